@@ -1,0 +1,1 @@
+"""Layer ``aircraft``: geometry, mass, derivatives, control mapping; no I/O except ``load``."""

@@ -1,0 +1,1 @@
+"""Layer ``flight``: FlightRecord and what reads and writes it (bag, ulog, csv)."""

@@ -1,0 +1,88 @@
+"""FlightRecord: a flight as time-aligned columns. SI, radians, body axes forward-right-down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Columns a record may hold, with their units. A record also holds one column per further control.
+COLUMNS = {
+    "ax": "specific force, body x, m/s^2",
+    "ay": "specific force, body y, m/s^2",
+    "az": "specific force, body z, m/s^2 (about -9.8 in level flight)",
+    "p": "roll rate, rad/s",
+    "q": "pitch rate, rad/s",
+    "r": "yaw rate, rad/s",
+    "phi": "roll angle, rad",
+    "theta": "pitch angle, rad",
+    "psi": "heading, rad",
+    "V": "true airspeed, m/s",
+    "alpha": "angle of attack, rad",
+    "beta": "sideslip, rad",
+    "rho": "air density, kg/m^3",
+    "thrust": "thrust, N",
+    "de": "elevator, rad",
+    "da": "aileron, rad",
+    "dr": "rudder, rad",
+}
+
+
+@dataclass(frozen=True)
+class FlightRecord:
+    """A flight on one time base.
+
+    ``time`` (N,) s, strictly increasing, usually from zero; ``columns`` name -> (N,), NaN = not measured.
+    ``start_ns`` is the header stamp of ``time == 0``. ``rejected`` counts input left out, by reason.
+    Raises ValueError where times do not increase or lengths differ.
+    """
+
+    time: Array
+    columns: Mapping[str, Array]
+    name: str = ""
+    start_ns: int = 0
+    rejected: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.time.ndim != 1 or self.time.size < 2:
+            raise ValueError(f"flight {self.name!r}: {self.time.size} samples; at least 2 are needed")
+        step = np.diff(self.time)
+        if not np.all(step > 0):
+            i = int(np.argmin(step > 0))
+            raise ValueError(
+                f"flight {self.name!r}: time must increase; sample {i + 1} at {self.time[i + 1]:.6f} s "
+                f"follows {self.time[i]:.6f} s"
+            )
+        for column, values in self.columns.items():
+            if values.shape != self.time.shape:
+                raise ValueError(
+                    f"flight {self.name!r}: column {column!r} has {values.size} values for {self.time.size} times"
+                )
+
+    def __getitem__(self, column: str) -> Array:
+        """The column, or all NaN where it was not measured."""
+        if column in self.columns:
+            return self.columns[column]
+        return np.full(self.time.shape, np.nan)
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last sample."""
+        return float(self.time[-1] - self.time[0])
+
+    def measured(self, column: str) -> bool:
+        """Whether the column holds any finite value."""
+        return bool(np.isfinite(self[column]).any())
+
+    def between(self, start: float, stop: float) -> FlightRecord:
+        """The part with start <= time < stop (s), on the same clock."""
+        keep = (self.time >= start) & (self.time < stop)
+        columns = {name: values[keep] for name, values in self.columns.items()}
+        return FlightRecord(self.time[keep], columns, self.name, self.start_ns, self.rejected)
