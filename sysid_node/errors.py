@@ -1,0 +1,5 @@
+"""What a user can do wrong, said in one line."""
+
+
+class InputError(ValueError):
+    """Bad input: one line that says what was wrong, where, and what to do. The CLI exits with 2."""

@@ -1,0 +1,44 @@
+"""What goes into and comes out of the online estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+#: Columns of an aligned sample before the aerodynamic controls (which follow in the aircraft file's order).
+#: Specific force at the IMU m/s^2, rates rad/s, airspeed m/s, flow angles at the air-data probe rad,
+#: air density kg/m^3, thrust N (NaN = not measured). Body axes FRD.
+SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust")
+
+
+@dataclass(frozen=True)
+class DerivativeEstimate:
+    """One derivative with its standard error and 95 % interval; ``status`` says why it is not valid."""
+
+    name: str
+    value: float
+    standard_error: float
+    lower: float
+    upper: float
+    valid: bool
+    status: str  # "ok", "converging", "not excited", "collinear with ...", "stale input", "outside model", "changed"
+
+
+@dataclass(frozen=True)
+class FitQuality:
+    """How well one coefficient's equation is satisfied over the lines in use."""
+
+    coefficient: str
+    r_squared: float  # 0..1
+    residual_std: float  # of the non-dimensional coefficient, in the band
+    degrees_of_freedom: float  # independent observations beyond the parameters
+    samples: int  # in the window
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """All that the estimator knows at one time (s, of the last sample included)."""
+
+    time: float
+    derivatives: Mapping[str, DerivativeEstimate]
+    fits: Mapping[str, FitQuality]
