@@ -1,0 +1,70 @@
+"""What can be set of the online estimator: one table for node parameters, ``--set`` and tests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, get_type_hints
+
+from sysid_node.errors import InputError
+
+METHODS = ("sls_rft", "iv_rft")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the online estimator. The defaults suit UAVs of 1 to 20 kg; raises InputError on impossible values."""
+
+    frequencies: tuple[float, float, float] = (0.1, 0.04, 2.0)  # Hz: first line, step, last line
+    method: str = "sls_rft"  # "sls_rft" least squares, "iv_rft" instrumental variables
+    forgetting_time: float = 0.0  # s: older data count e^-1; 0 = nothing is forgotten
+    window: float = 0.0  # s: only the last so many seconds count; 0 = the whole record
+    settle_time: float = 0.5  # s left out at the start, while filters and pilots settle
+    max_gap: float = 0.2  # s: the longest gap in the data that is bridged by interpolation
+    use_prior: bool = False  # whether the aircraft file's derivatives count, by their tolerances
+    detect_changes: bool = True  # forget what was before an abrupt change of the aircraft
+    valid_fraction: float = 0.3  # a derivative is valid once its standard error is under this share of its size
+
+    def __post_init__(self) -> None:
+        start, step, stop = self.frequencies
+        if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
+            raise InputError(f"frequencies {start}:{step}:{stop}: expected 0 < start < stop and step > 0, in Hz")
+        if self.method not in METHODS:
+            raise InputError(f"method {self.method!r}: expected one of {', '.join(METHODS)}")
+        for name in ("forgetting_time", "window", "settle_time"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError(f"{name} {value}: expected seconds, zero or more")
+        if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):
+            raise InputError(f"max_gap {self.max_gap}: expected seconds, more than zero")
+        if not 0.0 < self.valid_fraction:
+            raise InputError(f"valid_fraction {self.valid_fraction}: expected a positive fraction")
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Settings:
+        """From node parameters or ``--set key=value`` texts. Raises InputError naming the wrong key or value."""
+        types = get_type_hints(cls)
+        for key in values:
+            if key not in types:
+                raise InputError(f"setting {key!r} is not known; known: {', '.join(types)}")
+        return cls(**{key: _parse(key, types[key], value) for key, value in values.items()})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values by name, for ``summary.json``."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+def _parse(key: str, kind: Any, value: Any) -> Any:
+    """One setting from a text or a plain value."""
+    try:
+        if key == "frequencies":
+            parts = value.split(":") if isinstance(value, str) else value
+            start, step, stop = (float(part) for part in parts)
+            return start, step, stop
+        if kind is bool and isinstance(value, str):
+            return {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}[value.lower()]
+        return kind(value)
+    except (KeyError, TypeError, ValueError):
+        wanted = "START:STEP:STOP in Hz" if key == "frequencies" else f"a {kind.__name__}"
+        raise InputError(f"setting {key} = {value!r}: expected {wanted}") from None
