@@ -1,0 +1,31 @@
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "sysid_node"
+SHARE = f"share/{NAME}"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["report/templates/**/*"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (SHARE, ["package.xml"]),
+        *((f"{SHARE}/{folder}", glob(f"{folder}/*.*")) for folder in ("config", "config/aircraft", "launch")),
+    ],
+    zip_safe=False,
+    maintainer="sysid maintainers",
+    maintainer_email="maintainers@sysid.invalid",
+    description="Identifies a fixed-wing aircraft's stability and control derivatives in flight.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "identifier = sysid_node.ros.identifier:main",
+            "player = sysid_node.ros.player:main",
+            "sysid = sysid_node.cli.main:main",
+        ],
+    },
+)
