@@ -102,7 +102,7 @@ class Aircraft:
     derivatives: Mapping[str, Derivative]  # by name, in the file's order
     throttle: Throttle | None = None
     sensors: Sensors = field(default_factory=Sensors)
-    noise: Mapping[str, float] = DEFAULT_NOISE
+    noise: Mapping[str, float] = field(default_factory=lambda: dict(DEFAULT_NOISE))
 
     @property
     def control_symbols(self) -> tuple[str, ...]:

@@ -26,6 +26,9 @@ STATE_REGRESSORS = {
 #: Symbols of the standard controls; a further control states its own in the aircraft file.
 CONTROL_SYMBOLS = {"elevator": "de", "aileron": "da", "rudder": "dr"}
 
+#: Names of signals, which no control's symbol may take.
+RESERVED_SYMBOLS = frozenset(STATE_REGRESSORS) | {"ax", "ay", "az", "phi", "theta", "psi", "rho", "thrust", "time", "t"}
+
 #: The full linear model of the design, in the order in which tables list it.
 STANDARD_DERIVATIVES = (
     *("CL_0", "CL_alpha", "CL_q", "CL_de"),

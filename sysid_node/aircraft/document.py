@@ -1,0 +1,112 @@
+"""A YAML file in which every value knows its file, line and dotted key, so that an error can say where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import yaml
+
+from sysid_node.errors import InputError
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One value of the file. ``key`` is its dotted path, empty at the top."""
+
+    node: yaml.Node
+    key: str
+    file: str
+
+    def error(self, problem: str) -> InputError:
+        """The error to raise about this value: ``file:line: dotted.key: problem``."""
+        return InputError(f"{self.file}:{self.node.start_mark.line + 1}: {self.key or 'top level'}: {problem}")
+
+    def mismatch(self, expected: str) -> InputError:
+        """The error that says what was got and what was expected."""
+        return self.error(f"got {self._got()}, expected {expected}")
+
+    def number(self, expected: str, accept: Callable[[float], bool] = math.isfinite) -> float:
+        """The value as a finite number for which ``accept`` holds; ``expected`` says so in words."""
+        try:
+            value = float(self.node.value) if self._is_plain() else math.nan
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and accept(value)):
+            raise self.mismatch(expected)
+        return value
+
+    def text(self, expected: str) -> str:
+        """The value as text that is not empty."""
+        if not isinstance(self.node, yaml.ScalarNode) or not str(self.node.value).strip():
+            raise self.mismatch(expected)
+        return str(self.node.value)
+
+    def items(self, expected: str) -> list[Entry]:
+        """The entries of a list."""
+        if not isinstance(self.node, yaml.SequenceNode):
+            raise self.mismatch(expected)
+        return [Entry(node, f"{self.key}[{i}]", self.file) for i, node in enumerate(self.node.value)]
+
+    def mapping(self, expected: str) -> dict[str, Entry]:
+        """The entries of a mapping with keys of any name; a key given twice is an error."""
+        if not isinstance(self.node, yaml.MappingNode):
+            raise self.mismatch(expected)
+        entries: dict[str, Entry] = {}
+        for key_node, node in self.node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise Entry(key_node, self.key, self.file).mismatch("a name as key")
+            key = str(key_node.value)
+            entry = Entry(node, f"{self.key}.{key}" if self.key else key, self.file)
+            if key in entries:
+                raise Entry(key_node, entry.key, self.file).error("given twice; keep one")
+            entries[key] = entry
+        return entries
+
+    def fields(self, required: Mapping[str, str], optional: Collection[str] = ()) -> dict[str, Entry]:
+        """The entries of a mapping with known keys. ``required`` says of each needed key what it is."""
+        known = (*required, *optional)
+        entries = self.mapping(f"a mapping with {', '.join(known)}")
+        for key, entry in entries.items():
+            if key not in known:
+                raise entry.error(f"unknown key; expected one of {', '.join(known)}{did_you_mean(key, known)}")
+        for key, meaning in required.items():
+            if key not in entries:
+                raise self.error(f"key {key!r} is missing; expected {meaning}")
+        return entries
+
+    def _is_plain(self) -> bool:
+        return isinstance(self.node, yaml.ScalarNode) and self.node.style is None
+
+    def _got(self) -> str:
+        if isinstance(self.node, yaml.MappingNode):
+            return "a mapping"
+        if isinstance(self.node, yaml.SequenceNode):
+            return "a list"
+        if self._is_plain():
+            return str(self.node.value) or "nothing"
+        return f"the text {self.node.value!r}"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """``"; did you mean cbar?"`` or nothing."""
+    names = list(known)
+    matches = [name for name in names if name.casefold() == word.casefold()]
+    matches = matches or get_close_matches(word, names, n=1, cutoff=0.5)
+    return f"; did you mean {matches[0]!r}?" if matches else ""
+
+
+def parse_document(text: str, file: str) -> Entry:
+    """The top-level entry of a YAML text. Raises InputError, with the line, where it is not YAML."""
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise InputError(f"{file}:{line}: not valid YAML: {error.problem or error.context}") from error
+    except (yaml.YAMLError, RecursionError) as error:
+        raise InputError(f"{file}: not valid YAML: {str(error).splitlines()[0]}") from error
+    if node is None:
+        raise InputError(f"{file}: the file is empty")
+    return Entry(node, "", file)
