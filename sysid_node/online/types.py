@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 #: Columns of an aligned sample before the aerodynamic controls (which follow in the aircraft file's order).
 #: Specific force at the IMU m/s^2, rates rad/s, airspeed m/s, flow angles at the air-data probe rad,
-#: air density kg/m^3, thrust N (NaN = not measured). Body axes FRD.
-SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust")
+#: air density kg/m^3, thrust N (NaN = not measured), and the time between the two air-data messages that the
+#: sample lies between, s: the flow angles' noise density is their variance times it. Body axes FRD.
+SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", "air_interval")
 
 
 @dataclass(frozen=True)
