@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,15 +30,16 @@ class Spectra:
     """Amplitude spectra on one frequency axis: peak amplitude of a sinusoid at each frequency.
 
     ``frequency`` (F,) Hz, increasing; ``inputs`` control symbol -> (F,) in rad (thrust in N);
-    ``residuals`` coefficient -> (F,), non-dimensional: measured minus modelled.
+    ``measured`` and ``residuals`` coefficient -> (F,), non-dimensional: as measured, and measured minus modelled.
     """
 
     frequency: Array
     inputs: Mapping[str, Array] = field(default_factory=dict)
+    measured: Mapping[str, Array] = field(default_factory=dict)
     residuals: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, values in (*self.inputs.items(), *self.residuals.items()):
+        for name, values in (*self.inputs.items(), *self.measured.items(), *self.residuals.items()):
             if values.shape != self.frequency.shape:
                 raise InputError(
                     f"spectrum {name!r} has {values.size} values for {self.frequency.size} frequencies; "
@@ -94,7 +96,7 @@ class RunResult:
 
     def __post_init__(self) -> None:
         times = [estimates.time for estimates in self.history]
-        if any(later < earlier for earlier, later in zip(times, times[1:], strict=False)):
+        if any(later < earlier for earlier, later in pairwise(times)):
             raise InputError("estimates over time are out of order; give them by increasing time")
 
     @property

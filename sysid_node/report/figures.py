@@ -1,0 +1,131 @@
+"""Plotly figures as plain values: one quiet style, arrays packed as 32-bit floats.
+
+The page needs plotly.js only (its basic bundle lies in ``templates/vendor``); nothing here imports Plotly.
+Colours are Okabe and Ito's (2008), told apart by colour-blind readers and in grey print by dashes.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from sysid_node.flight.record import Array
+
+BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#AA4499"
+INK, MUTED, GRID, PRIOR_BAND = "#1f2933", "#8a94a0", "#e6eaef", "rgba(110,122,137,0.16)"
+BLUE_BAND, GREY_BAND = "rgba(0,114,178,0.20)", "rgba(138,148,160,0.20)"
+CYCLE = ((BLUE, "solid"), (VERMILION, "dash"), (GREEN, "dot"), (PURPLE, "dashdot"))
+
+Trace = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One plot: Plotly traces and layout, a sentence for who cannot see it, its height in pixels."""
+
+    label: str
+    traces: Sequence[Trace]
+    layout: Mapping[str, Any] = field(default_factory=dict)
+    height: int = 230
+
+    @property
+    def json(self) -> Markup:
+        """The figure for a ``<script type="application/json">``: nothing in it can end that element."""
+        spec = {"data": list(self.traces), "layout": {**_LAYOUT, "height": self.height, **self.layout}}
+        text = json.dumps(spec, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+        return Markup(text.replace("<", "\\u003c"))
+
+
+def packed(values: Array) -> dict[str, str]:
+    """An array (N,) as Plotly's typed-array text; NaN is a gap in the line."""
+    data = np.ascontiguousarray(values, dtype="<f4").tobytes()
+    return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
+
+
+def line(x: Array, y: Array, name: str = "", *, colour: str = BLUE, dash: str = "solid", width: float = 1.6) -> Trace:
+    """A line through (N,) points; the hover text names it."""
+    return {
+        "type": "scatter",
+        "mode": "lines" if x.size > 1 else "markers",
+        "x": packed(x),
+        "y": packed(y),
+        "name": name,
+        "line": {"color": colour, "dash": dash, "width": width},
+        "marker": {"color": colour, "size": 7},
+        "hovertemplate": "%{y:.4~g}",
+    }
+
+
+def band(x: Array, lower: Array, upper: Array, keep: Array, colour: str) -> Trace:
+    """The area between two (N,) curves wherever ``keep`` (N,) holds and both are finite, one polygon a stretch."""
+    inside = (keep & np.isfinite(lower) & np.isfinite(upper)).astype(np.int8)
+    edges = np.flatnonzero(np.diff(inside, prepend=0, append=0))
+    xs, ys = [], []
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        stretch = slice(start, stop)
+        xs += [x[stretch], x[stretch][::-1], [np.nan]]
+        ys += [upper[stretch], lower[stretch][::-1], [np.nan]]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": packed(np.concatenate(xs) if xs else np.empty(0)),
+        "y": packed(np.concatenate(ys) if ys else np.empty(0)),
+        "fill": "toself",
+        "fillcolor": colour,
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+    }
+
+
+def level(value: float, colour: str, dash: str = "solid", width: float = 1.4) -> dict[str, Any]:
+    """A horizontal line across the plot."""
+    position = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value}
+    return {**position, "line": {"color": colour, "dash": dash, "width": width}}
+
+
+def stripe(lower: float, upper: float, colour: str) -> dict[str, Any]:
+    """A horizontal stripe across the plot, behind everything."""
+    position = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": lower, "y1": upper}
+    return {**position, "layer": "below", "fillcolor": colour, "line": {"width": 0}}
+
+
+def moment(time: float, colour: str = VERMILION) -> dict[str, Any]:
+    """A dotted vertical line at a time (s)."""
+    position = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": time, "x1": time}
+    return {**position, "line": {"color": colour, "dash": "dot", "width": 1.2}}
+
+
+def axis(title: str, **more: Any) -> dict[str, Any]:
+    """An axis with its quantity and unit."""
+    return {**_AXIS, "title": {"text": title, "standoff": 6, "font": {"size": 12}}, **more}
+
+
+_AXIS: dict[str, Any] = {
+    "gridcolor": GRID,
+    "zeroline": False,
+    "linecolor": "#b8c0ca",
+    "showline": True,
+    "ticks": "outside",
+    "ticklen": 3,
+    "tickcolor": "#b8c0ca",
+    "nticks": 6,
+    "automargin": True,
+    "exponentformat": "power",
+}
+
+_LAYOUT: dict[str, Any] = {
+    "font": {"family": "system-ui, 'Segoe UI', Roboto, 'Liberation Sans', sans-serif", "size": 12, "color": INK},
+    "margin": {"l": 54, "r": 10, "t": 10, "b": 40},
+    "paper_bgcolor": "rgba(0,0,0,0)",
+    "plot_bgcolor": "rgba(0,0,0,0)",
+    "showlegend": False,
+    "hovermode": "x",
+    "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.0, "yanchor": "bottom", "font": {"size": 12}},
+    "separators": ".\u202f",
+}

@@ -1,0 +1,121 @@
+"""The final table: every derivative with its interval, in numbers and as a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from sysid_node.online.types import DerivativeEstimate
+from sysid_node.report.compare import NORMAL_95, agrees, covers, half_width
+from sysid_node.report.data import Prior, RunResult
+from sysid_node.report.sections import Section
+from sysid_node.report.sections.groups import grouped
+from sysid_node.report.words import meaning, number, symbol, unit, with_interval
+
+#: Half widths, as fractions of the reference, that the picture's axis may take.
+SPANS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A value with its interval on the picture's axis: percent of its width, cut at the edges."""
+
+    at: float
+    lower: float
+    upper: float
+    beyond: str = ""  # "left" or "right" where the value itself lies outside the axis
+
+
+@dataclass(frozen=True)
+class Row:
+    """One derivative as the table shows it."""
+
+    name: str
+    symbol: Markup
+    meaning: str
+    unit: str
+    estimate: str
+    valid: bool
+    status: str
+    prior: str
+    differs: bool  # from the prior, by more than both uncertainties
+    truth: str
+    missed: bool  # valid, yet the interval does not hold the true value
+    mark: Mark | None
+    prior_mark: Mark | None
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """Groups of rows and the picture's axis."""
+    estimates = run.final.derivatives if run.final else {}
+    span = _span(run, estimates.values())
+    groups = [(title, [_row(run, estimates[name], span) for name in names]) for title, names in grouped(estimates)]
+    return {
+        "groups": groups,
+        "span": f"{number(100 * span, 2)}\u202f%",
+        "reference": "true value" if run.truth else "aircraft file" if run.prior else "",
+        "has_prior": bool(run.prior),
+        "has_truth": bool(run.truth),
+    }
+
+
+def _row(run: RunResult, d: DerivativeEstimate, span: float) -> Row:
+    prior, truth, reference = run.prior.get(d.name), run.truth.get(d.name), _reference(run, d.name)
+    drawn = math.isfinite(reference) and reference != 0.0
+    return Row(
+        name=d.name,
+        symbol=symbol(d.name),
+        meaning=meaning(d.name),
+        unit=unit(d.name),
+        estimate=with_interval(d.value, half_width(d)),
+        valid=d.valid,
+        status="valid" if d.valid and d.status == "ok" else d.status,
+        prior="" if prior is None else with_interval(prior.value, NORMAL_95 * prior.tolerance),
+        differs=d.valid and prior is not None and not agrees(d, prior),
+        truth="" if truth is None else number(truth),
+        missed=d.valid and truth is not None and not covers(d, truth),
+        mark=_mark(d.value, half_width(d), reference, span) if drawn else None,
+        prior_mark=_prior_mark(prior, reference, span) if drawn and prior is not None else None,
+    )
+
+
+def _reference(run: RunResult, name: str) -> float:
+    """What the picture is normalised by: the truth where any is known, else the prior; NaN = neither."""
+    if run.truth:
+        return run.truth.get(name, math.nan)
+    return run.prior[name].value if name in run.prior else math.nan
+
+
+def _span(run: RunResult, estimates: Iterable[DerivativeEstimate]) -> float:
+    """The smallest axis on which most usable intervals lie whole."""
+    reach = [
+        max(abs(d.lower - reference), abs(d.upper - reference)) / abs(reference)
+        for d in estimates
+        if d.valid and (reference := _reference(run, d.name))
+    ]
+    reach = [value for value in reach if math.isfinite(value)]
+    wanted = float(np.percentile(reach, 85)) if reach else 1.0
+    return next((span for span in SPANS if span >= wanted), SPANS[-1])
+
+
+def _mark(value: float, half: float, reference: float, span: float) -> Mark | None:
+    """Where a value and its interval fall on an axis from -span to +span about the reference."""
+    if not math.isfinite(value):
+        return None
+    half = half if math.isfinite(half) else 0.0
+    places = [50.0 + 50.0 * (v - reference) / (abs(reference) * span) for v in (value, value - half, value + half)]
+    at, lower, upper = (min(max(place, 0.0), 100.0) for place in places)
+    beyond = "left" if places[0] < 0 else "right" if places[0] > 100 else ""
+    return Mark(at, lower, upper, beyond)
+
+
+def _prior_mark(prior: Prior, reference: float, span: float) -> Mark | None:
+    return _mark(prior.value, NORMAL_95 * prior.tolerance, reference, span)
+
+
+SECTION: Section[RunResult] = Section("derivatives", "Derivatives", "derivatives.html.j2", context)

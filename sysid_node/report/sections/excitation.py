@@ -1,0 +1,95 @@
+"""What was flown: inputs and motion against time, and the inputs' spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sysid_node.flight.record import COLUMNS, FlightRecord
+from sysid_node.report import figures
+from sysid_node.report.data import RunResult, Spectra
+from sysid_node.report.figures import CYCLE, Figure
+from sysid_node.report.sections import Section
+from sysid_node.report.thin import thin_curve
+
+DEGREES = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class Group:
+    """Signals that share one plot: column -> label, drawn in ``unit`` = SI times ``scale``."""
+
+    title: str
+    unit: str
+    scale: float
+    columns: Mapping[str, str]
+
+
+GROUPS = (
+    Group("Flow angles", "deg", DEGREES, {"alpha": "\u03b1", "beta": "\u03b2"}),
+    Group("Angular rates", "deg/s", DEGREES, {"p": "p, roll", "q": "q, pitch", "r": "r, yaw"}),
+    Group("Airspeed", "m/s", 1.0, {"V": "V"}),
+    Group("Specific force", "m/s\u00b2", 1.0, {"ax": "forward", "ay": "right", "az": "down"}),
+    Group("Attitude", "deg", DEGREES, {"phi": "\u03c6, roll", "theta": "\u03b8, pitch"}),
+    Group("Thrust", "N", 1.0, {"thrust": "thrust"}),
+)
+
+_SURFACES = {"de": "elevator", "da": "aileron", "dr": "rudder"}
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """Captions and figures, the deflections first."""
+    plots = [] if run.flight is None else _histories(run.flight)
+    spectrum = None if run.spectra is None or not run.spectra.inputs else _spectrum(run.spectra)
+    return {"plots": plots, "spectrum": spectrum}
+
+
+def _histories(flight: FlightRecord) -> list[tuple[str, Figure]]:
+    surfaces = {c: _SURFACES.get(c, c) for c in flight.columns if c in _SURFACES or c not in COLUMNS}
+    groups = (Group("Control deflections", "deg", DEGREES, surfaces), *GROUPS)
+    return [(group.title, figure) for group in groups if (figure := _history(flight, group)) is not None]
+
+
+def _history(flight: FlightRecord, group: Group) -> Figure | None:
+    measured = [column for column in group.columns if flight.measured(column)]
+    if not measured:
+        return None
+    traces = [
+        figures.line(*_curve(flight, column, group.scale), group.columns[column], colour=colour, width=1.3)
+        for column, (colour, _) in zip(measured, CYCLE, strict=False)
+    ]
+    layout = {
+        "xaxis": figures.axis("time, s"),
+        "yaxis": figures.axis(group.unit),
+        "showlegend": len(traces) > 1,
+    }
+    names = ", ".join(group.columns[column] for column in measured)
+    return Figure(f"{group.title} against time in {group.unit}: {names}", traces, layout)
+
+
+def _curve(flight: FlightRecord, column: str, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    time, values = thin_curve(flight.time, flight[column])
+    return time, scale * values
+
+
+def _spectrum(spectra: Spectra) -> Figure:
+    traces = [
+        figures.line(spectra.frequency, DEGREES * values, _SURFACES.get(name, name), colour=colour, dash=dash)
+        for (name, values), (colour, dash) in zip(_deflections(spectra), CYCLE, strict=False)
+    ]
+    layout = {
+        "xaxis": figures.axis("frequency, Hz"),
+        "yaxis": figures.axis("amplitude, deg", rangemode="tozero"),
+        "showlegend": len(traces) > 1,
+    }
+    return Figure("Amplitude spectra of the control deflections, deg against Hz", traces, layout, height=260)
+
+
+def _deflections(spectra: Spectra) -> list[tuple[str, np.ndarray]]:
+    return [(name, values) for name, values in spectra.inputs.items() if name != "thrust"]
+
+
+SECTION: Section[RunResult] = Section("excitation", "What was flown", "excitation.html.j2", context)

@@ -1,0 +1,56 @@
+"""How well the model explains the flight, and other flights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from sysid_node.report import figures
+from sysid_node.report.data import Response, RunResult
+from sysid_node.report.figures import Figure
+from sysid_node.report.sections import Section
+from sysid_node.report.thin import MAX_POINTS, thin_curve
+from sysid_node.report.words import COEFFICIENT_WORDS, number, symbol, words_of
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """Quality by coefficient, measured against modelled, and figures of merit on held-out flights."""
+    fits = run.final.fits.values() if run.final else ()
+    return {
+        "fits": [
+            {
+                "name": fit.coefficient,
+                "symbol": symbol(fit.coefficient),
+                "words": COEFFICIENT_WORDS.get(fit.coefficient, ""),
+                "explained": number(100 * fit.r_squared, 3) + ("\u202f%" if math.isfinite(fit.r_squared) else ""),
+                "bar": min(max(100 * fit.r_squared, 0.0), 100.0) if math.isfinite(fit.r_squared) else 0.0,
+                "residual": number(fit.residual_std, 2),
+                "freedom": number(fit.degrees_of_freedom, 3),
+                "samples": str(fit.samples),
+            }
+            for fit in fits
+        ],
+        "responses": [(name, symbol(name), r.unit, _figure(name, r)) for name, r in run.responses.items()],
+        "holdout": [_flight(name, outputs) for name, outputs in run.holdout.items()],
+    }
+
+
+def _figure(name: str, response: Response) -> Figure:
+    time, measured, modelled = thin_curve(response.time, response.measured, response.modelled, points=2 * MAX_POINTS)
+    traces = [
+        figures.line(time, measured, "measured", colour=figures.MUTED, width=1.4),
+        figures.line(time, modelled, "model", width=1.6),
+    ]
+    layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(response.unit)}
+    return Figure(f"{name}: measured, and the model's answer to the same inputs", traces, layout)
+
+
+def _flight(name: str, outputs: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    """A table: outputs down, figures of merit across."""
+    merits = list(dict.fromkeys(merit for figures_of in outputs.values() for merit in figures_of))
+    rows = [(output, [number(found.get(m, math.nan)) for m in merits]) for output, found in outputs.items()]
+    return {"name": name, "merits": [words_of(merit) for merit in merits], "rows": rows}
+
+
+SECTION: Section[RunResult] = Section("fit", "Quality of fit", "fit.html.j2", context)

@@ -1,0 +1,140 @@
+"""Every estimate against time with its 95 % band, small multiples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from sysid_node.flight.record import Array
+from sysid_node.online.types import DerivativeEstimate
+from sysid_node.report import figures
+from sysid_node.report.compare import NORMAL_95, half_width
+from sysid_node.report.data import RunResult
+from sysid_node.report.figures import Figure
+from sysid_node.report.sections import Section
+from sysid_node.report.sections.groups import grouped
+from sysid_node.report.thin import thin_curve
+from sysid_node.report.words import short_meaning, symbol, unit, with_interval
+
+POINTS = 900  # of one panel's curves
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One small multiple with its caption; without a figure where no estimate was ever finite."""
+
+    name: str
+    symbol: Markup
+    meaning: str
+    valid: bool
+    status: str
+    figure: Figure | None
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """One derivative over time, each (N,)."""
+
+    time: Array
+    value: Array
+    lower: Array
+    upper: Array
+    valid: Array  # 1.0 or 0.0
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """Groups of panels; none where there is but one time."""
+    if run.final is None or len(run.history) < 2:
+        return {"groups": []}
+    final = run.final.derivatives
+    groups = [(title, [_panel(run, final[name]) for name in names]) for title, names in grouped(final)]
+    return {"groups": groups, "has_prior": bool(run.prior), "has_truth": bool(run.truth)}
+
+
+def _panel(run: RunResult, last: DerivativeEstimate) -> Panel:
+    curves = _curves(run, last.name)
+    figure = _figure(run, last, curves) if np.isfinite(curves.value).any() else None
+    status = "valid" if last.valid and last.status == "ok" else last.status
+    return Panel(last.name, symbol(last.name), short_meaning(last.name), last.valid, status, figure)
+
+
+def _curves(run: RunResult, name: str) -> _Curves:
+    found = [(e.time, d) for e in run.history if (d := e.derivatives.get(name)) is not None]
+    table = np.array([(time, d.value, d.lower, d.upper, d.valid) for time, d in found], dtype=np.float64)
+    return _Curves(*thin_curve(*table.T, points=POINTS))
+
+
+def _figure(run: RunResult, last: DerivativeEstimate, c: _Curves) -> Figure:
+    valid = c.valid > 0.5
+    muted = _touching(~valid)
+    traces = [
+        figures.band(c.time, c.lower, c.upper, muted, figures.GREY_BAND),
+        figures.band(c.time, c.lower, c.upper, valid, figures.BLUE_BAND),
+        figures.line(c.time, np.where(muted, c.value, np.nan), colour=figures.MUTED, width=1.2),
+        figures.line(c.time, np.where(valid, c.value, np.nan)),
+    ]
+    layout = {
+        "xaxis": figures.axis("time, s"),
+        "yaxis": figures.axis(unit(last.name), range=_limits(run, last.name, c)),
+        "shapes": _references(run, last.name) + [figures.moment(time) for time in _changes(run, last.name)],
+    }
+    ends = f"ends at {with_interval(last.value, half_width(last))} {unit(last.name)}, {last.status}"
+    return Figure(f"{last.name} against time with its 95 % interval; {ends}", traces, layout, height=200)
+
+
+def _touching(mask: Array) -> Array:
+    """The mask widened by one sample on both sides, so that two lines meet where validity changes."""
+    wide = mask.copy()
+    wide[1:] |= mask[:-1]
+    wide[:-1] |= mask[1:]
+    return wide
+
+
+def _references(run: RunResult, name: str) -> list[dict[str, Any]]:
+    shapes = []
+    if name in run.prior:
+        prior = run.prior[name]
+        reach = NORMAL_95 * prior.tolerance
+        if np.isfinite(reach):
+            shapes.append(figures.stripe(prior.value - reach, prior.value + reach, figures.PRIOR_BAND))
+        shapes.append(figures.level(prior.value, figures.MUTED, "dash"))
+    if name in run.truth:
+        shapes.append(figures.level(run.truth[name], figures.VERMILION))
+    return shapes
+
+
+def _limits(run: RunResult, name: str, c: _Curves) -> list[float]:
+    """Axis limits for where the estimate ends up; the wide intervals of the first seconds run off the panel."""
+    settled = c.time >= c.time[0] + 0.25 * (c.time[-1] - c.time[0])
+    shown = settled & (c.valid > 0.5)
+    if not shown.any():
+        shown = settled
+    wanted = [*_percentiles(c.value[shown], 1, 99), *_percentiles(c.lower[shown], 15, 85)]
+    wanted += [*_percentiles(c.upper[shown], 15, 85), c.lower[-1], c.upper[-1], c.value[-1]]
+    wanted += [run.truth[name]] if name in run.truth else []
+    wanted += [run.prior[name].value] if name in run.prior else []
+    finite = [float(value) for value in wanted if np.isfinite(value)]
+    if not finite:
+        finite = c.value[np.isfinite(c.value)].tolist()
+    low, high = min(finite), max(finite)
+    margin = 0.12 * (high - low) or 0.1 * abs(high) or 0.1
+    return [low - margin, high + margin]
+
+
+def _percentiles(values: Array, low: float, high: float) -> list[float]:
+    known = values[np.isfinite(values)]
+    return [float(p) for p in np.percentile(known, [low, high])] if known.size else []
+
+
+def _changes(run: RunResult, name: str) -> list[float]:
+    """Times (s) at which this derivative was announced as changed."""
+    states = [(e.time, e.derivatives[name].status.startswith("changed")) for e in run.history if name in e.derivatives]
+    before = [False, *(changed for _, changed in states)]
+    return [time for (time, changed), was in zip(states, before, strict=False) if changed and not was]
+
+
+SECTION: Section[RunResult] = Section("history", "Estimates against time", "history.html.j2", context)

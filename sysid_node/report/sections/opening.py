@@ -1,0 +1,133 @@
+"""The opening: what came out, in one paragraph that a pilot understands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from markupsafe import Markup, escape
+
+from sysid_node.online.types import DerivativeEstimate
+from sysid_node.report.compare import agrees, covers, half_width
+from sysid_node.report.data import RunResult
+from sysid_node.report.sections import Section
+from sysid_node.report.words import METHOD_WORDS, listing, number, plural, short_meaning, symbol
+
+#: What the sign of a derivative means in the air: (derivative, if negative, if positive).
+HANDLING = (
+    (
+        "Cm_alpha",
+        "in pitch the aircraft returns to trim by itself after a disturbance",
+        "in pitch the aircraft does not return to trim by itself: a disturbance grows",
+    ),
+    ("Cn_beta", "in yaw it turns away from the wind", "in yaw it weathercocks back into the wind"),
+    (
+        "Cl_p",
+        "a roll stops by itself once the ailerons are centred",
+        "a roll does not stop by itself when the ailerons are centred",
+    ),
+)
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """The sentences, the remarks, and the facts in one line."""
+    final = run.final
+    derivatives = list(final.derivatives.values()) if final else []
+    sentences: list[Callable[[RunResult, list[DerivativeEstimate]], Markup | None]] = [
+        _known,
+        _handling,
+        _best,
+        _unknown,
+        _against_truth,
+        _against_prior,
+    ]
+    paragraph = [sentence for make in sentences if (sentence := make(run, derivatives))]
+    return {"paragraph": Markup(" ").join(paragraph), "remarks": run.remarks, "facts": _facts(run)}
+
+
+def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
+    length = f"{number(run.data_seconds)} s of flight" if math.isfinite(run.data_seconds) else "this flight"
+    if not derivatives:
+        return Markup(
+            "<strong>No derivative was estimated</strong> from {} of {}. The tables below say what arrived and "
+            "what was rejected."
+        ).format(length, run.aircraft)
+    valid = sum(d.valid for d in derivatives)
+    share = f"all {len(derivatives)}" if valid == len(derivatives) else f"{valid} of {len(derivatives)}"
+    return Markup(
+        "From {} of {}, <strong>{} derivatives are known well enough to use</strong>. Each comes with an interval "
+        "meant to hold its true value 95 times in 100."
+    ).format(length, run.aircraft, share)
+
+
+def _handling(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
+    """Statements only where the whole interval has one sign."""
+    known = {d.name: d for d in derivatives if d.valid}
+    clauses = []
+    for name, negative, positive in HANDLING:
+        d = known.get(name)
+        if d is not None and d.lower * d.upper > 0:
+            clauses.append(Markup("{} ({})").format(negative if d.upper < 0 else positive, symbol(name)))
+    if not clauses:
+        return None
+    text = Markup("; ").join(clauses)
+    return Markup("They say that {}.").format(text)
+
+
+def _best(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
+    ranked = sorted((half_width(d) / abs(d.value), d) for d in derivatives if d.valid and d.value and _named(d))
+    if not ranked:
+        return None
+    relative, best = ranked[0]
+    return Markup("Best known is {} ({}), to ±{} %.").format(
+        symbol(best.name), short_meaning(best.name), number(100 * relative, 2)
+    )
+
+
+def _unknown(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
+    by_status: dict[str, list[Markup]] = {}
+    for d in derivatives:
+        if not d.valid:
+            by_status.setdefault(d.status, []).append(symbol(d.name))
+    if not by_status:
+        return None
+    reasons = [Markup("{} ({})").format(listing(names), escape(status)) for status, names in by_status.items()]
+    return Markup("<strong>Not to be used</strong>: {}.").format(Markup("; ").join(reasons))
+
+
+def _against_truth(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
+    checked = [d for d in derivatives if d.valid and d.name in run.truth]
+    if not checked:
+        return None
+    held = sum(covers(d, run.truth[d.name]) for d in checked)
+    return Markup("The true values are known here: {} of {} usable intervals hold theirs.").format(held, len(checked))
+
+
+def _against_prior(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
+    checked = [d for d in derivatives if d.valid and d.name in run.prior]
+    if not checked:
+        return None
+    differing = [symbol(d.name) for d in checked if not agrees(d, run.prior[d.name])]
+    if not differing:
+        return Markup("None differs from the aircraft file by more than the uncertainties allow.")
+    verb = "differs" if len(differing) == 1 else "differ"
+    return Markup("From the aircraft file {} {} by more than the uncertainties allow.").format(listing(differing), verb)
+
+
+def _named(d: DerivativeEstimate) -> bool:
+    """Offsets and trim terms are left out where the best known derivative is named."""
+    return not d.name.endswith("_0") and math.isfinite(half_width(d))
+
+
+def _facts(run: RunResult) -> list[tuple[str, str]]:
+    lost = sum(run.rejected.values())
+    return [
+        ("Aircraft", run.aircraft),
+        ("Method", METHOD_WORDS.get(run.method, run.method)),
+        ("Data", f"{number(run.data_seconds)} s, {plural(run.samples, 'sample')}"),
+        ("Rejected", plural(lost, "message") if lost else "nothing"),
+    ]
+
+
+SECTION: Section[RunResult] = Section("opening", "", "opening.html.j2", context)

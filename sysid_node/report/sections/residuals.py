@@ -1,0 +1,38 @@
+"""What the model leaves unexplained, by frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sysid_node.report import figures
+from sysid_node.report.data import RunResult, Spectra
+from sysid_node.report.figures import Figure
+from sysid_node.report.sections import Section
+from sysid_node.report.words import COEFFICIENT_WORDS, symbol
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """One panel a coefficient: its residual, and itself where it is known."""
+    spectra = run.spectra
+    names = () if spectra is None else tuple(spectra.residuals)
+    return {
+        "panels": [(symbol(n), n, COEFFICIENT_WORDS.get(n, ""), _figure(spectra, n)) for n in names if spectra],
+        "has_measured": spectra is not None and bool(spectra.measured),
+    }
+
+
+def _figure(spectra: Spectra, name: str) -> Figure:
+    traces = []
+    if name in spectra.measured:
+        measured = spectra.measured[name]
+        traces.append(figures.line(spectra.frequency, measured, "measured", colour=figures.MUTED, width=1.2))
+    traces.append(figures.line(spectra.frequency, spectra.residuals[name], "residual", colour=figures.VERMILION))
+    layout = {
+        "xaxis": figures.axis("frequency, Hz"),
+        "yaxis": figures.axis("amplitude", rangemode="tozero"),
+    }
+    return Figure(f"Amplitude spectrum of the residual of {name}", traces, layout, height=200)
+
+
+SECTION: Section[RunResult] = Section("residuals", "What the model leaves", "residuals.html.j2", context)
