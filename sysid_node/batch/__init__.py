@@ -1,0 +1,5 @@
+"""Layer ``batch``: estimators that see the whole flight at once."""
+
+import jax
+
+jax.config.update("jax_enable_x64", True)

@@ -1,0 +1,110 @@
+"""From a converged search to a Fit: covariance for coloured residuals, intervals, and what deserves no trust."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
+from sysid_node.batch.identifiability import inseparable_pairs, null_combination, sentences
+from sysid_node.batch.result import Answer, Estimate, Fit, interval
+from sysid_node.batch.unknowns import Unknowns
+from sysid_node.flight.record import Array
+
+
+def assess(
+    method: str,
+    unknowns: Unknowns,
+    z: Array,
+    *,
+    sensitivities: Sequence[Array],
+    answers: Sequence[Answer],
+    noise: Array,
+    converged: bool,
+    iterations: int,
+    message: str,
+) -> Fit:
+    """The Fit at the unknowns ``z`` (n,).
+
+    ``sensitivities`` (N, ny, n) and ``answers`` of each manoeuvre; ``noise`` (ny,) the residuals' standard deviation.
+    """
+    weighted = [block / noise[None, :, None] for block in sensitivities]
+    residuals = [np.nan_to_num(answer.residuals / noise, nan=0.0) for answer in answers]
+    information = sum(np.einsum("nop,noq->pq", block, block) for block in weighted) + _prior_information(unknowns)
+    count = len(unknowns.free)
+    lost = null_combination(_condensed(information, count), unknowns.names)
+    inverse = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+    covariance = coloured_covariance(inverse, weighted, residuals)[:count, :count]
+    white = np.sqrt(np.clip(np.diag(inverse)[:count], 0.0, None))
+    freedom = degrees_of_freedom([len(answer.time) for answer in answers])
+    status = _status(unknowns, z, lost)
+    estimates = {
+        name: _estimate(name, float(z[i]), float(np.sqrt(covariance[i, i])), freedom, status[name], float(white[i]))
+        for i, name in enumerate(unknowns.names)
+    }
+    return Fit(
+        method=method,
+        estimates=estimates,
+        covariance=covariance,
+        noise=dict(zip(unknowns.model.outputs, (float(s) for s in noise), strict=True)),
+        log_det=float(2.0 * np.sum(np.log(noise))),
+        answers=answers,
+        converged=converged,
+        iterations=iterations,
+        message=message,
+        remarks=_remarks(status, covariance, unknowns.names, lost),
+        nuisance=unknowns.nuisance(z),
+    )
+
+
+def _prior_information(unknowns: Unknowns) -> Array:
+    information = np.zeros((unknowns.size, unknowns.size))
+    index, _, sigma = unknowns.priors()
+    information[index, index] = 1.0 / sigma**2
+    return information
+
+
+def _condensed(information: Array, count: int) -> Array:
+    """Information (count, count) on the parameters once initial states and biases are estimated too."""
+    if information.shape[0] == count:
+        return information
+    own = information[count:, count:]
+    cross = information[:count, count:]
+    condensed = information[:count, :count] - cross @ np.linalg.pinv(own, rcond=1e-14, hermitian=True) @ cross.T
+    return np.asarray(0.5 * (condensed + condensed.T))
+
+
+def _status(unknowns: Unknowns, z: Array, lost: Sequence[str]) -> dict[str, str]:
+    """"ok", or why a parameter deserves no trust."""
+    lower, upper = unknowns.bounds()
+    status = {}
+    for i, name in enumerate(unknowns.names):
+        margin = 1e-6 * max(1.0, abs(z[i]))
+        others = [other for other in lost if other != name]
+        if name in lost:
+            status[name] = f"collinear with {', '.join(others)}" if others else "not excited"
+        elif z[i] - lower[i] < margin:
+            status[name] = f"at its lower bound {lower[i]:g}"
+        elif upper[i] - z[i] < margin:
+            status[name] = f"at its upper bound {upper[i]:g}"
+        else:
+            status[name] = "ok"
+    return status
+
+
+def _estimate(name: str, value: float, error: float, freedom: float, status: str, white: float) -> Estimate:
+    lower, upper = interval(value, error, freedom)
+    return Estimate(name, value, error, lower, upper, status == "ok", status, white)
+
+
+def _remarks(status: dict[str, str], covariance: Array, names: Sequence[str], lost: Sequence[str]) -> tuple[str, ...]:
+    remarks = []
+    if len(lost) > 1:
+        remarks.append(f"this flight does not determine {', '.join(lost)} apart from one another")
+    elif lost:
+        remarks.append(f"this flight says nothing about {lost[0]}")
+    remarks += [f"{name} ended {text}" for name, text in status.items() if text.startswith("at its")]
+    kept = [i for i, name in enumerate(names) if name not in lost]
+    pairs = inseparable_pairs(covariance[np.ix_(kept, kept)], [names[i] for i in kept])
+    return tuple(remarks + sentences(pairs))

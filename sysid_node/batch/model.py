@@ -1,0 +1,158 @@
+"""A model that every estimator understands: states, inputs, outputs, parameters, x' = f(x, u, theta), y = g(x, u, theta)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import jax
+import numpy as np
+
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+
+#: ``(x (nx,), u (nu,), theta (P,)) -> (n,)``, in JAX operations only, without side effects.
+VectorFunction = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One constant of a model: where its estimation starts and what is known of it beforehand.
+
+    ``prior`` is the 1-sigma uncertainty of ``start`` as knowledge from elsewhere (None: nothing is known);
+    ``fixed`` keeps it at ``start``. Raises InputError where ``start`` is not finite or outside the bounds.
+    """
+
+    name: str
+    start: float
+    unit: str = ""
+    lower: float = -math.inf
+    upper: float = math.inf
+    prior: float | None = None
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.start):
+            raise InputError(f"parameter {self.name}: start value {self.start} is not a number; give a finite one")
+        if not self.lower <= self.start <= self.upper:
+            raise InputError(
+                f"parameter {self.name}: start value {self.start:g} is outside its bounds "
+                f"{self.lower:g} to {self.upper:g}; move one or the other"
+            )
+        if not self.lower < self.upper:
+            raise InputError(f"parameter {self.name}: bounds {self.lower:g} to {self.upper:g} hold no value")
+        if self.prior is not None and not self.prior > 0.0:
+            raise InputError(f"parameter {self.name}: prior {self.prior:g}; expected a 1-sigma uncertainty above zero")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A dynamic system with unknown constants; compared by identity, so that compiled code is kept per model.
+
+    ``derivative`` (nx,) and ``output`` (ny,) are functions of state (nx,), input (nu,) and parameters (P,), each in
+    the order of the names given here; their units are those of the names (SI, radians, body axes FRD).
+    """
+
+    name: str
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    derivative: VectorFunction
+    output: VectorFunction
+    units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
+
+    def __post_init__(self) -> None:
+        for kind in ("states", "inputs", "outputs", "names"):
+            names = getattr(self, kind)
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise InputError(f"model {self.name}: {kind} named twice: {', '.join(twice)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameter names in the order of theta."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def start(self) -> Array:
+        """Start values (P,)."""
+        return np.array([parameter.start for parameter in self.parameters])
+
+    def changed(self, **changes: object) -> Model:
+        """The same model with some fields replaced."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def started_at(self, values: dict[str, float]) -> Model:
+        """The same model with other start values (clipped into the bounds) for some parameters."""
+        unknown = sorted(set(values) - set(self.names))
+        if unknown:
+            raise InputError(f"model {self.name} has no parameter {', '.join(unknown)}; it has {', '.join(self.names)}")
+
+        def moved(parameter: Parameter) -> Parameter:
+            if parameter.name not in values:
+                return parameter
+            return replace(parameter, start=float(np.clip(values[parameter.name], parameter.lower, parameter.upper)))
+
+        return self.changed(parameters=tuple(moved(parameter) for parameter in self.parameters))
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """One stretch of flight as a model sees it.
+
+    ``time`` (N,) s, increasing; ``inputs`` (N, nu), complete; ``outputs`` (N, ny) as measured, NaN = not measured;
+    ``initial_state`` (nx,) at ``time[0]``. Raises InputError on gaps in the inputs, too few samples, wrong shapes.
+    """
+
+    time: Array
+    inputs: Array
+    outputs: Array
+    initial_state: Array
+    name: str = "flight"
+
+    def __post_init__(self) -> None:
+        samples = self.time.size
+        if samples < 5:
+            raise InputError(f"{self.name}: {samples} samples; a manoeuvre needs at least 5")
+        if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0.0).all()):
+            raise InputError(f"{self.name}: time must be finite and increase")
+        for kind in ("inputs", "outputs"):
+            rows = getattr(self, kind).shape[0]
+            if getattr(self, kind).ndim != 2 or rows != samples:
+                raise InputError(f"{self.name}: {kind} have {rows} rows for {samples} times")
+        if not np.isfinite(self.initial_state).all():
+            raise InputError(f"{self.name}: initial state {self.initial_state} is not finite")
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    @property
+    def step(self) -> float:
+        """Median sampling interval, s."""
+        return float(np.median(np.diff(self.time)))
+
+
+def check_manoeuvres(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
+    """Raises InputError where a manoeuvre does not fit the model, lacks inputs, or measures nothing."""
+    if not manoeuvres:
+        raise InputError(f"model {model.name}: no manoeuvre given; at least one is needed")
+    for manoeuvre in manoeuvres:
+        sizes = (manoeuvre.inputs.shape[1], manoeuvre.outputs.shape[1], manoeuvre.initial_state.size)
+        wanted = (len(model.inputs), len(model.outputs), len(model.states))
+        if sizes != wanted:
+            raise InputError(
+                f"{manoeuvre.name}: {sizes[0]} inputs, {sizes[1]} outputs, {sizes[2]} states; "
+                f"model {model.name} has {wanted[0]}, {wanted[1]}, {wanted[2]}"
+            )
+        gaps = ~np.isfinite(manoeuvre.inputs)
+        if gaps.any():
+            row, column = np.argwhere(gaps)[0]
+            raise InputError(
+                f"{manoeuvre.name}: input {model.inputs[column]} is missing at {manoeuvre.time[row]:.3f} s "
+                f"({int(gaps[:, column].sum())} samples in all); cut the flight there or leave that input out of the model"
+            )
+    for column, name in enumerate(model.outputs):
+        if not any(np.isfinite(manoeuvre.outputs[:, column]).any() for manoeuvre in manoeuvres):
+            raise InputError(f"output {name} was never measured; leave it out of model {model.name}")

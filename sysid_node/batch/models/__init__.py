@@ -1,0 +1,1 @@
+"""Models for the batch estimators, one file each."""

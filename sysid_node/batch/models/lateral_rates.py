@@ -1,0 +1,48 @@
+"""Roll and yaw rate of an aircraft whose sideslip is measured: dimensional derivatives, linear.
+
+Jategaonkar (2015), sec. 4.20.1, eqs. 4.90 and 4.91 (ATTAS). With beta an input the equations of p and r stand alone, and
+neither airspeed, mass nor inertia need be known. The offsets lump initial conditions and biases of the measured inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax
+import jax.numpy as jnp
+
+from sysid_node.batch.model import Model, Parameter
+
+_REGRESSORS = ("p", "r", "da", "dr", "beta")
+_UNITS = {"L": "1/s", "N": "1/s", "Y": "m/s"}
+
+
+def lateral_rates(start: Mapping[str, float]) -> Model:
+    """States p, r (rad/s, from their first values); inputs da, dr, beta (rad); outputs pdot, rdot, ay, p, r.
+
+    Parameters ``L_p ... N_beta, Y_p ... Y_beta`` per rad or rad/s, offsets ``L_0 N_0`` of the state equations and
+    ``bias_<output>``; those missing from ``start`` begin at zero.
+    """
+    names = [f"{axis}_{regressor}" for axis in "LNY" for regressor in _REGRESSORS]
+    names += ["L_0", "N_0", *(f"bias_{output}" for output in ("pdot", "rdot", "ay", "p", "r"))]
+    parameters = tuple(Parameter(name, start.get(name, 0.0), unit=_UNITS.get(name[0], "")) for name in names)
+
+    def accelerations(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+        return theta[:15].reshape(3, 5) @ jnp.concatenate([x, u])
+
+    def derivative(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+        return accelerations(x, u, theta)[:2] + theta[15:17]
+
+    def output(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+        return jnp.concatenate([accelerations(x, u, theta), x]) + theta[17:22]
+
+    return Model(
+        name="lateral_rates",
+        states=("p", "r"),
+        inputs=("da", "dr", "beta"),
+        outputs=("pdot", "rdot", "ay", "p", "r"),
+        parameters=parameters,
+        derivative=derivative,
+        output=output,
+        units={"p": "rad/s", "r": "rad/s", "pdot": "rad/s^2", "rdot": "rad/s^2", "ay": "m/s^2"},
+    )

@@ -1,0 +1,232 @@
+"""The rigid aircraft, as many of its states as are wanted; the others are taken from what was measured.
+
+Flat earth, still air, rigid body, body axes FRD: Klein & Morelli (2006), eqs. 3.33 to 3.37. A state that is not
+integrated enters as an input, and so does the specific force of a coefficient that is not modelled: then a longitudinal
+or lateral model needs nothing of the other axes, and a measured airspeed makes thrust unnecessary (Morelli, SIDPAC, does
+the same). All eight states make it the six-degree-of-freedom simulation of the nominal aircraft.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.model import Model
+from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
+from sysid_node.errors import InputError
+
+GRAVITY = 9.80665  # m/s^2
+
+#: States that may be integrated, each with the coefficient without which it cannot be; None: kinematics alone.
+STATES: dict[str, str | None] = {
+    "V": "CD",
+    "alpha": "CL",
+    "beta": "CY",
+    "p": "Cl",
+    "q": "Cm",
+    "r": "Cn",
+    "phi": None,
+    "theta": None,
+}
+#: Coefficients that share an equation of motion: with one modelled, so must be the other.
+_TOGETHER = {"p": ("Cl", "Cn"), "r": ("Cl", "Cn")}
+#: Outputs, with their units.
+OUTPUTS = {
+    **{"V": "m/s", "alpha": "rad", "beta": "rad", "p": "rad/s", "q": "rad/s", "r": "rad/s", "phi": "rad", "theta": "rad"},
+    **{"ax": "m/s^2", "ay": "m/s^2", "az": "m/s^2", "pdot": "rad/s^2", "qdot": "rad/s^2", "rdot": "rad/s^2"},
+}
+_MODELLED_FORCE = {"CD": "ax", "CY": "ay", "CL": "az"}
+
+Signals = Mapping[str, jax.Array]
+
+
+def rigid_body(
+    aircraft: Aircraft,
+    states: Sequence[str],
+    outputs: Sequence[str],
+    *,
+    use_prior: bool = False,
+    reference_rates: bool = False,
+    thrust: bool = True,
+) -> Model:
+    """A model of the aircraft file's derivatives with these states and outputs.
+
+    Inputs are the remaining states, the aircraft's controls, ``rho`` (kg/m^3), ``thrust`` (N; left out, and taken as
+    zero, where not ``thrust``) and the specific forces at the CG (m/s^2) that no coefficient models. Outputs ax, ay, az
+    are those of the IMU where it sits, V, alpha and beta those of the air-data probe. ``use_prior``: the aircraft
+    file's tolerances count. Raises InputError on unknown names and on states whose coefficient has no derivatives.
+    """
+    modelled = _coefficients_needed(aircraft, states)
+    parameters = derivative_parameters(aircraft, modelled, use_prior)
+    names = tuple(parameter.name for parameter in parameters)
+    given = [name for name in STATES if name not in states]
+    forces = _measured_forces(modelled)
+    controls = [symbol for symbol in aircraft.control_symbols if any(name.endswith(f"_{symbol}") for name in names)]
+    inputs = (*given, *controls, "rho", *(["thrust"] if thrust else []), *forces)
+    unknown = [name for name in outputs if name not in OUTPUTS]
+    if unknown:
+        raise InputError(f"outputs {', '.join(unknown)} are not known; known: {', '.join(OUTPUTS)}")
+    motion = _Motion(aircraft, tuple(states), inputs, names, reference_rates)
+    return Model(
+        name="rigid_body",
+        states=tuple(states),
+        inputs=inputs,
+        outputs=tuple(outputs),
+        parameters=parameters,
+        derivative=motion.derivative,
+        output=lambda x, u, theta: motion.output(outputs, x, u, theta),
+        units=dict(OUTPUTS),
+    )
+
+
+def _coefficients_needed(aircraft: Aircraft, states: Sequence[str]) -> tuple[str, ...]:
+    """Coefficients that these states need. Raises InputError where the aircraft file has no derivatives of one."""
+    needed: list[str] = []
+    for state in states:
+        if state not in STATES:
+            raise InputError(f"state {state!r} is not known; known: {', '.join(STATES)}")
+        for coefficient in _TOGETHER.get(state, (STATES[state],)):
+            if coefficient is None or coefficient in needed:
+                continue
+            if coefficient not in aircraft.structure:
+                raise InputError(
+                    f"aircraft {aircraft.name}: state {state} needs derivatives of {coefficient}, and the file has none; "
+                    f"give some or leave {state} out of the states"
+                )
+            needed.append(coefficient)
+    if not needed:
+        raise InputError("states phi and theta alone have no aerodynamics; add at least one of V alpha beta p q r")
+    if "CD_k" in aircraft.derivatives and "CD" in needed and "CL" not in needed:
+        raise InputError("CD_k multiplies CL^2, and alpha is not among the states; add it")
+    return tuple(needed)
+
+
+def _measured_forces(modelled: Sequence[str]) -> list[str]:
+    """Specific forces that enter as inputs; lift and drag share two axes, so that both are needed for either."""
+    both = {"CL", "CD"} <= set(modelled)
+    return [force for coefficient, force in _MODELLED_FORCE.items() if not (both or coefficient == "CY")] + (
+        [] if "CY" in modelled else ["ay"]
+    )
+
+
+class _Motion:
+    """Equations of motion and measurement, as pure functions of state, input and parameters."""
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        states: tuple[str, ...],
+        inputs: tuple[str, ...],
+        names: tuple[str, ...],
+        reference_rates: bool,
+    ) -> None:
+        self.aircraft = aircraft
+        self.states = states
+        self.inputs = inputs
+        self.coefficients = coefficient_function(aircraft, names, reference_rates)
+
+    def derivative(self, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+        """State derivative (nx,)."""
+        s = self._signals(x, u)
+        coefficients = self.coefficients(s, theta)
+        rates = {**self._flow(s, self._specific_force(s, coefficients)), **self._attitude(s)}
+        rates |= self._angular(s, coefficients)
+        return jnp.array([rates[name] for name in self.states])
+
+    def output(self, outputs: Sequence[str], x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+        """Measured quantities (ny,)."""
+        s = self._signals(x, u)
+        coefficients = self.coefficients(s, theta)
+        angular = self._angular(s, coefficients)
+        values = {**s, **{f"{name}dot": value for name, value in angular.items()}}
+        values |= self._at_imu(s, self._specific_force(s, coefficients), angular)
+        values |= self._at_probe(s)
+        return jnp.array([values[name] for name in outputs])
+
+    def _signals(self, x: jax.Array, u: jax.Array) -> dict[str, jax.Array]:
+        values = dict(zip(self.states, x, strict=True)) | dict(zip(self.inputs, u, strict=True))
+        return {"thrust": jnp.zeros_like(u[0])} | values
+
+    def _specific_force(self, s: Signals, c: Mapping[str, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
+        """At the CG, body axes: modelled where there is a coefficient, else as measured.
+
+        Drag and lift act along the stability axes; either may be the measured one.
+        """
+        a, throttle = self.aircraft, self.aircraft.throttle
+        per_coefficient = 0.5 * s["rho"] * s["V"] ** 2 * a.geometry.S / a.mass
+        ca, sa = jnp.cos(s["alpha"]), jnp.sin(s["alpha"])
+        line = s["alpha"] + (throttle.inclination if throttle else 0.0)
+        push = s["thrust"] / a.mass
+        along = -per_coefficient * c["CD"] + push * jnp.cos(line) if "CD" in c else s["ax"] * ca + s["az"] * sa
+        down = -per_coefficient * c["CL"] - push * jnp.sin(line) if "CL" in c else s["az"] * ca - s["ax"] * sa
+        side = per_coefficient * c["CY"] if "CY" in c else s["ay"]
+        return along * ca - down * sa, side, along * sa + down * ca
+
+    def _flow(self, s: Signals, force: tuple[jax.Array, jax.Array, jax.Array]) -> dict[str, jax.Array]:
+        """V, alpha and beta derivatives from the accelerations of the CG."""
+        fx, fy, fz = force
+        ca, sa, cb, sb = jnp.cos(s["alpha"]), jnp.sin(s["alpha"]), jnp.cos(s["beta"]), jnp.sin(s["beta"])
+        st, ct, sp, cp = jnp.sin(s["theta"]), jnp.cos(s["theta"]), jnp.sin(s["phi"]), jnp.cos(s["phi"])
+        gx, gy, gz = fx - GRAVITY * st, fy + GRAVITY * ct * sp, fz + GRAVITY * ct * cp
+        along = gx * ca + gz * sa
+        return {
+            "V": along * cb + gy * sb,
+            "alpha": (gz * ca - gx * sa) / (s["V"] * cb) + s["q"] - (s["p"] * ca + s["r"] * sa) * sb / cb,
+            "beta": (gy * cb - along * sb) / s["V"] + s["p"] * sa - s["r"] * ca,
+        }
+
+    def _attitude(self, s: Signals) -> dict[str, jax.Array]:
+        sp, cp = jnp.sin(s["phi"]), jnp.cos(s["phi"])
+        return {
+            "phi": s["p"] + jnp.tan(s["theta"]) * (s["q"] * sp + s["r"] * cp),
+            "theta": s["q"] * cp - s["r"] * sp,
+        }
+
+    def _angular(self, s: Signals, c: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
+        """Angular accelerations of the axes whose moments are modelled."""
+        a, inertia = self.aircraft, self.aircraft.inertia
+        pressure = 0.5 * s["rho"] * s["V"] ** 2 * a.geometry.S
+        Ixx, Iyy, Izz, Ixz = inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz
+        rates: dict[str, jax.Array] = {}
+        if "Cm" in c:
+            pitching = pressure * a.geometry.cbar * c["Cm"] + s["thrust"] * (a.throttle.arm if a.throttle else 0.0)
+            coupling = 0.0
+            if Ixx == Ixx and Izz == Izz:  # NaN: not known, and then of no account in this flight
+                coupling = (Izz - Ixx) * s["p"] * s["r"] + Ixz * (s["r"] ** 2 - s["p"] ** 2)
+            rates["q"] = (pitching + coupling) / Iyy
+        if "Cl" in c and "Cn" in c:
+            rolling = pressure * a.geometry.b * c["Cl"] + Ixz * s["p"] * s["q"] + (Iyy - Izz) * s["q"] * s["r"]
+            yawing = pressure * a.geometry.b * c["Cn"] - Ixz * s["q"] * s["r"] + (Ixx - Iyy) * s["p"] * s["q"]
+            determinant = Ixx * Izz - Ixz**2
+            rates["p"] = (Izz * rolling + Ixz * yawing) / determinant
+            rates["r"] = (Ixz * rolling + Ixx * yawing) / determinant
+        return rates
+
+    def _at_imu(
+        self, s: Signals, force: tuple[jax.Array, jax.Array, jax.Array], angular: Mapping[str, jax.Array]
+    ) -> dict[str, jax.Array]:
+        """Specific force where the IMU sits; unmodelled angular accelerations count as zero."""
+        x, y, z = self.aircraft.sensors.imu
+        p, q, r = s["p"], s["q"], s["r"]
+        zero = jnp.zeros_like(p)
+        pd, qd, rd = (angular.get(name, zero) for name in "pqr")
+        return {
+            "ax": force[0] - (q**2 + r**2) * x + (p * q - rd) * y + (p * r + qd) * z,
+            "ay": force[1] + (p * q + rd) * x - (p**2 + r**2) * y + (q * r - pd) * z,
+            "az": force[2] + (p * r - qd) * x + (q * r + pd) * y - (p**2 + q**2) * z,
+        }
+
+    def _at_probe(self, s: Signals) -> dict[str, jax.Array]:
+        """Air data where the probe sits: the rotation moves it through the air."""
+        position = self.aircraft.sensors.air_data
+        if not any(position):
+            return {}
+        x, y, z = position
+        u = s["V"] * jnp.cos(s["alpha"]) * jnp.cos(s["beta"]) + s["q"] * z - s["r"] * y
+        v = s["V"] * jnp.sin(s["beta"]) + s["r"] * x - s["p"] * z
+        w = s["V"] * jnp.sin(s["alpha"]) * jnp.cos(s["beta"]) + s["p"] * y - s["q"] * x
+        speed = jnp.sqrt(u**2 + v**2 + w**2)
+        return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}
