@@ -14,15 +14,16 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#AA4499"
-INK, MUTED, GRID, PRIOR_BAND = "#1f2933", "#8a94a0", "#e6eaef", "rgba(110,122,137,0.16)"
+INK, MUTED, GRID = "#1f2933", "#8a94a0", "#e6eaef"
 BLUE_BAND, GREY_BAND = "rgba(0,114,178,0.20)", "rgba(138,148,160,0.20)"
-CYCLE = ((BLUE, "solid"), (VERMILION, "dash"), (GREEN, "dot"), (PURPLE, "dashdot"))
 
 Trace = dict[str, Any]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,17 @@ def line(x: Array, y: Array, name: str = "", *, colour: str = BLUE, dash: str = 
     }
 
 
-def band(x: Array, lower: Array, upper: Array, keep: Array, colour: str) -> Trace:
+def band(x: Array, lower: Array, upper: Array, keep: Mask, colour: str) -> Trace:
     """The area between two (N,) curves wherever ``keep`` (N,) holds and both are finite, one polygon a stretch."""
     inside = (keep & np.isfinite(lower) & np.isfinite(upper)).astype(np.int8)
     edges = np.flatnonzero(np.diff(inside, prepend=0, append=0))
-    xs, ys = [], []
+    xs: list[Array] = []
+    ys: list[Array] = []
+    gap = np.array([np.nan])
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         stretch = slice(start, stop)
-        xs += [x[stretch], x[stretch][::-1], [np.nan]]
-        ys += [upper[stretch], lower[stretch][::-1], [np.nan]]
+        xs += [x[stretch], x[stretch][::-1], gap]
+        ys += [upper[stretch], lower[stretch][::-1], gap]
     return {
         "type": "scatter",
         "mode": "lines",
@@ -87,12 +90,6 @@ def level(value: float, colour: str, dash: str = "solid", width: float = 1.4) ->
     """A horizontal line across the plot."""
     position = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value}
     return {**position, "line": {"color": colour, "dash": dash, "width": width}}
-
-
-def stripe(lower: float, upper: float, colour: str) -> dict[str, Any]:
-    """A horizontal stripe across the plot, behind everything."""
-    position = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": lower, "y1": upper}
-    return {**position, "layer": "below", "fillcolor": colour, "line": {"width": 0}}
 
 
 def moment(time: float, colour: str = VERMILION) -> dict[str, Any]:

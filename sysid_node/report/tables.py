@@ -165,14 +165,14 @@ def _estimate(row: list[str]) -> tuple[float, DerivativeEstimate]:
     time, name, value, standard_error, lower, upper, valid, status = row
     if valid not in ("true", "false"):
         raise ValueError(f"valid is {valid!r}, expected true or false")
-    numbers = (_number(cell) for cell in (value, standard_error, lower, upper))
-    return _number(time), DerivativeEstimate(name, *numbers, valid == "true", status)
+    error, low, high = _number(standard_error), _number(lower), _number(upper)
+    return _number(time), DerivativeEstimate(name, _number(value), error, low, high, valid == "true", status)
 
 
 def _fit(row: list[str]) -> tuple[float, FitQuality]:
     time, coefficient, r_squared, residual_std, freedom, samples = row
-    numbers = (_number(cell) for cell in (r_squared, residual_std, freedom))
-    return _number(time), FitQuality(coefficient, *numbers, int(samples))
+    quality = FitQuality(coefficient, _number(r_squared), _number(residual_std), _number(freedom), int(samples))
+    return _number(time), quality
 
 
 def _number(cell: str) -> float:

@@ -52,6 +52,16 @@ NICKNAMES = {
     "Cn_dr": "rudder power",
 }
 
+#: What a status means to who flies: start of the status -> words.
+STATUS_WORDS = {
+    "not excited": "not moved enough in this flight",
+    "collinear": "moved together with another, so they cannot be told apart",
+    "converging": "not settled yet: more flying needed",
+    "stale input": "a sensor was silent",
+    "outside model": "flown where the model does not hold",
+    "changed": "changed in flight, being learned anew",
+}
+
 METHOD_WORDS = {
     "sls_rft": "recursive Fourier transform, sequential least squares",
     "iv_rft": "recursive Fourier transform, instrumental variables",
@@ -61,6 +71,7 @@ METHOD_WORDS = {
     "filter_error": "filter error (maximum likelihood with process noise)",
 }
 
+_C = Markup('<span class="symbol"><i>C</i><sub>{}</sub></span>')
 _GREEK = {"alpha": "\u03b1", "beta": "\u03b2"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 
@@ -75,10 +86,10 @@ def symbol(name: str) -> Markup:
     """The derivative or coefficient as it stands in a textbook, in HTML: C with its indices."""
     coefficient, regressor = split_name(name)
     if name in COEFFICIENTS:
-        return Markup("<i>C</i><sub>{}</sub>").format(name[1:])
+        return _C.format(name[1:])
     if not coefficient:
         return escape(name)
-    return Markup("<i>C</i><sub>{}\u202f{}</sub>").format(coefficient[1:], _index(regressor))
+    return _C.format(f"{coefficient[1:]}\u202f{_index(regressor)}")
 
 
 def _index(regressor: str) -> str:
@@ -113,6 +124,11 @@ def unit(name: str) -> str:
     return {"V": "per V/V\u2080", "k": "per CL\u00b2"}.get(regressor, "per rad")
 
 
+def status_words(status: str) -> str:
+    """A status in a pilot's words; one not known here as it is."""
+    return next((words for start, words in STATUS_WORDS.items() if status.startswith(start)), status)
+
+
 def plural(count: int, word: str) -> str:
     """``"1 flight"``, ``"2 flights"``."""
     return f"{count} {word}" + ("" if count == 1 else "s")
@@ -121,7 +137,7 @@ def plural(count: int, word: str) -> str:
 def listing(words: list[Markup] | list[str], most: int = 4) -> Markup:
     """``a, b and c``; beyond ``most`` entries the rest is counted."""
     if len(words) > most:
-        words = [*words[: most - 1], f"{len(words) - most + 1} others"]  # type: ignore[list-item]
+        words = [*words[: most - 1], f"{len(words) - most + 1} others"]
     if len(words) < 2:
         return escape(words[0]) if words else Markup("")
     return Markup("{} and {}").format(Markup(", ").join(words[:-1]), words[-1])
@@ -155,6 +171,14 @@ def with_interval(value: float, half_width: float) -> str:
     scale, decimals = 10.0**largest, max(largest - exponent + 1, 0)
     pair = f"({value / scale:.{decimals}f} \u00b1 {half_width / scale:.{decimals}f})".replace("-", MINUS)
     return f"{pair}\u202f\u00d7\u202f10{str(largest).translate(_SUPERSCRIPTS)}"
+
+
+def seconds(value: float) -> str:
+    """``"60 s"``, ``"12 min 30 s"``."""
+    if not math.isfinite(value) or value < 300:
+        return f"{number(value) if value < 10 or not math.isfinite(value) else format(value, '.4g')}\u202fs"
+    minutes, rest = divmod(round(value), 60)
+    return f"{minutes}\u202fmin {rest}\u202fs"
 
 
 def setting(value: object) -> str:

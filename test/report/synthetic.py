@@ -100,7 +100,7 @@ def _flight(random: np.random.Generator, seconds: float, rate: float) -> FlightR
 def _spectra(random: np.random.Generator) -> Spectra:
     frequency = np.arange(0.1, 2.02, 0.04)
     inputs = {c: 0.02 / (1 + (frequency / f) ** 2) for c, f in (("de", 0.5), ("da", 0.7), ("dr", 0.6))}
-    measured = {c: 0.03 / (1 + (frequency / 0.6) ** 2) for c in COEFFICIENTS}
+    measured = dict.fromkeys(COEFFICIENTS, 0.03 / (1 + (frequency / 0.6) ** 2))
     residuals = {c: 0.0006 + 0.0002 * random.normal(size=frequency.size) ** 2 for c in COEFFICIENTS}
     return Spectra(frequency, inputs, measured, residuals)
 

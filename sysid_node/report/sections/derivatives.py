@@ -15,7 +15,7 @@ from sysid_node.report.compare import NORMAL_95, agrees, covers, half_width
 from sysid_node.report.data import Prior, RunResult
 from sysid_node.report.sections import Section
 from sysid_node.report.sections.groups import grouped
-from sysid_node.report.words import meaning, number, symbol, unit, with_interval
+from sysid_node.report.words import meaning, number, short_meaning, symbol, unit, with_interval
 
 #: Half widths, as fractions of the reference, that the picture's axis may take.
 SPANS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
@@ -37,7 +37,8 @@ class Row:
 
     name: str
     symbol: Markup
-    meaning: str
+    meaning: str  # a few words
+    explanation: str  # in full
     unit: str
     estimate: str
     valid: bool
@@ -70,7 +71,8 @@ def _row(run: RunResult, d: DerivativeEstimate, span: float) -> Row:
     return Row(
         name=d.name,
         symbol=symbol(d.name),
-        meaning=meaning(d.name),
+        meaning=short_meaning(d.name),
+        explanation=meaning(d.name),
         unit=unit(d.name),
         estimate=with_interval(d.value, half_width(d)),
         valid=d.valid,

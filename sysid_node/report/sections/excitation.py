@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from sysid_node.flight.record import COLUMNS, FlightRecord
+from sysid_node.flight.record import COLUMNS, Array, FlightRecord
 from sysid_node.report import figures
 from sysid_node.report.data import RunResult, Spectra
-from sysid_node.report.figures import CYCLE, Figure
+from sysid_node.report.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
 from sysid_node.report.sections import Section
 from sysid_node.report.thin import thin_curve
 
@@ -37,6 +37,15 @@ GROUPS = (
     Group("Thrust", "N", 1.0, {"thrust": "thrust"}),
 )
 
+#: One colour and dash an axis of motion, throughout: pitch, roll, yaw; anything else comes last.
+_STYLE = {
+    **dict.fromkeys(("de", "alpha", "q", "theta", "az"), (BLUE, "solid")),
+    **dict.fromkeys(("da", "p", "phi"), (VERMILION, "solid")),
+    **dict.fromkeys(("dr", "beta", "r", "ay"), (GREEN, "solid")),
+    **dict.fromkeys(("V", "thrust"), (BLUE, "solid")),
+}
+_OTHER_STYLE = (PURPLE, "dash")
+
 _SURFACES = {"de": "elevator", "da": "aileron", "dr": "rudder"}
 
 
@@ -58,8 +67,8 @@ def _history(flight: FlightRecord, group: Group) -> Figure | None:
     if not measured:
         return None
     traces = [
-        figures.line(*_curve(flight, column, group.scale), group.columns[column], colour=colour, width=1.3)
-        for column, (colour, _) in zip(measured, CYCLE, strict=False)
+        _line(column, group.columns[column], *thin_curve(flight.time, group.scale * flight[column]))
+        for column in measured
     ]
     layout = {
         "xaxis": figures.axis("time, s"),
@@ -70,15 +79,16 @@ def _history(flight: FlightRecord, group: Group) -> Figure | None:
     return Figure(f"{group.title} against time in {group.unit}: {names}", traces, layout)
 
 
-def _curve(flight: FlightRecord, column: str, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    time, values = thin_curve(flight.time, flight[column])
-    return time, scale * values
+def _line(column: str, label: str, x: Array, y: Array) -> figures.Trace:
+    colour, dash = _STYLE.get(column, _OTHER_STYLE)
+    return figures.line(x, y, label, colour=colour, dash=dash, width=1.3)
 
 
 def _spectrum(spectra: Spectra) -> Figure:
     traces = [
-        figures.line(spectra.frequency, DEGREES * values, _SURFACES.get(name, name), colour=colour, dash=dash)
-        for (name, values), (colour, dash) in zip(_deflections(spectra), CYCLE, strict=False)
+        _line(name, _SURFACES.get(name, name), spectra.frequency, DEGREES * values)
+        for name, values in spectra.inputs.items()
+        if name != "thrust"
     ]
     layout = {
         "xaxis": figures.axis("frequency, Hz"),
@@ -86,10 +96,6 @@ def _spectrum(spectra: Spectra) -> Figure:
         "showlegend": len(traces) > 1,
     }
     return Figure("Amplitude spectra of the control deflections, deg against Hz", traces, layout, height=260)
-
-
-def _deflections(spectra: Spectra) -> list[tuple[str, np.ndarray]]:
-    return [(name, values) for name, values in spectra.inputs.items() if name != "thrust"]
 
 
 SECTION: Section[RunResult] = Section("excitation", "What was flown", "excitation.html.j2", context)

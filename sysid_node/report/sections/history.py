@@ -12,9 +12,9 @@ from markupsafe import Markup
 from sysid_node.flight.record import Array
 from sysid_node.online.types import DerivativeEstimate
 from sysid_node.report import figures
-from sysid_node.report.compare import NORMAL_95, half_width
+from sysid_node.report.compare import half_width
 from sysid_node.report.data import RunResult
-from sysid_node.report.figures import Figure
+from sysid_node.report.figures import Figure, Mask
 from sysid_node.report.sections import Section
 from sysid_node.report.sections.groups import grouped
 from sysid_node.report.thin import thin_curve
@@ -78,7 +78,7 @@ def _figure(run: RunResult, last: DerivativeEstimate, c: _Curves) -> Figure:
         figures.line(c.time, np.where(valid, c.value, np.nan)),
     ]
     layout = {
-        "xaxis": figures.axis("time, s"),
+        "xaxis": figures.axis("time, s", range=[min(run.history[0].time, 0.0), run.history[-1].time]),
         "yaxis": figures.axis(unit(last.name), range=_limits(run, last.name, c)),
         "shapes": _references(run, last.name) + [figures.moment(time) for time in _changes(run, last.name)],
     }
@@ -86,7 +86,7 @@ def _figure(run: RunResult, last: DerivativeEstimate, c: _Curves) -> Figure:
     return Figure(f"{last.name} against time with its 95 % interval; {ends}", traces, layout, height=200)
 
 
-def _touching(mask: Array) -> Array:
+def _touching(mask: Mask) -> Mask:
     """The mask widened by one sample on both sides, so that two lines meet where validity changes."""
     wide = mask.copy()
     wide[1:] |= mask[:-1]
@@ -97,11 +97,7 @@ def _touching(mask: Array) -> Array:
 def _references(run: RunResult, name: str) -> list[dict[str, Any]]:
     shapes = []
     if name in run.prior:
-        prior = run.prior[name]
-        reach = NORMAL_95 * prior.tolerance
-        if np.isfinite(reach):
-            shapes.append(figures.stripe(prior.value - reach, prior.value + reach, figures.PRIOR_BAND))
-        shapes.append(figures.level(prior.value, figures.MUTED, "dash"))
+        shapes.append(figures.level(run.prior[name].value, figures.MUTED, "dash"))
     if name in run.truth:
         shapes.append(figures.level(run.truth[name], figures.VERMILION))
     return shapes

@@ -6,27 +6,23 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from sysid_node.online.types import DerivativeEstimate
 from sysid_node.report.compare import agrees, covers, half_width
 from sysid_node.report.data import RunResult
 from sysid_node.report.sections import Section
-from sysid_node.report.words import METHOD_WORDS, listing, number, plural, short_meaning, symbol
+from sysid_node.report.words import METHOD_WORDS, listing, number, plural, seconds, short_meaning, status_words, symbol
 
 #: What the sign of a derivative means in the air: (derivative, if negative, if positive).
 HANDLING = (
     (
         "Cm_alpha",
-        "in pitch the aircraft returns to trim by itself after a disturbance",
-        "in pitch the aircraft does not return to trim by itself: a disturbance grows",
+        "disturbed in pitch, the aircraft tends back to trim",
+        "disturbed in pitch, the aircraft tends further away from trim",
     ),
-    ("Cn_beta", "in yaw it turns away from the wind", "in yaw it weathercocks back into the wind"),
-    (
-        "Cl_p",
-        "a roll stops by itself once the ailerons are centred",
-        "a roll does not stop by itself when the ailerons are centred",
-    ),
+    ("Cn_beta", "in a sideslip its nose turns away from the wind", "in a sideslip its nose turns into the wind"),
+    ("Cl_p", "a roll dies out once the ailerons are centred", "a roll speeds up even with the ailerons centred"),
 )
 
 
@@ -47,7 +43,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
 
 
 def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
-    length = f"{number(run.data_seconds)} s of flight" if math.isfinite(run.data_seconds) else "this flight"
+    length = f"{seconds(run.data_seconds)} of flight" if math.isfinite(run.data_seconds) else "this flight"
     if not derivatives:
         return Markup(
             "<strong>No derivative was estimated</strong> from {} of {}. The tables below say what arrived and "
@@ -56,7 +52,7 @@ def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
     valid = sum(d.valid for d in derivatives)
     share = f"all {len(derivatives)}" if valid == len(derivatives) else f"{valid} of {len(derivatives)}"
     return Markup(
-        "From {} of {}, <strong>{} derivatives are known well enough to use</strong>. Each comes with an interval "
+        "From {} of {}, <strong>{} derivatives are known well enough to use</strong>, each with an interval "
         "meant to hold its true value 95 times in 100."
     ).format(length, run.aircraft, share)
 
@@ -72,7 +68,7 @@ def _handling(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | N
     if not clauses:
         return None
     text = Markup("; ").join(clauses)
-    return Markup("They say that {}.").format(text)
+    return Markup("They say: {}.").format(text)
 
 
 def _best(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
@@ -89,10 +85,10 @@ def _unknown(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | No
     by_status: dict[str, list[Markup]] = {}
     for d in derivatives:
         if not d.valid:
-            by_status.setdefault(d.status, []).append(symbol(d.name))
+            by_status.setdefault(status_words(d.status), []).append(symbol(d.name))
     if not by_status:
         return None
-    reasons = [Markup("{} ({})").format(listing(names), escape(status)) for status, names in by_status.items()]
+    reasons = [Markup("{} ({})").format(listing(names), words) for words, names in by_status.items()]
     return Markup("<strong>Not to be used</strong>: {}.").format(Markup("; ").join(reasons))
 
 
@@ -125,7 +121,7 @@ def _facts(run: RunResult) -> list[tuple[str, str]]:
     return [
         ("Aircraft", run.aircraft),
         ("Method", METHOD_WORDS.get(run.method, run.method)),
-        ("Data", f"{number(run.data_seconds)} s, {plural(run.samples, 'sample')}"),
+        ("Data", f"{seconds(run.data_seconds)}, {plural(run.samples, 'sample')}"),
         ("Rejected", plural(lost, "message") if lost else "nothing"),
     ]
 

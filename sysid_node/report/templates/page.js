@@ -1,12 +1,12 @@
 "use strict";
-// Draws each plot from the data that lie in it: those on screen first, all of them before printing.
+// Draws each plot from the data that lie in it, one after another, so that the page can be read meanwhile.
 (function () {
   const touch = window.matchMedia("(pointer: coarse)").matches;
   const config = { displaylogo: false, displayModeBar: false, responsive: true };
+  const waiting = Array.from(document.querySelectorAll(".plot"));
 
   function draw(box) {
     const data = box.querySelector("script");
-    if (!data) return;
     const figure = JSON.parse(data.textContent);
     data.remove();
     // A finger scrolls the page; only a mouse zooms the plot.
@@ -14,11 +14,12 @@
     Plotly.newPlot(box, figure.data, figure.layout, config);
   }
 
-  const boxes = Array.from(document.querySelectorAll(".plot"));
-  const watch = new IntersectionObserver(
-    (entries) => entries.filter((e) => e.isIntersecting).forEach((e) => { watch.unobserve(e.target); draw(e.target); }),
-    { rootMargin: "400px" }
-  );
-  boxes.forEach((box) => watch.observe(box));
-  window.addEventListener("beforeprint", () => boxes.forEach(draw));
+  function drawNext() {
+    if (waiting.length === 0) return;
+    draw(waiting.shift());
+    setTimeout(drawNext, 0);
+  }
+
+  window.addEventListener("beforeprint", () => waiting.splice(0).forEach(draw));
+  drawNext();
 })();
