@@ -1,0 +1,65 @@
+"""Between ROS axes and the axes inside: FLU and FRD bodies, ENU and NED worlds, quaternions and Euler angles.
+
+REP-103 has the body forward-left-up and the world east-north-up; inside, bodies are forward-right-down and
+worlds north-east-down. Both changes of axes are half turns: FLU to FRD about x, ENU to NED about x = y.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import numpy as np
+
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+
+BodyFrame = Literal["flu", "frd"]
+
+
+def body_frame(text: str) -> BodyFrame:
+    """A body frame from the value of a parameter or option. Raises InputError naming the two that there are."""
+    for frame in get_args(BodyFrame):
+        if text.lower() == frame:
+            return frame  # type: ignore[no-any-return]
+    raise InputError(f"body_frame {text!r}: expected flu (forward-left-up, REP-103) or frd (forward-right-down)")
+
+
+def turn_vectors(vectors: Array, frame: BodyFrame) -> Array:
+    """Vectors (N, 3) between ``frame`` and FRD, either way: y and z change sign where the frame is FLU."""
+    signs = (1.0, 1.0, 1.0) if frame == "frd" else (1.0, -1.0, -1.0)
+    turned: Array = vectors * np.array(signs)
+    return turned
+
+
+def euler_from_quaternion(quaternion: Array, frame: BodyFrame) -> Array:
+    """Euler angles phi theta psi (N, 3) rad, 3-2-1, FRD against NED, of unit quaternions x y z w (N, 4).
+
+    The quaternion turns ``frame`` axes into the world's: ENU for an FLU body, NED for an FRD body.
+    Where it is not of unit length (within 1 %) there is no attitude: NaN.
+    """
+    length = np.sqrt(np.sum(quaternion**2, axis=1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x, y, z, w = np.where(np.abs(length - 1.0) < 0.01, quaternion.T / length, np.nan)
+        phi = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        theta = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+        psi = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    if frame == "flu":
+        theta, psi = -theta, np.mod(math.pi / 2.0 - psi + math.pi, 2.0 * math.pi) - math.pi
+    return np.column_stack([phi, theta, psi])
+
+
+def quaternion_from_euler(euler: Array, frame: BodyFrame) -> Array:
+    """Quaternions x y z w (N, 4) of Euler angles phi theta psi (N, 3) rad: the way back."""
+    phi, theta, psi = euler.T / 2.0
+    if frame == "flu":
+        theta, psi = -theta, math.pi / 4.0 - psi
+    cx, sx, cy, sy, cz, sz = np.cos(phi), np.sin(phi), np.cos(theta), np.sin(theta), np.cos(psi), np.sin(psi)
+    return np.column_stack(
+        [
+            sx * cy * cz - cx * sy * sz,
+            cx * sy * cz + sx * cy * sz,
+            cx * cy * sz - sx * sy * cz,
+            cx * cy * cz + sx * sy * sz,
+        ]
+    )

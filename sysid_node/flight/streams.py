@@ -1,0 +1,86 @@
+"""Streams: what the three input topics said, one array a topic, before anything is aligned or rejected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+
+Stamps = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """When the messages of a topic were stamped and when they came, in log order; all (N,)."""
+
+    stamp_ns: Stamps  # the headers' own
+    log_ns: Stamps  # when each was recorded
+    order: Stamps  # place among the messages of all topics
+
+    def __len__(self) -> int:
+        return int(self.stamp_ns.size)
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The messages of one topic."""
+
+    arrival: Arrival
+
+
+@dataclass(frozen=True)
+class ImuStream(Stream):
+    """IMU messages, FRD."""
+
+    values: Array  # (N, 6) ax ay az m/s^2, p q r rad/s
+    attitude: Array  # (N, 3) phi theta psi rad, NaN = not given
+    frame_id: str = ""
+
+
+@dataclass(frozen=True)
+class AirDataStream(Stream):
+    """Air data messages; NaN = not measured."""
+
+    values: Array  # (N, 4) V m/s, alpha rad, beta rad, rho kg/m^3
+
+
+@dataclass(frozen=True)
+class JointStream(Stream):
+    """Joint state messages; NaN where a message lacks a joint that others have."""
+
+    names: tuple[str, ...]
+    positions: Array  # (N, J) rad; throttle 0..1 or N
+
+
+@dataclass(frozen=True)
+class Streams:
+    """A flight as it was recorded; ``name`` is what errors call it. Raises InputError where a topic is empty."""
+
+    imu: ImuStream
+    air_data: AirDataStream
+    actuators: JointStream
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for topic, stream in self.by_topic.items():
+            if not len(stream.arrival):
+                raise InputError(f"{self.name}: no messages on {topic}; record that topic too")
+
+    @property
+    def by_topic(self) -> dict[str, Stream]:
+        """The streams by the topics' own names."""
+        return {IMU: self.imu, AIR_DATA: self.air_data, ACTUATORS: self.actuators}
+
+
+def arrivals_in_stamp_order(*stamps_ns: Stamps) -> list[Arrival]:
+    """Arrivals of topics whose messages came when they were stamped; at equal stamps the first topic's first."""
+    every = np.concatenate(stamps_ns)
+    order = np.empty(every.size, np.int64)
+    order[np.argsort(every, kind="stable")] = np.arange(every.size)
+    ends = np.cumsum([stamps.size for stamps in stamps_ns])[:-1]
+    return [Arrival(stamps, stamps, place) for stamps, place in zip(stamps_ns, np.split(order, ends), strict=True)]

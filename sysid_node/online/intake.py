@@ -1,0 +1,266 @@
+"""Intake: from messages, one by one as they come, to aligned samples.
+
+The live node and the replay both feed this. Each message is checked (``flight.checks``: plausible values; here: its
+stamp), and every IMU message waits until air data and actuators stamped after it have come, so that both are
+interpolated and never held (``flight.align`` says why). What comes out depends on the stamps alone, not on the order in
+which topics arrive, as long as none is more than the buffer (5 s) behind; a replay therefore equals the live run.
+
+A stamp that leaps (back by more than 1 s, ahead by more than 5 min) is left out; if the next message follows it, the
+clock was set, and a new time base begins: the samples' time goes on after a break longer than ``max_gap``, which
+no estimator integrates across. Messages before and after a step are never combined.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import NamedTuple
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.actuation import Actuation
+from sysid_node.flight.align import STEP_BACK_NS, STEP_FORWARD_NS, Rejected, buffer_ns, gap_ns
+from sysid_node.flight.checks import (
+    CLOCK_STEP,
+    DUPLICATE,
+    OUT_OF_ORDER,
+    UNSTAMPED,
+    air_data_fault,
+    gap,
+    imu_fault,
+    is_nan,
+)
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+
+FOLLOWS_NS = 1_000_000_000  # a message this soon after a leap of the stamps confirms it
+BREAK_NS = 1_000_000_000  # beyond max_gap: the break in the samples' time where a clock was set
+
+Sample = tuple[float, ...]
+Values = tuple[float, ...]
+
+
+@dataclass(slots=True)
+class _Clock:
+    """The stamps of one topic."""
+
+    last: int | None = None
+    leapt_to: int | None = None
+    epoch: int = 0  # how often the clock was set
+
+    def fault(self, stamp: int) -> str | None:
+        """What is wrong with the next stamp, or None: it is taken."""
+        if stamp <= 0:
+            return UNSTAMPED
+        step = 1 if self.last is None else stamp - self.last
+        if 0 < step <= STEP_FORWARD_NS:
+            self.last, self.leapt_to = stamp, None
+            return None
+        if -STEP_BACK_NS <= step <= 0:
+            return OUT_OF_ORDER if step else DUPLICATE
+        if self.leapt_to is not None and 0 < stamp - self.leapt_to <= FOLLOWS_NS:
+            self.last, self.leapt_to = stamp, None
+            self.epoch += 1
+            return None
+        self.leapt_to = stamp
+        return CLOCK_STEP
+
+
+class _Missing(Enum):
+    """Why a topic has no values at an IMU message's stamp."""
+
+    AS_YET = auto()  # a neighbour may still come
+    FOR_GOOD = auto()
+
+
+class _Entry(NamedTuple):
+    """A message that is believed."""
+
+    epoch: int
+    stamp: int
+    values: Values
+
+
+class _Waiting(NamedTuple):
+    """An IMU message that waits for its neighbours in the other topics."""
+
+    epoch: int
+    stamp: int
+    since: int  # ns from the first IMU message, breaks included
+    values: Values
+
+
+class _Base(NamedTuple):
+    """The first IMU message of an epoch."""
+
+    epoch: int
+    since: int
+    stamp: int
+
+
+@dataclass(slots=True)
+class _Neighbours:
+    """Recent messages of a topic that is interpolated."""
+
+    topic: str
+    clock: _Clock = field(default_factory=_Clock)
+    entries: deque[_Entry] = field(default_factory=deque)
+    ahead: int = 0  # the topic's epoch less the IMU's, where their clocks were not set together
+
+
+@dataclass(slots=True)
+class IntakeState:
+    """All that the intake remembers. ``accepted`` and ``rejected`` count messages by topic (and reason)."""
+
+    actuation: Actuation
+    air_density: float
+    gap: int  # ns
+    buffer: int  # ns
+    clock: _Clock = field(default_factory=_Clock)
+    waiting: deque[_Waiting] = field(default_factory=deque)
+    air_data: _Neighbours = field(default_factory=lambda: _Neighbours(AIR_DATA))
+    actuators: _Neighbours = field(default_factory=lambda: _Neighbours(ACTUATORS))
+    since: int = 0  # of the last IMU message
+    bases: deque[_Base] = field(default_factory=lambda: deque(maxlen=16))  # of the last epochs
+    joints: tuple[Sequence[str], tuple[int, ...]] = ((), ())  # the last message's names, and our joints among them
+    accepted: dict[str, int] = field(default_factory=lambda: dict.fromkeys((IMU, AIR_DATA, ACTUATORS), 0))
+    rejected: Rejected = field(default_factory=lambda: {IMU: {}, AIR_DATA: {}, ACTUATORS: {}})
+
+
+def init(aircraft: Aircraft, max_gap: float) -> IntakeState:
+    """An intake for an aircraft; ``max_gap`` s is the longest spacing of messages that is interpolated across."""
+    actuation = Actuation.of(aircraft)
+    state = IntakeState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap))
+    state.joints = ((), actuation.places(()))
+    return state
+
+
+def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple[float, Sample]]:
+    """Takes ax ay az (m/s^2) p q r (rad/s), FRD; returns the samples that are now complete: (time s, sample).
+
+    A sample holds SAMPLE_COLUMNS, then the aircraft's controls. Never raises for any numbers.
+    """
+    fault = imu_fault(values) or state.clock.fault(stamp_ns)
+    if fault is not None:
+        _reject(state, IMU, fault)
+        return []
+    state.accepted[IMU] += 1
+    epoch = state.clock.epoch
+    if not state.bases or state.bases[-1].epoch != epoch:
+        state.bases.append(_Base(epoch, state.since + state.gap + BREAK_NS if epoch else 0, stamp_ns))
+    base = state.bases[-1]
+    state.since = base.since + (stamp_ns - base.stamp)
+    state.waiting.append(_Waiting(epoch, stamp_ns, state.since, values))
+    complete = _release(state)
+    while state.waiting and state.since - state.waiting[0].since > state.buffer:
+        _give_up(state)
+        complete += _release(state)
+    return complete
+
+
+def on_air_data(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple[float, Sample]]:
+    """Takes V (m/s), alpha, beta (rad), rho (kg/m^3); NaN = not measured. Returns as ``on_imu`` does.
+
+    The angle of attack and the sideslip may be NaN, and are then NaN in the samples; where the density is, the aircraft
+    file's stands in.
+    """
+    fault = air_data_fault(values)
+    V, alpha, beta, rho = values
+    known = (V, alpha, beta, state.air_density if is_nan(rho) else rho)
+    return _on_neighbour(state, state.air_data, stamp_ns, fault or known)
+
+
+def on_actuators(
+    state: IntakeState, stamp_ns: int, names: Sequence[str], positions: Sequence[float]
+) -> list[tuple[float, Sample]]:
+    """Takes joint positions (rad; throttle 0..1 or N) by name. Returns as ``on_imu`` does.
+
+    Joints that the aircraft file does not name are ignored; without its throttle joint the thrust is NaN.
+    """
+    known, places = state.joints
+    if names != known:
+        places = state.actuation.places(names)
+        state.joints = (copy(names), places)
+    return _on_neighbour(state, state.actuators, stamp_ns, state.actuation.of_message(places, positions))
+
+
+def stamp_of(state: IntakeState, time: float) -> int:
+    """The header stamp, in ns, of the IMU message whose sample has this time; for samples just returned."""
+    since = round(time * 1e9)
+    base = next(base for base in reversed(state.bases) if base.since <= since)
+    return base.stamp + since - base.since
+
+
+def _on_neighbour(
+    state: IntakeState, topic: _Neighbours, stamp: int, values: Values | str
+) -> list[tuple[float, Sample]]:
+    """Takes a message of an interpolated topic, or the reason why not."""
+    fault = values if isinstance(values, str) else topic.clock.fault(stamp)
+    if fault is not None or isinstance(values, str):
+        _reject(state, topic.topic, str(fault))
+        return []
+    state.accepted[topic.topic] += 1
+    entries, epoch = topic.entries, topic.clock.epoch
+    entries.append(_Entry(epoch, stamp, values))
+    while entries[0].epoch < epoch - 1 or (entries[0].epoch == epoch and stamp - entries[0].stamp > state.buffer):
+        entries.popleft()
+    return _release(state)
+
+
+def _release(state: IntakeState) -> list[tuple[float, Sample]]:
+    """The samples whose neighbours have come, in order; counts those that have none close enough."""
+    complete: list[tuple[float, Sample]] = []
+    waiting = state.waiting
+    while waiting:
+        imu = waiting[0]
+        air_data = _at(state, state.air_data, imu)
+        if air_data is _Missing.AS_YET:
+            break
+        actuators = _at(state, state.actuators, imu)
+        if actuators is _Missing.AS_YET:
+            break
+        waiting.popleft()
+        if air_data is _Missing.FOR_GOOD:
+            _reject(state, IMU, gap(AIR_DATA))
+        elif actuators is _Missing.FOR_GOOD:
+            _reject(state, IMU, gap(ACTUATORS))
+        else:
+            complete.append((imu.since / 1e9, imu.values + air_data + actuators))
+    return complete
+
+
+def _give_up(state: IntakeState) -> None:
+    """Leaves out the IMU message that has waited longest, and takes it that the topics' clocks are set apart."""
+    imu = state.waiting.popleft()
+    missing = isinstance(_at(state, state.air_data, imu), _Missing)
+    _reject(state, IMU, gap(AIR_DATA if missing else ACTUATORS))
+    for topic in (state.air_data, state.actuators):
+        topic.ahead = topic.clock.epoch - state.clock.epoch
+
+
+def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> Values | _Missing:
+    """A topic's values at an IMU message's stamp, or why there are none. Forgets messages that are no longer needed."""
+    entries, epoch, stamp = topic.entries, imu.epoch + topic.ahead, imu.stamp
+    while entries and entries[0].epoch < epoch:
+        entries.popleft()
+    while len(entries) > 1 and entries[1].epoch == epoch and entries[1].stamp <= stamp:
+        entries.popleft()
+    left = entries[0] if entries and entries[0].epoch == epoch else None
+    if left is not None and left.stamp == stamp:
+        return left.values
+    if left is not None and left.stamp > stamp:
+        return _Missing.FOR_GOOD
+    right = entries[1] if len(entries) > 1 and entries[1].epoch == epoch else None
+    if left is None or right is None:
+        both_set = topic.clock.epoch > epoch and state.clock.epoch > imu.epoch
+        return _Missing.FOR_GOOD if both_set else _Missing.AS_YET
+    if right.stamp - left.stamp > state.gap:
+        return _Missing.FOR_GOOD
+    weight = (stamp - left.stamp) / (right.stamp - left.stamp)
+    return tuple([a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)])
+
+
+def _reject(state: IntakeState, topic: str, reason: str) -> None:
+    reasons = state.rejected[topic]
+    reasons[reason] = reasons.get(reason, 0) + 1
