@@ -1,0 +1,89 @@
+"""Between ROS messages and what the layers below speak: tuples in SI, radians, body axes forward-right-down."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from std_msgs.msg import Header
+from sysid_msgs.msg import DerivativeEstimate, DerivativeEstimates, FitQuality
+
+from sysid_node.online import types
+from sysid_node.online.types import Estimates
+
+NANOSECONDS = 1_000_000_000
+
+
+def stamp_ns(stamp: Time) -> int:
+    """A stamp in nanoseconds."""
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+def stamp_message(nanoseconds: int) -> Time:
+    """Nanoseconds as a stamp."""
+    seconds, rest = divmod(nanoseconds, NANOSECONDS)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def header(nanoseconds: int, frame_id: str) -> Header:
+    """A header."""
+    return Header(stamp=stamp_message(nanoseconds), frame_id=frame_id)
+
+
+def imu_values(message: Any, sign: float) -> tuple[float, float, float, float, float, float]:
+    """Specific force (m/s^2) and rates (rad/s), FRD, of a sensor_msgs/Imu; ``sign`` -1 turns FLU axes, 1 keeps FRD."""
+    force, rate = message.linear_acceleration, message.angular_velocity
+    return force.x, sign * force.y, sign * force.z, rate.x, sign * rate.y, sign * rate.z
+
+
+def air_data_values(message: Any) -> tuple[float, float, float, float]:
+    """True airspeed (m/s), flow angles (rad) and air density (kg/m^3) of a sysid_msgs/AirData."""
+    return message.true_airspeed, message.angle_of_attack, message.sideslip, message.air_density
+
+
+def axes_sign(body_frame: str) -> float:
+    """What y and z are multiplied by on the way from ``body_frame`` to FRD."""
+    return 1.0 if body_frame == "frd" else -1.0
+
+
+def estimates_message(estimates: Estimates, header: Header, aircraft: str, method: str) -> DerivativeEstimates:
+    """The estimates as a message."""
+    message = DerivativeEstimates(header=header, aircraft=aircraft, method=method)
+    message.derivatives = [
+        DerivativeEstimate(
+            name=d.name,
+            value=d.value,
+            standard_error=d.standard_error,
+            lower=d.lower,
+            upper=d.upper,
+            valid=d.valid,
+            status=d.status,
+        )
+        for d in estimates.derivatives.values()
+    ]
+    message.fits = [
+        FitQuality(
+            coefficient=f.coefficient,
+            r_squared=f.r_squared,
+            residual_std=f.residual_std,
+            degrees_of_freedom=f.degrees_of_freedom,
+            samples=f.samples,
+        )
+        for f in estimates.fits.values()
+    ]
+    return message
+
+
+def estimates_from_message(message: Any, start_ns: int) -> Estimates:
+    """The way back; ``time`` in s from ``start_ns``."""
+    return Estimates(
+        time=(stamp_ns(message.header.stamp) - start_ns) / NANOSECONDS,
+        derivatives={
+            d.name: types.DerivativeEstimate(d.name, d.value, d.standard_error, d.lower, d.upper, d.valid, d.status)
+            for d in message.derivatives
+        },
+        fits={
+            f.coefficient: types.FitQuality(f.coefficient, f.r_squared, f.residual_std, f.degrees_of_freedom, f.samples)
+            for f in message.fits
+        },
+    )

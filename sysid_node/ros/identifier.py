@@ -1,0 +1,184 @@
+"""The node `identifier`: stability and control derivatives from the aircraft's own topics, while it flies."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import Trigger
+from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.online.types import Estimates
+from sysid_node.ros import conversion
+from sysid_node.ros.conversion import stamp_ns
+from sysid_node.ros.declaring import declare, refusal, values_of
+from sysid_node.ros.diagnostics import Source
+from sysid_node.ros.lifecycle import CarefulNode
+from sysid_node.ros.monitor import Durations, TopicMonitor
+from sysid_node.ros.parameters import estimation_settings
+from sysid_node.ros.save import save_estimates
+from sysid_node.ros.session import Session
+from sysid_node.ros.spin import run_program, serve
+
+#: As sensor data are published, but deep enough that a burst after a pause of the process is not lost.
+SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class Identifier(CarefulNode):
+    """``config/identifier.yaml`` says what its parameters mean; where ``autostart`` is true it starts by itself.
+
+    Raises InputError on parameters of a wrong type or value, and SystemExit(2) where it should start and cannot.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("identifier")
+        self._session: Session | None = None
+        declare(self)
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        # A steady clock: diagnostics go on where simulated time stands still.
+        self.create_timer(1.0, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(Trigger, "~/save", self._on_save)
+        if self.get_parameter("autostart").value:
+            self._start()
+
+    def _start(self) -> None:
+        for transition in (self.trigger_configure, self.trigger_activate):
+            if transition() != TransitionCallbackReturn.SUCCESS:
+                raise SystemExit(2)
+
+    # Lifecycle
+
+    def configure(self) -> None:
+        """Load the aircraft file; make the estimator, its inputs and its outputs."""
+        values = values_of(self)
+        if not values["aircraft"]:
+            raise InputError("parameter aircraft is empty: give a name or a file, e.g. -p aircraft:=cdrw")
+        aircraft = load_aircraft(values["aircraft"])
+        self._session = Session(aircraft, estimation_settings(values), values["publish_rate"])
+        self._sign = conversion.axes_sign(values["body_frame"])
+        self._frame_id = ""
+        self._lag = math.nan  # s, from the stamp of the last published sample to its publication
+        self._publish_times = Durations()
+        self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
+        self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
+        self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
+        self._inputs = [
+            self._listen(Imu, IMU, self._on_imu),
+            self._listen(AirData, AIR_DATA, self._on_air_data),
+            self._listen(JointState, ACTUATORS, self._on_actuators),
+        ]
+        self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.structure)}")
+
+    def cleanup(self) -> None:
+        """Give up what ``configure`` made."""
+        if self._session is None:
+            return
+        self._session = None
+        for subscription in self._inputs:
+            self.destroy_subscription(subscription)
+        for publisher in (self._derivatives, self._model_gap):
+            self.destroy_lifecycle_publisher(publisher)
+
+    # Messages
+
+    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Any], list[Estimates]]) -> Any:
+        """Subscribe to an input; what falls due after a message is published."""
+        monitor = self._monitors[topic]
+
+        def on_message(message: Any) -> None:
+            monitor.arrived()
+            if self._session is not None:
+                for estimates in take(self._session, message):
+                    self._publish(self._session, estimates)
+
+        overrides = QoSOverridingOptions.with_default_policies()
+        return self.create_subscription(
+            kind, topic, self.guarded(on_message), SENSOR_QOS, qos_overriding_options=overrides
+        )
+
+    def _on_imu(self, session: Session, message: Any) -> list[Estimates]:
+        self._frame_id = message.header.frame_id
+        return session.imu(stamp_ns(message.header.stamp), conversion.imu_values(message, self._sign))
+
+    def _on_air_data(self, session: Session, message: Any) -> list[Estimates]:
+        return session.air_data(stamp_ns(message.header.stamp), conversion.air_data_values(message))
+
+    def _on_actuators(self, session: Session, message: Any) -> list[Estimates]:
+        return session.actuators(stamp_ns(message.header.stamp), message.name, message.position)
+
+    def _publish(self, session: Session, estimates: Estimates) -> None:
+        start = time.perf_counter()
+        stamp = session.stamp_ns(estimates.time)
+        header = conversion.header(stamp, self._frame_id)
+        aircraft, method = session.aircraft.name, session.settings.method
+        self._derivatives.publish(conversion.estimates_message(estimates, header, aircraft, method))
+        self._lag = (self.get_clock().now().nanoseconds - stamp) / conversion.NANOSECONDS
+        self._publish_times.add(time.perf_counter() - start)
+
+    # Requests
+
+    def _on_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        reason = refusal(self, self.state_label, changes)
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    def _on_reset(self, _: Any, response: Any) -> Any:
+        response.success = self._session is not None
+        response.message = "all estimates forgotten" if self._session else f"nothing to reset: {self.state_label}"
+        if self._session is not None:
+            self._session.reset()
+        return response
+
+    def _on_save(self, _: Any, response: Any) -> Any:
+        try:
+            response.message = str(self._save())
+            response.success = True
+        except InputError as error:
+            response.message = str(error)
+        return response
+
+    def _save(self) -> Path:
+        if self._session is None or not self._session.samples:
+            raise InputError(f"nothing to save: the node is {self.state_label} and no aligned sample has come")
+        return save_estimates(Path(self.get_parameter("save_directory").value), self._session)
+
+    def _on_tick(self) -> None:
+        self.settle()
+        session = self._session
+        source = Source(self.get_name(), session.aircraft.name if session else "")
+        message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
+        message.header.stamp = self.get_clock().now().to_msg()
+        if self.active and session is not None:
+            stale_after = self.get_parameter("stale_after").value
+            work = {"update": session.update_times, "publication": self._publish_times}
+            message.status += [
+                source.input(list(self._monitors.values()), session.rejected, stale_after),
+                source.estimate(session.estimates, session.samples),
+                source.computation(work, self._lag),
+            ]
+        self._diagnostics.publish(message)
+
+
+def main() -> None:
+    """Entry point of the node."""
+    sys.exit(run_program(lambda: serve(Identifier())))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+"""The program `player`: a bag's messages on real topics, at the pace at which they were recorded."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import struct
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.utilities import remove_ros_args
+from rosbags.rosbag2 import Reader, ReaderError
+from rosgraph_msgs.msg import Clock
+
+from sysid_node.errors import InputError
+from sysid_node.ros.conversion import NANOSECONDS, stamp_message
+from sysid_node.ros.spin import run_program
+
+CLOCK_PERIOD = NANOSECONDS // 100
+SETTLE = 0.3  # s from the moment when a listener is found until it surely hears
+
+
+class Player(Node):
+    """Publishes a bag's topics under their own names (which ROS remaps as for any node), reliably."""
+
+    def __init__(self, topics: dict[str, str], clock: bool) -> None:
+        """``topics``: name -> type, e.g. ``sensor_msgs/msg/Imu``; an unknown type is left out, with a warning."""
+        super().__init__("player")
+        self._topics: dict[str, tuple[Any, bool]] = {}  # publisher, whether its messages begin with a header
+        for name, type_name in topics.items():
+            kind = _message_class(type_name)
+            if kind is None:
+                self.get_logger().warning(f"{name} is not played: its type {type_name} is not installed here")
+                continue
+            publisher = self.create_publisher(kind, name, QoSProfile(depth=1000))
+            first = next(iter(kind.get_fields_and_field_types().values()), "")
+            self._topics[name] = publisher, first == "std_msgs/Header"
+        self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
+
+    def await_listeners(self, patience: float) -> None:
+        """Wait up to ``patience`` s until every topic is heard; go on without, saying which are not."""
+        end = time.monotonic() + patience
+        deaf = self._deaf()
+        while deaf and time.monotonic() < end and rclpy.ok():
+            time.sleep(0.02)
+            deaf = self._deaf()
+        if deaf:
+            self.get_logger().warning(f"nobody listens to {', '.join(deaf)}")
+        else:
+            time.sleep(SETTLE)
+
+    def play(self, messages: Iterable[tuple[str, int, bytes]], rate: float, restamp: bool) -> int:
+        """Publish (topic, log time in ns, serialised message), ``rate`` times as fast as recorded. Returns how many.
+
+        With ``restamp`` all stamps, and /clock, are moved by one constant that takes the first log time to now.
+        """
+        begun, first, shift, next_clock, count = 0, None, 0, 0, 0
+        for topic, log_ns, raw in messages:
+            if first is None:
+                begun, first = time.monotonic_ns(), log_ns
+                shift = time.time_ns() - log_ns if restamp else 0
+            if not _sleep_until(begun + int((log_ns - first) / rate)):
+                break
+            if self._clock is not None and log_ns >= next_clock:
+                self._clock.publish(Clock(clock=stamp_message(log_ns + shift)))
+                next_clock = log_ns + CLOCK_PERIOD
+            if topic in self._topics:
+                publisher, headed = self._topics[topic]
+                publisher.publish(shift_stamp(raw, shift) if headed and shift else raw)
+                count += 1
+        return count
+
+    def _deaf(self) -> list[str]:
+        return [name for name, (publisher, _) in self._topics.items() if not publisher.get_subscription_count()]
+
+
+def shift_stamp(raw: bytes, shift: int) -> bytes:
+    """A serialised message that begins with a header, its stamp moved by ``shift`` ns (CDR: sec, nanosec at byte 4)."""
+    form = "<iI" if raw[1] & 1 else ">iI"
+    seconds, nanoseconds = struct.unpack_from(form, raw, 4)
+    moved = divmod(seconds * NANOSECONDS + nanoseconds + shift, NANOSECONDS)
+    return raw[:4] + struct.pack(form, *moved) + raw[12:]
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Reader]:
+    """A bag, open for reading. Raises InputError where it is missing, empty or damaged."""
+    try:
+        with Reader(path) as reader:
+            if not reader.message_count:
+                raise InputError(f"bag {path}: holds no messages; give another")
+            yield reader
+    except (OSError, ReaderError) as error:
+        raise InputError(f"bag {path}: cannot be read: {error}; give a rosbag2 folder, .mcap or .db3 file") from error
+
+
+def _message_class(type_name: str) -> Any:
+    """The class of ``package/msg/Name``, None where its package is not installed."""
+    package, _, name = type_name.partition("/msg/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name, None)
+    except ImportError:
+        return None
+
+
+def _sleep_until(moment: int) -> bool:
+    """Sleep until a monotonic time in ns. False where ROS was shut down meanwhile."""
+    while rclpy.ok():
+        left = (moment - time.monotonic_ns()) / NANOSECONDS
+        if left <= 0.0:
+            return True
+        time.sleep(min(left, 0.1))
+    return False
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: expected a number over zero")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="player", description=__doc__, epilog="ROS arguments follow --ros-args.")
+    parser.add_argument("bag", type=Path, help="rosbag2 folder, or .mcap or .db3 file")
+    parser.add_argument("--rate", type=_positive, default=1.0, help="how many times as fast as recorded (1)")
+    parser.add_argument("--restamp", action="store_true", help="move all stamps by one constant, to now")
+    parser.add_argument("--clock", action="store_true", help="publish /clock, for nodes with use_sim_time")
+    parser.add_argument("--wait", type=float, default=5.0, help="longest wait for listeners, s (5)")
+    return parser
+
+
+def main() -> None:
+    """Entry point of the program."""
+    options = _parser().parse_args(remove_ros_args(sys.argv)[1:])
+
+    def play() -> None:
+        with open_bag(options.bag) as bag:
+            player = Player({connection.topic: connection.msgtype for connection in bag.connections}, options.clock)
+            player.await_listeners(options.wait)
+            messages = ((connection.topic, log_ns, raw) for connection, log_ns, raw in bag.messages())
+            count = player.play(messages, options.rate, options.restamp)
+            player.get_logger().info(f"played {count} messages of {options.bag}")
+
+    sys.exit(run_program(play))
+
+
+if __name__ == "__main__":
+    main()

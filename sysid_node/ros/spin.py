@@ -1,0 +1,46 @@
+"""Runs a ROS program until it is done or told to stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+
+from sysid_node.errors import InputError
+
+
+def run_program(program: Callable[[], None]) -> int:
+    """Run ``program`` with ROS initialised; returns the exit code.
+
+    0 when it is done or stopped by Ctrl-C, SIGTERM or a shutdown of its context; 2 where it raises InputError, which
+    becomes one line of the log.
+    """
+    rclpy.init()
+    try:
+        program()
+    except InputError as error:
+        rclpy.logging.get_logger("sysid").fatal(str(error))
+        return 2
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+def serve(node: Node) -> None:
+    """Serve a node's callbacks until ROS is shut down, then destroy it.
+
+    The events executor takes a third of the processor time of the single-threaded one; its ``spin`` hangs, hence
+    ``spin_once``.
+    """
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        node.destroy_node()
