@@ -1,0 +1,87 @@
+"""``sysid``: finds the command, runs it, and turns what goes wrong into one line and an exit code.
+
+A command is the module of its name beside this one. It has ``add_parser(commands)``, which adds its parser to
+argparse's ``commands`` and returns it, and ``run(args)``. Only the module of the command that is run is imported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import NoReturn
+
+from sysid_node.errors import InputError
+
+COMMANDS = {
+    "replay": "identify an aircraft from a bag, as the live node does",
+    "identify": "identify an aircraft from bags with a batch method",
+    "simulate": "fly a simulated aircraft into a bag",
+    "excite": "design a manoeuvre and tell what it would show",
+    "gap": "find why the simulator does not fly like the aircraft",
+    "convert": "turn a flight log into a bag",
+    "export": "write an estimate as another simulator's model",
+    "report": "write report.html again from the files of a run",
+}
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Says what is wrong and where help is, and exits with 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs a command; returns the exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    command = next((word for word in arguments if not word.startswith("-")), "")
+    debug = "--debug" in arguments
+    try:
+        parser = build_parser(command)
+        args = parser.parse_args(arguments)
+        if not args.command:
+            parser.print_help()
+            return BAD_INPUT
+        import_module(f"sysid_node.cli.{command}").run(args)
+    except KeyboardInterrupt:
+        return _say(command, "interrupted", INTERRUPTED)
+    except BrokenPipeError:  # whoever read our output has left; Python must not complain of it at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except Exception as error:  # every command's last resort: one line for the user, the traceback on request
+        if debug:
+            traceback.print_exc()
+        if isinstance(error, InputError):
+            return _say(command, str(error), BAD_INPUT)
+        return _say(command, f"failed: {type(error).__name__}: {error} (more with --debug)", FAILED)
+    return DONE
+
+
+def build_parser(command: str) -> Parser:
+    """The parser of all commands, with the arguments of one."""
+    parser = Parser(prog="sysid", description="Identify a fixed-wing aircraft in flight and at the desk.")
+    parser.add_argument("--debug", action="store_true", help="print the traceback of an error")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    for name, meaning in COMMANDS.items():
+        if find_spec(f"sysid_node.cli.{name}") is None:
+            continue  # of a layer that is not installed
+        if name == command:
+            one = import_module(f"sysid_node.cli.{name}").add_parser(commands)
+            one.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+        else:
+            commands.add_parser(name, help=meaning)
+    return parser
+
+
+def _say(command: str, message: str, code: int) -> int:
+    """One line on stderr, whatever the message holds."""
+    print(f"sysid {command}: {' '.join(message.split())}", file=sys.stderr)
+    return code

@@ -1,0 +1,101 @@
+"""Flights from files: bags and logs by suffix, and a log's samples as the messages that would have carried them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.align import flight_record
+from sysid_node.flight.bag import read_streams
+from sysid_node.flight.csv import read_csv
+from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
+
+#: Readers of logs that hold samples already aligned, by suffix.
+READERS: Mapping[str, Callable[[Path], FlightRecord]] = MappingProxyType({".csv": read_csv})
+
+#: Joints of a log's controls, by symbol; thrust is in N.
+STANDARD_JOINTS = MappingProxyType({"elevator": "de", "aileron": "da", "rudder": "dr"})
+THROTTLE_JOINT = "throttle"
+
+_START_NS = 1_000_000_000  # of a log without a date: a stamp of zero would say that there is none
+_NEEDED = ("ax", "ay", "az", "p", "q", "r", "V")
+
+
+def read_log(path: str | Path) -> FlightRecord:
+    """A flight from a log. Raises InputError where the suffix is not known or the log cannot be read."""
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(f"{path}: not a log that can be read; known: {', '.join(READERS)}")
+    return reader(path)
+
+
+def load_flight(
+    path: str | Path,
+    aircraft: Aircraft,
+    *,
+    topics: Mapping[str, str] | None = None,
+    frame: BodyFrame = "flu",
+    max_gap: float = 0.2,
+) -> FlightRecord:
+    """A flight from a log, or from a bag (aligned; ``max_gap`` s as of ``align``). Raises InputError."""
+    if Path(path).suffix.lower() in READERS:
+        return read_log(path)
+    return flight_record(aircraft, read_streams(path, topics, frame), max_gap)
+
+
+def streams_of(flight: FlightRecord, aircraft: Aircraft | None = None) -> Streams:
+    """A flight as messages, one on each topic per sample, stamped from the flight's start.
+
+    Joints are the aircraft's where one is given (its map turned round), else ``elevator``, ``aileron``,
+    ``rudder``, with thrust in N as ``throttle``. Raises InputError where a column that every flight needs is missing.
+    """
+    missing = [column for column in _NEEDED if not flight.measured(column)]
+    if missing:
+        raise InputError(f"flight {flight.name!r}: no values in {', '.join(missing)}; a bag needs them")
+    since = np.round(flight.time * 1e9).astype(np.int64)
+    stamps = since + (flight.start_ns or _START_NS - min(int(since[0]), 0))
+    imu, air_data, actuators = arrivals_in_stamp_order(stamps, stamps, stamps)
+    joints = _standard_joints(flight) if aircraft is None else _aircraft_joints(flight, aircraft)
+    return Streams(
+        ImuStream(imu, _side_by_side(flight, *_NEEDED[:6]), _side_by_side(flight, "phi", "theta", "psi"), "imu"),
+        AirDataStream(air_data, _side_by_side(flight, "V", "alpha", "beta", "rho")),
+        JointStream(actuators, tuple(joints), np.column_stack(list(joints.values()))),
+        flight.name,
+    )
+
+
+def _side_by_side(flight: FlightRecord, *columns: str) -> Array:
+    return np.column_stack([flight[column] for column in columns])
+
+
+def _standard_joints(flight: FlightRecord) -> dict[str, Array]:
+    """Joints that are the controls themselves; those not measured are left out."""
+    joints = {joint: flight[symbol] for joint, symbol in STANDARD_JOINTS.items() if flight.measured(symbol)}
+    if flight.measured("thrust"):
+        joints[THROTTLE_JOINT] = flight["thrust"]
+    if not joints:
+        raise InputError(f"flight {flight.name!r}: no values in de, da, dr or thrust; a bag needs one of them")
+    return joints
+
+
+def _aircraft_joints(flight: FlightRecord, aircraft: Aircraft) -> dict[str, Array]:
+    """The joints from which the aircraft file would make the flight's controls; of several such, the smallest."""
+    controls = list(aircraft.controls.values())
+    unmeasured = [control.symbol for control in controls if not flight.measured(control.symbol)]
+    if unmeasured:
+        raise InputError(f"flight {flight.name!r}: no values in {', '.join(unmeasured)}, which {aircraft.name} has")
+    names = list(dict.fromkeys(joint for control in controls for joint in control.joints))
+    scales = np.array([[control.joints.get(name, 0.0) for name in names] for control in controls])
+    values = np.column_stack([flight[control.symbol] - control.offset for control in controls])
+    joints = dict(zip(names, (values @ np.linalg.pinv(scales).T).T, strict=True))
+    if aircraft.throttle is not None and flight.measured("thrust"):
+        joints[aircraft.throttle.joint] = flight["thrust"] / (aircraft.throttle.max_thrust or 1.0)
+    return joints
