@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -27,14 +28,20 @@ def write_run(folder: Path, run: RunResult) -> None:
     cannot be written.
     """
     stored = _stored(run)
-    try:
+    with _writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         _write_tables(folder, stored)
         text = json.dumps(summary(stored), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / SUMMARY).write_text(text + "\n", encoding="utf-8")
         write_report(folder / REPORT, stored)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder") from None
+
+
+def rebuild_report(folder: Path) -> Path:
+    """Draws ``report.html`` from the folder's other files and gives its path. Raises as ``read_run`` does."""
+    run = read_run(folder)
+    with _writing(folder):
+        write_report(folder / REPORT, run)
+    return folder / REPORT
 
 
 def read_run(folder: Path) -> RunResult:
@@ -96,6 +103,15 @@ def _stored(run: RunResult) -> RunResult:
 def _thin_response(response: Response) -> Response:
     curves = thin_curve(response.time, response.measured, response.modelled, points=MAX_ROWS)
     return Response(response.unit, *curves)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """What the system says where a file cannot be written, in one line."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder") from None
 
 
 def _write_tables(folder: Path, run: RunResult) -> None:

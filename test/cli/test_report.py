@@ -1,0 +1,45 @@
+"""``sysid report`` draws the page again, and says so where it cannot."""
+
+import argparse
+
+import pytest
+
+from sysid_node.cli import report
+from sysid_node.errors import InputError
+from sysid_node.online.types import DerivativeEstimate, Estimates
+from sysid_node.report.data import Prior, RunResult
+from sysid_node.report.folder import write_run
+
+
+def call(*arguments: str) -> int:
+    parser = argparse.ArgumentParser()
+    report.add_parser(parser.add_subparsers())
+    parsed = parser.parse_args(["report", *arguments])
+    return parsed.run(parsed)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    d = DerivativeEstimate("Cm_q", -1.3, 0.1, -1.5, -1.1, True, "ok")
+    run = RunResult("kestrel", "sls_rft", [Estimates(9.0, {"Cm_q": d}, {})], prior={"Cm_q": Prior(-1.2, 0.3)})
+    write_run(tmp_path, run)
+    return tmp_path
+
+
+def test_the_page_comes_back_as_it_was(folder, capsys):
+    page = folder / "report.html"
+    before = page.read_bytes()
+    page.unlink()
+    assert call(str(folder)) == 0
+    assert page.read_bytes() == before
+    assert capsys.readouterr().out.strip() == str(page)
+
+
+def test_quiet_is_silent(folder, capsys):
+    assert call(str(folder), "--quiet") == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_folder_without_a_run_is_bad_input(tmp_path):
+    with pytest.raises(InputError, match=r"no summary\.json"):
+        call(str(tmp_path / "nowhere"))
