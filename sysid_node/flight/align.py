@@ -30,6 +30,8 @@ STEP_BACK_NS = 1_000_000_000  # stamps that go back further are a clock that was
 STEP_FORWARD_NS = 300_000_000_000  # and those that leap forward further
 BUFFER_NS = 5_000_000_000  # what is kept of each topic while waiting for the others
 
+AIR_INTERVAL = "air_interval"
+
 Rejected = dict[str, dict[str, int]]  # topic -> reason -> messages
 
 
@@ -50,7 +52,8 @@ class Screened:
 class Alignment:
     """Aligned samples, and where each came from.
 
-    ``samples`` (N, 11 + controls): ax ay az p q r V alpha beta rho thrust, then the controls in the aircraft's order.
+    ``samples`` (N, 12 + controls): ax ay az p q r V alpha beta rho thrust air_interval, then the controls in the
+    aircraft's order. The air interval (s) is the time between the air-data messages on either side.
     """
 
     imu: Screened
@@ -127,11 +130,14 @@ def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
     right_act, near_act, wait_act = bracket(actuators.stamps, at, max_gap)
     decided = ~(wait_air | wait_act) | late
     used = np.flatnonzero(near_air & near_act)
+    actuated = interpolate(actuators.stamps, actuators.values, right_act[used], at[used])
     samples = np.column_stack(
         [
             imu.values[used],
             interpolate(air.stamps, air.values, right_air[used], at[used]),
-            interpolate(actuators.stamps, actuators.values, right_act[used], at[used]),
+            actuated[:, :1],
+            intervals(air.stamps, max_gap)[right_air[used]],
+            actuated[:, 1:],
         ]
     )
     gaps = {
@@ -180,6 +186,12 @@ def bracket(
     return right, exact | near, waits
 
 
+def intervals(stamps: Stamps, max_gap: float) -> Array:
+    """Time (s) of each stamp since the one before, at most ``max_gap``; the first's is zero."""
+    since: Array = np.minimum(np.diff(stamps, prepend=stamps[:1]), gap_ns(max_gap)) / 1e9
+    return since
+
+
 def interpolate(stamps: Stamps, values: Array, right: NDArray[np.intp], at: Stamps) -> Array:
     """Values (n, K) at the stamps ``at`` (n,), each on the line through its right neighbour and the one before.
 
@@ -208,12 +220,18 @@ def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> Fligh
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
-    names = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", *aircraft.control_symbols)
-    columns = dict(zip(names, np.ascontiguousarray(aligned.samples.T), strict=True))
+    columns = dict(zip(_columns(aircraft), np.ascontiguousarray(aligned.samples.T), strict=True))
+    del columns[AIR_INTERVAL]
     attitude = streams.imu.attitude[aligned.imu.kept[aligned.used]]
     columns |= dict(zip(("phi", "theta", "psi"), np.ascontiguousarray(attitude.T), strict=True))
     start = int(aligned.imu.stamps[0])
     return FlightRecord(aligned.time, columns, streams.name, start, flat(aligned.rejected))
+
+
+def _columns(aircraft: Aircraft) -> tuple[str, ...]:
+    """Names of the samples' columns."""
+    measured = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", AIR_INTERVAL)
+    return (*measured, *aircraft.control_symbols)
 
 
 def _require_one_clock(streams: Streams, aligned: Alignment) -> None:

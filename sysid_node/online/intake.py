@@ -75,10 +75,11 @@ class _Missing(Enum):
 
 
 class _Entry(NamedTuple):
-    """A message that is believed."""
+    """A message that is believed, or what would have been said between two."""
 
     epoch: int
     stamp: int
+    interval: int  # ns since the message before, at most max_gap
     values: Values
 
 
@@ -106,6 +107,7 @@ class _Neighbours:
     topic: str
     clock: _Clock = field(default_factory=_Clock)
     entries: deque[_Entry] = field(default_factory=deque)
+    newest: _Entry | None = None
     ahead: int = 0  # the topic's epoch less the IMU's, where their clocks were not set together
 
 
@@ -202,7 +204,9 @@ def _on_neighbour(
         return []
     state.accepted[topic.topic] += 1
     entries, epoch = topic.entries, topic.clock.epoch
-    entries.append(_Entry(epoch, stamp, values))
+    before = topic.newest if topic.newest is not None and topic.newest.epoch == epoch else None
+    topic.newest = _Entry(epoch, stamp, min(stamp - before.stamp, state.gap) if before else 0, values)
+    entries.append(topic.newest)
     while entries[0].epoch < epoch - 1 or (entries[0].epoch == epoch and stamp - entries[0].stamp > state.buffer):
         entries.popleft()
     return _release(state)
@@ -226,7 +230,9 @@ def _release(state: IntakeState) -> list[tuple[float, Sample]]:
         elif actuators is _Missing.FOR_GOOD:
             _reject(state, IMU, gap(ACTUATORS))
         else:
-            complete.append((imu.since / 1e9, imu.values + air_data + actuators))
+            thrust, controls = actuators.values[:1], actuators.values[1:]
+            sample = (*imu.values, *air_data.values, *thrust, air_data.interval / 1e9, *controls)
+            complete.append((imu.since / 1e9, sample))
     return complete
 
 
@@ -239,8 +245,8 @@ def _give_up(state: IntakeState) -> None:
         topic.ahead = topic.clock.epoch - state.clock.epoch
 
 
-def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> Values | _Missing:
-    """A topic's values at an IMU message's stamp, or why there are none. Forgets messages that are no longer needed."""
+def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Entry | _Missing:
+    """What a topic says at an IMU message's stamp, or why nothing. Forgets messages that are no longer needed."""
     entries, epoch, stamp = topic.entries, imu.epoch + topic.ahead, imu.stamp
     while entries and entries[0].epoch < epoch:
         entries.popleft()
@@ -248,7 +254,7 @@ def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> Values | _Miss
         entries.popleft()
     left = entries[0] if entries and entries[0].epoch == epoch else None
     if left is not None and left.stamp == stamp:
-        return left.values
+        return left
     if left is not None and left.stamp > stamp:
         return _Missing.FOR_GOOD
     right = entries[1] if len(entries) > 1 and entries[1].epoch == epoch else None
@@ -258,7 +264,8 @@ def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> Values | _Miss
     if right.stamp - left.stamp > state.gap:
         return _Missing.FOR_GOOD
     weight = (stamp - left.stamp) / (right.stamp - left.stamp)
-    return tuple([a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)])
+    values = tuple([a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)])
+    return _Entry(epoch, stamp, right.interval, values)
 
 
 def _reject(state: IntakeState, topic: str, reason: str) -> None:
