@@ -1,0 +1,135 @@
+"""A whole record at once: the same estimates as ``update`` with every sample, to the last bit, in a fraction of the time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online import estimator, signals, transform
+from sysid_node.online.estimates import estimate
+from sysid_node.online.estimator import State
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
+
+Array = NDArray[np.float64]
+CHUNK = 4096  # samples whose weights are held at once
+
+
+def run(
+    aircraft: Aircraft,
+    settings: Settings,
+    time: Array,
+    samples: Array,
+    publish_times: Array,
+    progress: Callable[[float], None] | None = None,
+) -> list[Estimates]:
+    """Estimates as they stand after the first sample at or past each of ``publish_times`` (K,) s, one a sample at most.
+
+    ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them. ``progress`` hears the time reached.
+    """
+    state = estimator.init(aircraft, settings)
+    results: list[Estimates] = []
+    due = np.unique(np.searchsorted(time, publish_times, side="left"))
+    for begin in range(0, time.size, CHUNK):
+        end = min(begin + CHUNK, time.size)
+        stops = due[(due >= begin) & (due < end)] - begin
+        chunk = _prepare(state, time[begin:end], samples[begin:end])
+        done = 0
+        for stop in chunk.kept[stops].tolist():
+            _advance(state, chunk, done, stop)
+            results.append(estimate(state))
+            done = stop
+        _advance(state, chunk, done, chunk.time.size)
+        if progress is not None:
+            progress(float(time[end - 1]))
+    return results
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Consecutive usable samples (n,), each with the interval that ends in it. Times in s."""
+
+    kept: NDArray[np.intp]  # (N,) usable samples up to and including each given one
+    time: Array  # (n,)
+    begins: Array  # (n,) start of the interval; NaN where none leads to the sample
+    means: Array  # (n, W)
+    halves: Array  # (n, W)
+    kernels: Array  # (n, 2, rows)
+    intervals: Array  # (n,) of the air data
+    last: tuple[float, Array, tuple[float, ...]] | None
+
+
+def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
+    """What ``update`` computes of each sample by itself, for many."""
+    usable = _usable(state, time, samples)
+    kept = np.cumsum(usable)
+    time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]
+    thrust = estimator.THRUST
+    columns[thrust] = np.where(np.isfinite(columns[thrust]), columns[thrust], 0.0)
+    grid = state.transform.grid
+    if not time.size:
+        empty = np.empty((0, state.model.layout.width))
+        return _Chunk(kept, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous)
+    rows, angles = signals.array_signals(state.model.aircraft)(columns)
+    rows.insert(estimator.DRIFT, time)
+    values = np.stack(rows, axis=1)
+    motion = [*columns[3:6], *angles]
+    begins = np.concatenate([[np.nan], time[:-1]])
+    before, motion_before = np.vstack([values[:1], values[:-1]]), [np.concatenate([m[:1], m[:-1]]) for m in motion]
+    if state.previous is not None:
+        begins[0], before[0] = state.previous[0], state.previous[1]
+        for column, value in zip(motion_before, state.previous[2], strict=True):
+            column[0] = value
+    begins[~(time - begins <= state.model.settings.max_gap)] = np.nan
+    steps = time - begins
+    halves = (values - before) * 0.5
+    means = before + halves
+    estimator.add_momentum(state.model.momentum, steps, motion_before, motion, means)
+    kernels = np.zeros((time.size, 2, grid.rows))
+    transform.weights(grid, (begins + 0.5 * steps)[:, None], steps[:, None], kernels)
+    kernels[:, 0, -1] = steps
+    last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
+    return _Chunk(kept, time, begins, means, halves, kernels, columns[estimator.INTERVAL], last)
+
+
+def _usable(state: State, time: Array, samples: Array) -> NDArray[np.bool_]:
+    """(N,) which samples ``update`` takes in; those that lack a value are counted as it counts them."""
+    if np.isnan(state.begin) and time.size:
+        state.begin = float(time[0]) + state.model.settings.settle_time
+    finite = np.isfinite(samples)
+    late = time >= state.begin
+    if not finite[late, estimator.THRUST].all():
+        state.thrust_known = False
+    finite[:, estimator.THRUST] = True
+    complete = finite.all(axis=1)
+    names = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols)
+    missing, counts = np.unique(np.argmin(finite[late & ~complete], axis=1), return_counts=True)
+    for column, count in zip(missing.tolist(), counts.tolist(), strict=True):
+        state.incomplete[names[column]] = state.incomplete.get(names[column], 0) + count
+    return late & complete
+
+
+def _advance(state: State, chunk: _Chunk, begin: int, end: int) -> None:
+    """Take in the chunk's samples begin..end (exclusive)."""
+    while begin < end:
+        if np.isnan(chunk.begins[begin]):
+            estimator.interrupt(state, float(chunk.time[begin]))
+            begin += 1
+            continue
+        # up to and including the sample that renews, short of the next gap
+        stop = min(int(np.searchsorted(chunk.time[begin:end], state.renew_at, side="left")) + 1 + begin, end)
+        gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
+        stop = begin + int(gaps[0]) if gaps.size else stop
+        part = slice(begin, stop)
+        transform.add_many(state.transform, chunk.kernels[part], chunk.time[part], chunk.means[part], chunk.halves[part])
+        for interval in chunk.intervals[part].tolist():
+            estimator.count(state, interval)
+        if state.transform.last >= state.renew_at:
+            estimator.renew(state)
+        begin = stop
+    if end == chunk.time.size:
+        state.previous = chunk.last

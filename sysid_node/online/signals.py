@@ -1,0 +1,154 @@
+"""From an aligned sample to the signals of the regression: coefficients, their regressors, angular momenta.
+
+Each coefficient's equation is multiplied by k = qbar / qbar0, the dynamic pressure over its reference value,
+
+    force or moment / (qbar0 S l) = k (C_0 + C_alpha alpha + C_q qhat + ...),
+
+so that a moment's rate-of-momentum part is a plain derivative of a measured rate and needs neither a numerical
+differentiation nor the derivative of the dynamic pressure: it enters as the increment of the angular momentum
+over a sampling interval, which the transform integrates exactly (see ``transform``).
+
+Equations of motion with all products of rates and Ixz: Klein & Morelli, "Aircraft System Identification"
+(2006), eqs. 3.35 to 3.37; coefficients from them eqs. 5.96 to 5.101. Body axes FRD, SI, radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+Array = NDArray[np.float64]
+
+#: The nuisances of every segment: the offset (times k) and a slow drift.
+NUISANCES = ("0", "t")
+OUTPUTS = len(COEFFICIENTS)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which column of the signal vector is what: six coefficients, two nuisances, then the regressors."""
+
+    regressors: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns in order."""
+        return (*COEFFICIENTS, *NUISANCES, *self.regressors)
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return OUTPUTS + len(NUISANCES) + len(self.regressors)
+
+    def column(self, name: str) -> int:
+        """Index of a coefficient, nuisance or regressor."""
+        return self.names.index(name)
+
+
+def layout(aircraft: Aircraft) -> Layout:
+    """The union of the regressors in the aircraft's model, each once, in the order of the file."""
+    wanted = (r for regressors in aircraft.structure.values() for r in regressors)
+    return Layout(tuple(dict.fromkeys(r for r in wanted if r != "0")))
+
+
+def scalar_signals(aircraft: Aircraft) -> Callable[[Sequence[float]], tuple[list[float], list[float]]]:
+    """Function from one sample to (signals without drift, accelerations per rate of change of p, q, r).
+
+    The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
+    """
+    return _signals(aircraft, math.cos, math.sin)
+
+
+def array_signals(aircraft: Aircraft) -> Callable[[Sequence[Array]], tuple[list[Array], list[Array]]]:
+    """As ``scalar_signals`` for columns (N,). Cosines come from the scalar library, for equal bits."""
+
+    def mapped(function: Callable[[float], float]) -> Callable[[Array], Array]:
+        return lambda x: np.fromiter(map(function, x.tolist()), np.float64, x.size)
+
+    return _signals(aircraft, mapped(math.cos), mapped(math.sin))
+
+
+def _signals(aircraft: Aircraft, cos, sin):  # type: ignore[no-untyped-def]
+    """Build the signal function over scalars or arrays; see ``scalar_signals``."""
+    m, S, b, c = aircraft.mass, aircraft.geometry.S, aircraft.geometry.b, aircraft.geometry.cbar
+    rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
+    qbar0 = 0.5 * rho0 * V0 * V0
+    force, roll, pitch = 1.0 / (qbar0 * S), 1.0 / (qbar0 * S * b), 1.0 / (qbar0 * S * c)
+    mass = m * force
+    Ixx, Iyy, Izz, Ixz = (_known(v) for v in _inertias(aircraft))
+    xi, yi, zi = aircraft.sensors.imu
+    xa, ya, za = aircraft.sensors.air_data
+    throttle = aircraft.throttle
+    incline, arm = (throttle.inclination, throttle.arm) if throttle else (0.0, 0.0)
+    cos_t, sin_t = math.cos(incline) * force, math.sin(incline) * force
+    names = layout(aircraft).regressors
+    controls = {s: len(SAMPLE_COLUMNS) + i for i, s in enumerate(aircraft.control_symbols)}
+
+    def signals(sample):  # type: ignore[no-untyped-def]
+        ax, ay, az, p, q, r, V, alpha, beta, rho, thrust = sample[:11]
+        # flow angles at the CG: the vanes see the rotation (small-angle form)
+        alpha = alpha + (q * xa - p * ya) / V
+        beta = beta - (r * xa - p * za) / V
+        # specific force at the CG: centripetal part of the lever arm here, tangential part below
+        ax = ax + (q * q + r * r) * xi - p * q * yi - p * r * zi
+        ay = ay - p * q * xi + (p * p + r * r) * yi - q * r * zi
+        az = az - p * r * xi - q * r * yi + (p * p + q * q) * zi
+        k = rho * V * V / (rho0 * V0 * V0)
+        FX, FY, FZ = mass * ax - cos_t * thrust, mass * ay, mass * az + sin_t * thrust
+        ca, sa = cos(alpha), sin(alpha)
+        lift, drag = FX * sa - FZ * ca, -FX * ca - FZ * sa
+        L = ((Izz - Iyy) * q * r - Ixz * p * q) * roll
+        M = ((Ixx - Izz) * p * r + Ixz * (p * p - r * r) - arm * thrust) * pitch
+        N = ((Iyy - Ixx) * p * q + Ixz * q * r) * roll
+        half = 0.5 * k / V
+        known = {"alpha": k * alpha, "beta": k * beta, "p": p * b * half, "q": q * c * half, "r": r * b * half}
+        known["V"] = k * V / V0
+        known["k"] = lift * lift / k
+        row = [lift, drag, FY, L, M, N, k]
+        row.extend(known[n] if n in known else k * sample[controls[n]] for n in names)
+        # per unit of dp/dt, dq/dt, dr/dt: (ca, sa) carry the tangential acceleration into lift and drag
+        return row, [ca, sa]
+
+    return signals
+
+
+def momentum_matrix(aircraft: Aircraft) -> Array:
+    """(3, 6) d(FX FY FZ L M N)/d(pdot qdot rdot): angular momentum, and the IMU's tangential acceleration.
+
+    Force rows are body-axis forces over qbar0 S, moment rows are moments over qbar0 S b (or cbar).
+    """
+    g = aircraft.geometry
+    qbar0 = 0.5 * aircraft.reference.air_density * aircraft.reference.airspeed**2
+    Ixx, Iyy, Izz, Ixz = (_known(v) for v in _inertias(aircraft))
+    x, y, z = aircraft.sensors.imu
+    mass = aircraft.mass / (qbar0 * g.S)
+    roll, pitch = 1.0 / (qbar0 * g.S * g.b), 1.0 / (qbar0 * g.S * g.cbar)
+    # a_cg = a_imu - omega_dot x r: columns are the axes of the force
+    tangential = mass * np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    moments = np.array([[Ixx * roll, 0.0, -Ixz * roll], [0.0, Iyy * pitch, 0.0], [-Ixz * roll, 0.0, Izz * roll]])
+    return np.hstack([tangential, moments])
+
+
+def unformed(aircraft: Aircraft) -> dict[str, str]:
+    """Coefficients whose equation cannot be formed, with the reason; empty where all inertias are known."""
+    Ixx, Iyy, Izz, _ = _inertias(aircraft)
+    missing = {"Cl": Ixx, "Cm": Iyy, "Cn": Izz}
+    return {c: "inertia unknown" for c, inertia in missing.items() if math.isnan(inertia)}
+
+
+def _inertias(aircraft: Aircraft) -> tuple[float, float, float, float]:
+    i = aircraft.inertia
+    return i.Ixx, i.Iyy, i.Izz, i.Ixz
+
+
+def _known(value: float) -> float:
+    """An inertia that is not known leaves its products of rates out (``unformed`` names the lost equations)."""
+    return 0.0 if math.isnan(value) else value
