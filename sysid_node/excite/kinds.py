@@ -1,0 +1,96 @@
+"""The kinds of manoeuvre that a spec can name, their keys, and what each draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.excite import shapes
+from sysid_node.excite.multisine import multisine
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Key:
+    """A number that shapes a manoeuvre: default, unit, what it means, and whether it must be above zero."""
+
+    default: float
+    unit: str
+    meaning: str
+    positive: bool = True
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind. ``draw(time, values, count)`` gives (count, N), peak one, zero outside 0 to ``length(values)`` s."""
+
+    meaning: str
+    keys: Mapping[str, Key]
+    length: Callable[[Values], float]
+    draw: Callable[[Array, Values, int], Array]
+
+
+#: Keys of every kind, besides ``amplitude`` (needed; rad; one for all controls of the segment, or one each).
+COMMON_KEYS = {
+    "start": Key(1.0, "s", "when it begins", positive=False),
+    "repeat": Key(1.0, "", "how often it is flown"),
+    "every": Key(0.0, "s", "from one beginning to the next; 0: one second after the last end", positive=False),
+}
+
+_BAND = {
+    "length": Key(20.0, "s", "how long it lasts"),
+    "low": Key(0.1, "Hz", "lowest frequency"),
+    "high": Key(2.0, "Hz", "highest frequency"),
+}
+
+
+def _steps(meaning: str, *pattern: float) -> Kind:
+    def draw(time: Array, values: Values, count: int) -> Array:
+        return np.tile(shapes.multistep(time, pattern, values["width"]), (count, 1))
+
+    keys = {"width": Key(0.5, "s", "length of the unit step")}
+    return Kind(meaning, keys, lambda values: sum(pattern) * values["width"], draw)
+
+
+def _ramp(time: Array, values: Values, count: int) -> Array:
+    return np.tile(shapes.ramp(time, values["length"]), (count, 1))
+
+
+def _sweep(time: Array, values: Values, count: int) -> Array:
+    return np.tile(shapes.sweep(time, values["length"], values["low"], values["high"]), (count, 1))
+
+
+def _random(time: Array, values: Values, count: int) -> Array:
+    """Each control its own noise."""
+    length, low, high, seed = values["length"], values["low"], values["high"], int(values["seed"])
+    return np.array([shapes.random(time, length, low, high, seed + i) for i in range(count)])
+
+
+def _multisine(time: Array, values: Values, count: int) -> Array:
+    return multisine(time, values["length"], values["low"], values["high"], count)
+
+
+def _length(values: Values) -> float:
+    return values["length"]
+
+
+KINDS: Mapping[str, Kind] = {
+    "pulse": _steps("one step and back", 1),
+    "doublet": _steps("a step, its opposite, and back", 1, 1),
+    "211": _steps("steps of 2, 1 and 1 units, alternating", 2, 1, 1),
+    "3211": _steps("steps of 3, 2, 1 and 1 units, alternating", 3, 2, 1, 1),
+    "ramp": Kind("a slow triangle", {"length": Key(20.0, "s", "how long it lasts")}, _length, _ramp),
+    "sweep": Kind("a sine of growing frequency", _BAND, _length, _sweep),
+    "random": Kind(
+        "band-limited Gaussian noise, another for each control",
+        {**_BAND, "seed": Key(1.0, "", "of the random numbers", positive=False)},
+        _length,
+        _random,
+    ),
+    "multisine": Kind("orthogonal multisines on all its controls at once", _BAND, _length, _multisine),
+}

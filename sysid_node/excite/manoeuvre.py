@@ -1,0 +1,63 @@
+"""A manoeuvre: deflections from trim over time, within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+
+Array = NDArray[np.float64]
+
+#: The throttle is flown like a surface, in its own unit: share of full throttle, or N.
+THROTTLE = "throttle"
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """``time`` (N,) s from zero, uniform; ``deflections`` control -> (N,), rad from trim (throttle: its own unit).
+
+    Every control that the aircraft has is a key, in the aircraft's order, the throttle last; zero where not moved.
+    """
+
+    time: Array
+    deflections: Mapping[str, Array]
+    spec: str
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last sample."""
+        return float(self.time[-1])
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """The controls that move."""
+        return tuple(name for name, values in self.deflections.items() if np.any(values))
+
+    def surfaces(self) -> Array:
+        """Deflections (N, M) of the aerodynamic controls, in the aircraft's order."""
+        return np.column_stack([values for name, values in self.deflections.items() if name != THROTTLE])
+
+
+def control_limits(aircraft: Aircraft) -> dict[str, float]:
+    """Largest deflection of every control that can be flown, infinite where the file gives none."""
+    limits = {name: control.limit or np.inf for name, control in aircraft.controls.items()}
+    if aircraft.throttle is not None:
+        limits[THROTTLE] = 1.0 if aircraft.throttle.max_thrust is not None else np.inf
+    return limits
+
+
+def check_limits(manoeuvre: Manoeuvre, aircraft: Aircraft) -> None:
+    """Raise InputError, naming control, time and limit, where a deflection from trim passes the control's limit."""
+    for name, limit in control_limits(aircraft).items():
+        size = np.abs(manoeuvre.deflections[name])
+        worst = int(size.argmax())
+        if size[worst] > limit * (1 + 1e-9):
+            raise InputError(
+                f"manoeuvre {manoeuvre.spec!r}: {name} moves {size[worst]:.4g} from trim at "
+                f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name}'s limit is {limit:g}; lower the amplitude"
+            )

@@ -1,0 +1,206 @@
+"""The text that describes a manoeuvre: ``kind:control[,control...]:key=value:...``, several joined by ``+``."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.document import did_you_mean
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.excite.kinds import COMMON_KEYS, KINDS, Key
+from sysid_node.excite.manoeuvre import Manoeuvre, check_limits, control_limits
+
+Array = NDArray[np.float64]
+
+#: Seconds of free response after the last segment, where the caller gives no duration.
+TAIL = 3.0
+
+_MOST_SAMPLES = 5_000_000
+
+#: A plus sign joins segments where a kind follows it; in a number such as 1e+1 it does not.
+_JOIN = re.compile(rf"\+(?=\s*(?:{'|'.join(KINDS)})\s*:)")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One term of a spec: a kind on some controls, with an amplitude each and its other numbers."""
+
+    kind: str
+    controls: tuple[str, ...]
+    amplitude: tuple[float, ...]  # one per control
+    values: Mapping[str, float]  # every key of the kind and of COMMON_KEYS
+
+    @property
+    def length(self) -> float:
+        """Seconds that one flight of it lasts."""
+        return KINDS[self.kind].length(self.values)
+
+    @property
+    def period(self) -> float:
+        """Seconds from one repetition to the next."""
+        return self.values["every"] or self.length + 1.0
+
+    @property
+    def end(self) -> float:
+        """When the last repetition is over, s."""
+        return self.values["start"] + (int(self.values["repeat"]) - 1) * self.period + self.length
+
+    def draw(self, time: Array) -> Array:
+        """Deflections (controls, N) at the times."""
+        total = np.zeros((len(self.controls), time.size))
+        for i in range(int(self.values["repeat"])):
+            local = time - self.values["start"] - i * self.period
+            try:
+                total += KINDS[self.kind].draw(local, self.values, len(self.controls))
+            except InputError as error:
+                raise InputError(f"manoeuvre {self.text()!r}: {error}") from error
+        return np.array(self.amplitude)[:, None] * total
+
+    def text(self) -> str:
+        """The segment as a spec that gives it back."""
+        amplitude = ",".join(f"{value:g}" for value in self.amplitude)
+        known = {**KINDS[self.kind].keys, **COMMON_KEYS}
+        rest = [f"{key}={value:g}" for key, value in self.values.items() if value != known[key].default]
+        return ":".join([self.kind, ",".join(self.controls), f"amplitude={amplitude}", *rest])
+
+
+def parse_manoeuvre(
+    spec: str | Sequence[str], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
+) -> Manoeuvre:
+    """The manoeuvre that a spec, or several flown together, describes for this aircraft.
+
+    Sampled at ``rate`` (Hz) for ``duration`` (s; until 3 s after the last segment where it is None). Raises InputError
+    (one line) for a spec that is wrong, a control that the aircraft does not have, or a deflection beyond its limit.
+    """
+    return draw_manoeuvre(parse_segments(spec, aircraft), aircraft, rate, duration)
+
+
+def draw_manoeuvre(
+    segments: Sequence[Segment], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
+) -> Manoeuvre:
+    """Sample segments into a manoeuvre; see ``parse_manoeuvre``."""
+    spec = "+".join(segment.text() for segment in segments)
+    time = _time_base(spec, segments, rate, duration)
+    deflections = {name: np.zeros(time.size) for name in control_limits(aircraft)}
+    for segment in segments:
+        for control, values in zip(segment.controls, segment.draw(time), strict=True):
+            deflections[control] += values
+    manoeuvre = Manoeuvre(time, deflections, spec)
+    check_limits(manoeuvre, aircraft)
+    return manoeuvre
+
+
+def _time_base(spec: str, segments: Sequence[Segment], rate: float, duration: float | None) -> Array:
+    end = max(segment.end for segment in segments)
+    total = end + TAIL if duration is None else duration
+    if total < end - 1e-9:
+        raise InputError(f"manoeuvre {spec!r}: lasts until {end:g} s, but the flight {total:g} s; fly longer")
+    if not 1.0 <= rate <= 10_000.0 or total * rate > _MOST_SAMPLES:
+        raise InputError(
+            f"manoeuvre {spec!r}: {total:g} s at {rate:g} Hz; expected 1 to 10000 Hz, at most {_MOST_SAMPLES} samples"
+        )
+    highest = max(segment.values.get("high", 0.0) for segment in segments)
+    if highest > rate / 2:
+        raise InputError(
+            f"manoeuvre {spec!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice as fast"
+        )
+    return np.asarray(np.arange(round(total * rate) + 1) / rate)
+
+
+def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[Segment, ...]:
+    """The segments of a spec or of several, checked. Raises InputError."""
+    texts = [spec] if isinstance(spec, str) else list(spec)
+    return tuple(_segment(part.strip(), aircraft) for text in texts for part in _JOIN.split(text))
+
+
+def moved(segment: Segment, start: float) -> Segment:
+    """The same segment at another time (s)."""
+    return replace(segment, values={**segment.values, "start": start})
+
+
+def _segment(text: str, aircraft: Aircraft) -> Segment:
+    kind, _, rest = text.partition(":")
+    kind = kind.strip()
+    if kind not in KINDS:
+        raise _error(text, f"{kind!r} is no kind of manoeuvre; expected one of {', '.join(KINDS)}", kind, KINDS)
+    names, _, settings = rest.partition(":")
+    controls = _controls(text, names, aircraft)
+    given = _settings(text, settings)
+    known = {**KINDS[kind].keys, **COMMON_KEYS}
+    expected = dict.fromkeys(("amplitude", *known))
+    for key in given:
+        if key not in expected:
+            raise _error(text, f"{key!r} is no key of {kind}; expected {', '.join(expected)}", key, expected)
+    values = {key: _number(text, key, given.get(key), default) for key, default in known.items()}
+    _check(text, values)
+    return Segment(kind, controls, _amplitude(text, given.get("amplitude"), len(controls)), values)
+
+
+def _error(text: str, problem: str, word: str = "", known: Mapping[str, object] | None = None) -> InputError:
+    return InputError(f"manoeuvre {text!r}: {problem}{did_you_mean(word, known) if known else ''}")
+
+
+def _controls(text: str, names: str, aircraft: Aircraft) -> tuple[str, ...]:
+    limits = control_limits(aircraft)
+    controls = tuple(name.strip() for name in names.split(","))
+    for name in controls:
+        if name not in limits:
+            listed = ", ".join(limits)
+            raise _error(text, f"{aircraft.name} has no control {name!r}; expected one of {listed}", name, limits)
+    if len(set(controls)) < len(controls):
+        raise _error(text, "a control is named twice")
+    return controls
+
+
+def _settings(text: str, settings: str) -> dict[str, str]:
+    given: dict[str, str] = {}
+    for item in filter(None, (part.strip() for part in settings.split(":"))):
+        key, equals, value = (part.strip() for part in item.partition("="))
+        if not equals:
+            raise _error(text, f"got {item!r}, expected key=value")
+        if key in given:
+            raise _error(text, f"{key} is given twice")
+        given[key] = value
+    return given
+
+
+def _float(text: str, key: str, value: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise _error(text, f"{key} is {value!r}, expected a number")
+    return number
+
+
+def _number(text: str, key: str, value: str | None, known: Key) -> float:
+    number = known.default if value is None else _float(text, key, value)
+    if number < 0 or (known.positive and number == 0):
+        bound = "above zero" if known.positive else "not negative"
+        raise _error(text, f"{key} is {number:g}, expected {bound}{f' ({known.unit})' if known.unit else ''}")
+    return number
+
+
+def _amplitude(text: str, value: str | None, count: int) -> tuple[float, ...]:
+    if value is None:
+        raise _error(text, "amplitude is missing; expected e.g. amplitude=0.05 (rad)")
+    amplitude = tuple(_float(text, "amplitude", part) for part in value.split(","))
+    if len(amplitude) == 1:
+        amplitude *= count
+    if len(amplitude) != count:
+        raise _error(text, f"{len(amplitude)} amplitudes for {count} controls; give one, or one each")
+    return amplitude
+
+
+def _check(text: str, values: Mapping[str, float]) -> None:
+    if values["repeat"] != int(values["repeat"]) or values["repeat"] > 1000:
+        raise _error(text, f"repeat is {values['repeat']:g}, expected a whole number, at most 1000")
+    if "high" in values and values["high"] <= values["low"]:
+        raise _error(text, f"high is {values['high']:g} Hz, expected more than low, {values['low']:g} Hz")

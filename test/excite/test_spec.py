@@ -1,0 +1,142 @@
+"""Specs: what the grammar means, and the one line that a wrong spec gets."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.excite.kinds import KINDS
+from sysid_node.excite.manoeuvre import control_limits
+from sysid_node.excite.shapes import multistep
+from sysid_node.excite.spec import draw_manoeuvre, moved, parse_manoeuvre, parse_segments
+
+CDRW = load_aircraft("cdrw")
+
+
+def test_a_3211():
+    manoeuvre = parse_manoeuvre("3211:elevator:amplitude=0.05:start=2:width=0.4", CDRW, rate=200.0)
+    assert tuple(manoeuvre.deflections) == ("elevator", "aileron", "rudder", "throttle")
+    assert manoeuvre.moved == ("elevator",)
+    assert manoeuvre.duration == pytest.approx(2 + 7 * 0.4 + 3)
+    expected = 0.05 * multistep(manoeuvre.time - 2, (3, 2, 1, 1), 0.4)
+    assert np.array_equal(manoeuvre.deflections["elevator"], expected)
+    assert np.array_equal(manoeuvre.surfaces()[:, 0], expected)
+    assert manoeuvre.surfaces().shape == (manoeuvre.time.size, 3)
+
+
+def test_segments_add_up_joined_or_given_one_by_one():
+    parts = ["doublet:elevator:amplitude=0.1", "211:rudder:amplitude=1e-1:start=1e+1", "pulse:elevator:amplitude=-0.02"]
+    joined = parse_manoeuvre(" + ".join(parts), CDRW)
+    assert joined.moved == ("elevator", "rudder")
+    listed = parse_manoeuvre(parts, CDRW)
+    alone = [parse_manoeuvre(part, CDRW, duration=joined.duration) for part in parts]
+    for name in joined.deflections:
+        assert np.array_equal(joined.deflections[name], listed.deflections[name])
+        assert np.allclose(joined.deflections[name], sum(one.deflections[name] for one in alone))
+
+
+def test_repeats():
+    manoeuvre = parse_manoeuvre("doublet:aileron:amplitude=0.1:width=0.5:start=1:repeat=3:every=4", CDRW)
+    rises = np.flatnonzero(np.diff(manoeuvre.deflections["aileron"]) > 0.15 - 1e-9)
+    starts = np.flatnonzero((manoeuvre.deflections["aileron"][1:] > 0) & (manoeuvre.deflections["aileron"][:-1] == 0))
+    assert rises.size == 0
+    assert np.allclose(manoeuvre.time[starts + 1], [1, 5, 9])
+    unsaid = parse_manoeuvre("doublet:aileron:amplitude=0.1:width=0.5:start=1:repeat=3", CDRW)
+    assert unsaid.duration == pytest.approx(1 + 2 * 2 + 1 + 3)  # one second after each end
+
+
+def test_an_amplitude_each():
+    manoeuvre = parse_manoeuvre("multisine:elevator,aileron,rudder:amplitude=0.05,0.04,0.03", CDRW)
+    peaks = np.abs(manoeuvre.surfaces()).max(axis=0)
+    assert np.all(peaks <= [0.05, 0.04, 0.03])
+    assert np.allclose(peaks, [0.05, 0.04, 0.03], rtol=0.01)
+
+
+def test_duration_pads():
+    manoeuvre = parse_manoeuvre("doublet:elevator:amplitude=0.1", CDRW, rate=50.0, duration=60.0)
+    assert manoeuvre.duration == 60.0
+    assert manoeuvre.time.size == 3001
+
+
+def test_limits_are_the_aircrafts():
+    assert control_limits(CDRW) == {"elevator": 0.35, "aileron": 0.35, "rudder": 0.35, "throttle": 1.0}
+    parse_manoeuvre("pulse:elevator:amplitude=0.35", CDRW)
+    with pytest.raises(InputError, match=r"elevator moves 0.36 from trim at 1.00 s, but cdrw's limit is 0.35"):
+        parse_manoeuvre("pulse:elevator:amplitude=0.36", CDRW)
+    with pytest.raises(InputError, match=r"elevator moves 0.4 from trim"):
+        parse_manoeuvre("pulse:elevator:amplitude=0.2+doublet:elevator:amplitude=0.2", CDRW)
+    without = replace(CDRW, throttle=None)
+    with pytest.raises(InputError, match="no control 'throttle'"):
+        parse_manoeuvre("pulse:throttle:amplitude=0.1", without)
+
+
+MISTAKES = [
+    ("", "'' is no kind of manoeuvre"),
+    ("321:elevator:amplitude=0.1", "did you mean '3211'?"),
+    ("doublet", "no control ''; expected one of elevator, aileron, rudder, throttle"),
+    ("doublet:elvator:amplitude=0.1", "did you mean 'elevator'?"),
+    ("doublet:elevator,elevator:amplitude=0.1", "named twice"),
+    ("doublet:elevator", "amplitude is missing"),
+    ("doublet:elevator:amp=0.1", "'amp' is no key of doublet"),
+    ("doublet:elevator:amplitude", "got 'amplitude', expected key=value"),
+    ("doublet:elevator:amplitude=0.1:amplitude=0.2", "amplitude is given twice"),
+    ("doublet:elevator:amplitude=big", "amplitude is 'big', expected a number"),
+    ("doublet:elevator:amplitude=nan", "amplitude is 'nan', expected a number"),
+    ("doublet:elevator:amplitude=0.1,0.2", "2 amplitudes for 1 controls"),
+    ("doublet:elevator:amplitude=0.1:width=0", "width is 0, expected above zero (s)"),
+    ("doublet:elevator:amplitude=0.1:start=-1", "start is -1, expected not negative (s)"),
+    ("doublet:elevator:amplitude=0.1:repeat=1.5", "repeat is 1.5, expected a whole number"),
+    ("sweep:elevator:amplitude=0.1:low=2:high=1", "high is 1 Hz, expected more than low, 2 Hz"),
+    ("sweep:elevator:amplitude=0.1:high=60", "60 Hz cannot be drawn at 100 Hz"),
+    ("multisine:elevator:amplitude=0.1:length=0.1", "no harmonic of 1/0.1 s"),
+    ("multisine:elevator:amplitude=0.1:length=1e9", "at most 5000000 samples"),
+]
+
+
+@pytest.mark.parametrize(("spec", "expected"), MISTAKES, ids=[spec for spec, _ in MISTAKES])
+def test_a_mistake_gets_one_line(spec, expected):
+    with pytest.raises(InputError) as caught:
+        parse_manoeuvre(spec, CDRW)
+    message = str(caught.value)
+    assert message.startswith("manoeuvre ")
+    assert expected in message
+    assert "\n" not in message
+
+
+def test_too_short_a_flight():
+    with pytest.raises(InputError, match=r"lasts until 2 s, but the flight 1.5 s"):
+        parse_manoeuvre("doublet:elevator:amplitude=0.1", CDRW, duration=1.5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_text_gives_the_segment_back(kind):
+    (segment,) = parse_segments(f"{kind}:elevator,rudder:amplitude=0.1,0.05:start=2.5:repeat=2", CDRW)
+    assert parse_segments(segment.text(), CDRW) == (segment,)
+    later = moved(segment, 7.25)
+    assert later.values["start"] == 7.25
+    assert draw_manoeuvre([later], CDRW).spec == later.text()
+
+
+@given(st.text(alphabet="3211doubletsweepelevator:,=+.-0123456789amplitudestart ", max_size=60))
+def test_any_text_gives_a_manoeuvre_or_one_line(text):
+    try:
+        manoeuvre = parse_manoeuvre(text, CDRW)
+    except InputError as error:
+        assert "\n" not in str(error)
+    else:
+        assert np.all(np.isfinite(manoeuvre.surfaces()))
+
+
+def test_the_documentation_names_every_kind_and_its_examples_parse():
+    page = (Path(__file__).parents[2] / "docs" / "manoeuvres.md").read_text()
+    for kind in KINDS:
+        assert f"| `{kind}` |" in page
+    examples = [line.strip() for line in page.split("```spec\n")[1].split("```")[0].splitlines()]
+    assert len(examples) >= 4
+    for example in examples:
+        parse_manoeuvre(example, CDRW)
