@@ -1,29 +1,27 @@
-"""``sysid report DIR``: draws ``report.html`` again from the files of a run."""
+"""``sysid report``: report.html drawn again from the files of a run."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
+
+from sysid_node.report.folder import rebuild_report
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 
-def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
-    """Adds the subcommand."""
-    parser = subparsers.add_parser(
-        "report",
-        help="draw report.html again from the files of a run",
-        description="Draws DIR/report.html again from summary.json and the CSV tables that replay or identify wrote.",
-    )
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser("report", help="write report.html again from the files of a run", description=__doc__)
     parser.add_argument("directory", metavar="DIR", type=Path, help="the --out folder of sysid replay or identify")
     parser.add_argument("--quiet", action="store_true", help="print nothing")
-    parser.set_defaults(run=run)
+    return parser
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Runs the subcommand; 0 when done. Raises InputError where the folder holds no run."""
-    from sysid_node.report.folder import rebuild_report  # noqa: PLC0415  (keeps `sysid --help` quick)
-
-    path = rebuild_report(arguments.directory)
-    if not arguments.quiet:
+def run(args: argparse.Namespace) -> None:
+    """Draws the page and prints its path."""
+    path = rebuild_report(args.directory)
+    if not args.quiet:
         print(path)
-    return 0

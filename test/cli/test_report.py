@@ -1,21 +1,11 @@
 """``sysid report`` draws the page again, and says so where it cannot."""
 
-import argparse
-
 import pytest
 
-from sysid_node.cli import report
-from sysid_node.errors import InputError
+from sysid_node.cli.main import main
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.data import Prior, RunResult
 from sysid_node.report.folder import write_run
-
-
-def call(*arguments: str) -> int:
-    parser = argparse.ArgumentParser()
-    report.add_parser(parser.add_subparsers())
-    parsed = parser.parse_args(["report", *arguments])
-    return parsed.run(parsed)
 
 
 @pytest.fixture
@@ -30,16 +20,19 @@ def test_the_page_comes_back_as_it_was(folder, capsys):
     page = folder / "report.html"
     before = page.read_bytes()
     page.unlink()
-    assert call(str(folder)) == 0
+    assert main(["report", str(folder)]) == 0
     assert page.read_bytes() == before
     assert capsys.readouterr().out.strip() == str(page)
 
 
 def test_quiet_is_silent(folder, capsys):
-    assert call(str(folder), "--quiet") == 0
+    assert main(["report", str(folder), "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_folder_without_a_run_is_bad_input(tmp_path):
-    with pytest.raises(InputError, match=r"no summary\.json"):
-        call(str(tmp_path / "nowhere"))
+def test_a_folder_without_a_run_is_bad_input(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "nowhere")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("sysid report: ")
+    assert "no summary.json in it" in said
+    assert said.count("\n") == 1

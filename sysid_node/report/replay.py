@@ -1,0 +1,142 @@
+"""From a replayed or live record to a RunResult: what was flown, and what the final estimates make of it.
+
+The measured coefficients drawn here differentiate the rates numerically, which the estimator itself does not do; they
+serve the eye. The estimates do not depend on anything in this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.online.settings import Settings
+from sysid_node.online.signals import array_signals, layout, momentum_matrix
+from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
+from sysid_node.report.data import Response, RunResult, Spectra, prior_of
+from sysid_node.report.spectrum import amplitude_spectrum
+
+THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
+POINTS_A_PERIOD = 8  # of the highest frequency in use, in drawn responses
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Complete samples as the model sees them: ``coefficients`` and ``regressors`` name -> (N,), non-dimensional."""
+
+    time: Array  # (N,) s
+    samples: Array  # (N, M)
+    coefficients: Mapping[str, Array]
+    regressors: Mapping[str, Array]
+
+
+def replay_result(
+    aircraft: Aircraft,
+    settings: Settings,
+    *,
+    time: Array,
+    samples: Array,
+    history: Sequence[Estimates],
+    rejected: Mapping[str, int],
+    truth: Mapping[str, float] | None = None,
+    title: str = "",
+    remarks: Sequence[str] = (),
+) -> RunResult:
+    """All that a report needs, from the aligned ``time`` (N,) s, ``samples`` (N, M) and the estimates over time.
+
+    Columns of ``samples`` are ``SAMPLE_COLUMNS``, then the controls in the aircraft's order.
+    """
+    motion = _motion(aircraft, time, samples)
+    modelled = _modelled(aircraft, motion, history[-1]) if motion and history else {}
+    return RunResult(
+        aircraft=aircraft.name,
+        method=settings.method,
+        history=history,
+        title=title,
+        data_seconds=float(time[-1] - time[0]) if time.size else 0.0,
+        samples=int(time.size),
+        settings=settings.as_dict(),
+        prior=prior_of(aircraft),
+        truth=truth or {},
+        flight=_flight(aircraft, time, samples),
+        spectra=_spectra(aircraft, settings, motion, modelled) if motion else None,
+        responses=_responses(settings, motion, modelled) if motion else {},
+        rejected=rejected,
+        remarks=remarks,
+    )
+
+
+def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | None:
+    if time.size < 2:
+        return None
+    names = (*SAMPLE_COLUMNS, *aircraft.control_symbols)
+    return FlightRecord(time, {n: samples[:, i] for i, n in enumerate(names) if i != AIR_INTERVAL})
+
+
+def _motion(aircraft: Aircraft, time: Array, samples: Array) -> Motion | None:
+    """The complete samples, unknown thrust taken as none, as the estimator does; None for fewer than ten."""
+    filled = samples.copy()
+    filled[np.isnan(filled[:, THRUST]), THRUST] = 0.0
+    complete = np.isfinite(filled).all(axis=1)
+    if complete.sum() < 10:
+        return None
+    time, filled = time[complete], filled[complete]
+    row, (ca, sa) = array_signals(aircraft)(list(filled.T))
+    acceleration = np.gradient(filled[:, 3:6], time, axis=0)
+    X, Y, Z, L, M, N = (acceleration @ momentum_matrix(aircraft)).T
+    inertial = (X * sa - Z * ca, -X * ca - Z * sa, Y, L, M, N)  # of rates and of the IMU's lever arm
+    k = row[len(COEFFICIENTS)]
+    coefficients = {c: (row[i] + inertial[i]) / k for i, c in enumerate(COEFFICIENTS)}
+    names = layout(aircraft).regressors
+    regressors = {name: x / k for name, x in zip(names, row[len(COEFFICIENTS) + 1 :], strict=True)}
+    return Motion(time, filled, coefficients, {"0": np.ones(time.size), **regressors})
+
+
+def _modelled(aircraft: Aircraft, motion: Motion, final: Estimates) -> dict[str, Array]:
+    """Each coefficient (N,) from the final estimates; left out where one of its derivatives is unknown."""
+    modelled = {}
+    for coefficient, regressors in aircraft.structure.items():
+        values = [final.derivatives[f"{coefficient}_{r}"].value for r in regressors]
+        if np.isfinite(values).all():
+            pairs = zip(values, regressors, strict=True)
+            modelled[coefficient] = np.sum([value * motion.regressors[r] for value, r in pairs], axis=0)
+    return modelled
+
+
+def _spectra(aircraft: Aircraft, settings: Settings, motion: Motion, modelled: Mapping[str, Array]) -> Spectra:
+    """Inputs, coefficients and residuals at the frequencies in use."""
+    start, step, stop = settings.frequencies
+    frequency = np.arange(start, stop + 0.5 * step, step)
+    symbols = aircraft.control_symbols
+    inputs = [motion.samples[:, len(SAMPLE_COLUMNS) + i] for i in range(len(symbols))]
+    measured = [motion.coefficients[c] for c in modelled]
+    residuals = [motion.coefficients[c] - values for c, values in modelled.items()]
+    columns = np.stack([*inputs, *measured, *residuals], axis=1)
+    first, *rest = np.split(
+        amplitude_spectrum(motion.time, columns, frequency).T, np.cumsum([len(inputs), len(measured)])
+    )
+    return Spectra(
+        frequency,
+        dict(zip(symbols, first, strict=True)),
+        dict(zip(modelled, rest[0], strict=True)),
+        dict(zip(modelled, rest[1], strict=True)),
+    )
+
+
+def _responses(settings: Settings, motion: Motion, modelled: Mapping[str, Array]) -> dict[str, Response]:
+    """Measured and modelled coefficients, averaged over half the shortest period in use: noise above is left out."""
+    step = float(np.median(np.diff(motion.time)))
+    width = max(round(0.5 / (settings.frequencies[2] * step)), 1)
+    every = max(2 * width // POINTS_A_PERIOD, 1)
+
+    def smooth(values: Array) -> Array:
+        return np.convolve(values, np.full(width, 1.0 / width), mode="valid")[::every]
+
+    if motion.time.size < width:
+        return {}
+    time = smooth(motion.time)
+    return {c: Response("", time, smooth(motion.coefficients[c]), smooth(values)) for c, values in modelled.items()}
