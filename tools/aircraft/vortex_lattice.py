@@ -161,7 +161,7 @@ def _panels(section: Section, n_chord: int) -> _Panels:
     # A flap acts where its panel's control point lies behind the hinge.
     gains: dict[str, Array] = {}
     for flap in section.flaps:
-        gains[flap.control] = gains.get(flap.control, 0.0) + flap.gain * (fraction > flap.hinge)
+        gains[flap.control] = np.where(fraction > flap.hinge, flap.gain, 0.0)
     count = len(left)
     chordwise = np.tile(aft, (count, 1))
     return _Panels(left, right, middle, np.tile(normal, (count, 1)) - slope[:, None] * chordwise, chordwise, gains)
@@ -170,8 +170,11 @@ def _panels(section: Section, n_chord: int) -> _Panels:
 def _merge(parts: Sequence[_Panels]) -> _Panels:
     names = {name for part in parts for name in part.gains}
     gains = {n: np.concatenate([part.gains.get(n, np.zeros(len(part.left))) for part in parts]) for n in names}
-    fields = ("left", "right", "collocation", "normal", "chordwise")
-    return _Panels(*(np.concatenate([getattr(part, name) for part in parts]) for name in fields), gains)
+    left, right, collocation, normal, chordwise = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("left", "right", "collocation", "normal", "chordwise")
+    )
+    return _Panels(left, right, collocation, normal, chordwise, gains)
 
 
 def _influence(panels: _Panels, points: Array) -> Array:
