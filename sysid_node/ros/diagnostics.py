@@ -13,6 +13,8 @@ from sysid_node.ros.monitor import Durations, TopicMonitor
 
 OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 
+FOREIGN_CLOCK = 60.0  # s of lag beyond which stamps are taken to be of another clock, as in a replay
+
 
 @dataclass(frozen=True)
 class Source:
@@ -65,7 +67,8 @@ class Source:
             p50, p99 = durations.percentiles()
             values[f"{kind} p50 (us)"] = 1e6 * p50
             values[f"{kind} p99 (us)"] = 1e6 * p99
-        return self._status("computation", OK, f"last estimate {1e3 * lag:.1f} ms after its sample", values)
+        late = f"{1e3 * lag:.1f} ms after its sample" if abs(lag) < FOREIGN_CLOCK else "of another clock's stamps"
+        return self._status("computation", OK, f"last estimate {late}", values)
 
     def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         pairs = [

@@ -23,7 +23,6 @@ from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.online.types import Estimates
 from sysid_node.ros import conversion
 from sysid_node.ros.conversion import stamp_ns
 from sysid_node.ros.declaring import declare, refusal, values_of
@@ -32,7 +31,7 @@ from sysid_node.ros.lifecycle import CarefulNode
 from sysid_node.ros.monitor import Durations, TopicMonitor
 from sysid_node.ros.parameters import estimation_settings
 from sysid_node.ros.save import save_estimates
-from sysid_node.ros.session import Session
+from sysid_node.ros.session import Due, Session
 from sysid_node.ros.spin import run_program, serve
 
 #: As sensor data are published, but deep enough that a burst after a pause of the process is not lost.
@@ -53,8 +52,8 @@ class Identifier(CarefulNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # A steady clock: diagnostics go on where simulated time stands still.
         self.create_timer(1.0, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.create_service(Trigger, "~/reset", self._on_reset)
-        self.create_service(Trigger, "~/save", self._on_save)
+        self.create_service(Trigger, "~/reset", self.answered(self.reset))
+        self.create_service(Trigger, "~/save", self.answered(self.save))
         if self.get_parameter("autostart").value:
             self._start()
 
@@ -98,38 +97,37 @@ class Identifier(CarefulNode):
 
     # Messages
 
-    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Any], list[Estimates]]) -> Any:
+    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Any], list[Due]]) -> Any:
         """Subscribe to an input; what falls due after a message is published."""
         monitor = self._monitors[topic]
 
         def on_message(message: Any) -> None:
             monitor.arrived()
             if self._session is not None:
-                for estimates in take(self._session, message):
-                    self._publish(self._session, estimates)
+                for due in take(self._session, message):
+                    self._publish(self._session, due)
 
         overrides = QoSOverridingOptions.with_default_policies()
         return self.create_subscription(
             kind, topic, self.guarded(on_message), SENSOR_QOS, qos_overriding_options=overrides
         )
 
-    def _on_imu(self, session: Session, message: Any) -> list[Estimates]:
+    def _on_imu(self, session: Session, message: Any) -> list[Due]:
         self._frame_id = message.header.frame_id
         return session.imu(stamp_ns(message.header.stamp), conversion.imu_values(message, self._sign))
 
-    def _on_air_data(self, session: Session, message: Any) -> list[Estimates]:
+    def _on_air_data(self, session: Session, message: Any) -> list[Due]:
         return session.air_data(stamp_ns(message.header.stamp), conversion.air_data_values(message))
 
-    def _on_actuators(self, session: Session, message: Any) -> list[Estimates]:
+    def _on_actuators(self, session: Session, message: Any) -> list[Due]:
         return session.actuators(stamp_ns(message.header.stamp), message.name, message.position)
 
-    def _publish(self, session: Session, estimates: Estimates) -> None:
+    def _publish(self, session: Session, due: Due) -> None:
         start = time.perf_counter()
-        stamp = session.stamp_ns(estimates.time)
-        header = conversion.header(stamp, self._frame_id)
+        header = conversion.header(due.stamp_ns, self._frame_id)
         aircraft, method = session.aircraft.name, session.settings.method
-        self._derivatives.publish(conversion.estimates_message(estimates, header, aircraft, method))
-        self._lag = (self.get_clock().now().nanoseconds - stamp) / conversion.NANOSECONDS
+        self._derivatives.publish(conversion.estimates_message(due.estimates, header, aircraft, method))
+        self._lag = (self.get_clock().now().nanoseconds - due.stamp_ns) / conversion.NANOSECONDS
         self._publish_times.add(time.perf_counter() - start)
 
     # Requests
@@ -138,41 +136,42 @@ class Identifier(CarefulNode):
         reason = refusal(self, self.state_label, changes)
         return SetParametersResult(successful=not reason, reason=reason)
 
-    def _on_reset(self, _: Any, response: Any) -> Any:
-        response.success = self._session is not None
-        response.message = "all estimates forgotten" if self._session else f"nothing to reset: {self.state_label}"
-        if self._session is not None:
-            self._session.reset()
-        return response
+    def reset(self) -> str:
+        """Forget all estimates. Raises InputError where there is nothing to forget."""
+        if self._session is None:
+            raise InputError(f"nothing to reset: the node is {self.state_label}")
+        self._session.reset()
+        return "all estimates forgotten"
 
-    def _on_save(self, _: Any, response: Any) -> Any:
-        try:
-            response.message = str(self._save())
-            response.success = True
-        except InputError as error:
-            response.message = str(error)
-        return response
-
-    def _save(self) -> Path:
+    def save(self) -> str:
+        """Write the estimates to a file and name it. Raises InputError where there are none or the file cannot be."""
         if self._session is None or not self._session.samples:
             raise InputError(f"nothing to save: the node is {self.state_label} and no aligned sample has come")
-        return save_estimates(Path(self.get_parameter("save_directory").value), self._session)
+        return str(save_estimates(Path(self.get_parameter("save_directory").value), self._session))
+
+    # Diagnostics
 
     def _on_tick(self) -> None:
         self.settle()
-        session = self._session
-        source = Source(self.get_name(), session.aircraft.name if session else "")
+        source = Source(self.get_name(), self._session.aircraft.name if self._session else "")
         message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
         message.header.stamp = self.get_clock().now().to_msg()
-        if self.active and session is not None:
-            stale_after = self.get_parameter("stale_after").value
-            work = {"update": session.update_times, "publication": self._publish_times}
-            message.status += [
-                source.input(list(self._monitors.values()), session.rejected, stale_after),
-                source.estimate(session.estimates, session.samples),
-                source.computation(work, self._lag),
-            ]
+        self.guarded(self._on_active_tick)(message)
         self._diagnostics.publish(message)
+
+    def _on_active_tick(self, message: DiagnosticArray) -> None:
+        session = self._session
+        if session is None:
+            return
+        source, stale_after = Source(self.get_name(), session.aircraft.name), self.get_parameter("stale_after").value
+        message.status.append(source.input(list(self._monitors.values()), session.rejected, stale_after))
+        if session.samples:
+            due = session.now(session.silence)
+            if session.silence > stale_after:
+                self._publish(session, due)  # nothing falls due without data; say that what is known grows old
+            message.status.append(source.estimate(due.estimates, session.samples))
+            work = {"update": session.update_times, "publication": self._publish_times}
+            message.status.append(source.computation(work, self._lag))
 
 
 def main() -> None:

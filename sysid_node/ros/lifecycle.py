@@ -51,6 +51,21 @@ class CarefulNode(LifecycleNode):
 
         return call
 
+    def answered(self, request: Callable[[], str]) -> Callable[[Any, Any], Any]:
+        """A service callback of type std_srvs/Trigger: what ``request`` returns, or raises, is the answer."""
+
+        def call(_: Any, response: Any) -> Any:
+            try:
+                response.message, response.success = request(), True
+            except InputError as error:
+                response.message = str(error)
+            except Exception as error:
+                self._record(request.__name__, error)
+                response.message = self.fault
+            return response
+
+        return call
+
     def settle(self) -> None:
         """Leave `active` after a fault. Call it from a timer: a subscription cannot be destroyed in its callback."""
         if self.fault and self.state_label == "active":

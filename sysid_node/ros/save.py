@@ -18,11 +18,11 @@ def save_estimates(folder: Path, session: Session) -> Path:
 
     Returns the file. Raises InputError where the folder cannot be written.
     """
-    estimates = session.estimates
+    stamp_ns, estimates = session.now()
     content = {
         "aircraft": session.aircraft.name,
         "method": session.settings.method,
-        "stamp_ns": session.stamp_ns(estimates.time),
+        "stamp_ns": stamp_ns,
         "data_seconds": estimates.time,
         "samples": session.samples,
         "rejected": session.rejected,
@@ -31,7 +31,7 @@ def save_estimates(folder: Path, session: Session) -> Path:
         "fits": {name: _plain(asdict(f), without="coefficient") for name, f in estimates.fits.items()},
         "holdout": {},
     }
-    path = folder / f"{content['aircraft']}-{content['stamp_ns']}.json"
+    path = folder / f"{session.aircraft.name}-{stamp_ns}.json"
     partial = path.with_suffix(".part")
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,155 @@
+"""The live node at work: what is lost, how late estimates are, what it costs. `python bench/live.py [--seconds 60]`
+
+One process publishes 400 Hz IMU, 100 Hz air data and 100 Hz actuators, another is the identifier, this one listens.
+Latency is from the IMU message's header stamp to the estimate's arrival here, one DDS hop and one callback included.
+Inputs are interpolated, so a sample waits until air data and actuators of its own time or later have come. Where all
+three are sampled together that takes no time; where they run free it takes up to their period, 10 ms here.
+"""
+
+import argparse
+import contextlib
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Imu, JointState
+from sysid_msgs.msg import AirData, DerivativeEstimates  # found once sysid_node.ros is there
+
+from sysid_node.ros.conversion import stamp_message, stamp_ns
+
+IMU_RATE, SLOW_EVERY = 400, 4
+PUBLISH_RATE = 50.0
+
+
+def publish(seconds: float, together: bool) -> None:
+    """Publish a made-up, well excited flight, each message stamped when it is published."""
+    rclpy.init()
+    node = rclpy.create_node("flight")
+    qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    imu, air, joints = (
+        node.create_publisher(kind, topic, qos)
+        for kind, topic in ((Imu, "imu/data"), (AirData, "air_data"), (JointState, "actuators"))
+    )
+    while not all(publisher.get_subscription_count() for publisher in (imu, air, joints)):
+        time.sleep(0.05)
+    time.sleep(0.5)
+    start = time.monotonic()
+    for tick in range(int(seconds * IMU_RATE) + 1):
+        t = tick / IMU_RATE
+        time.sleep(max(0.0, start + t - time.monotonic()))
+        shared = time.time_ns()
+        if tick % SLOW_EVERY == 0:
+            stamp = stamp_message(shared)
+            air.publish(air_data(AirData(), t, stamp))
+            joints.publish(deflections(JointState(name=["elevator", "aileron", "rudder", "throttle"]), t, stamp))
+        imu.publish(motion(Imu(), t, stamp_message(shared if together else time.time_ns())))
+    rclpy.shutdown()
+
+
+def motion(message, t, stamp):
+    message.header.stamp = stamp
+    message.linear_acceleration.x, message.linear_acceleration.z = 0.1 * math.sin(t), 9.8 + math.sin(2.0 * t)
+    rates = message.angular_velocity
+    rates.x, rates.y, rates.z = 0.3 * math.sin(3.0 * t), 0.2 * math.cos(2.0 * t), 0.1 * math.sin(2.5 * t)
+    return message
+
+
+def air_data(message, t, stamp):
+    message.header.stamp = stamp
+    message.true_airspeed, message.air_density = 18.0 + 0.5 * math.sin(0.7 * t), 1.2
+    message.angle_of_attack, message.sideslip = 0.05 + 0.03 * math.sin(2.0 * t), 0.03 * math.sin(2.5 * t)
+    return message
+
+
+def deflections(message, t, stamp):
+    message.header.stamp = stamp
+    message.position = [0.05 * math.sin(3.1 * t), 0.05 * math.sin(2.3 * t), 0.05 * math.cos(1.9 * t), 0.5]
+    return message
+
+
+@contextlib.contextmanager
+def identifier() -> Iterator[subprocess.Popen]:
+    """The node, in a process of its own."""
+    command = [sys.executable, "-m", "sysid_node.ros.identifier", "--ros-args", "--log-level", "warn"]
+    process = subprocess.Popen([*command, "-p", "aircraft:=cdrw", "-p", f"publish_rate:={PUBLISH_RATE}"])
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def processor_seconds(pid: int) -> float:
+    """Processor time that a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def listen(node, flight: BaseProcess, pid: int) -> tuple[list[float], dict[str, str], float]:
+    """Latencies (s), the last words of /diagnostics by key, and the node's share of one core."""
+    latencies: list[float] = []
+    words: dict[str, str] = {}
+    used = began = 0.0
+
+    def on_estimates(message) -> None:
+        nonlocal used, began
+        latencies.append((time.time_ns() - stamp_ns(message.header.stamp)) / 1e9)
+        if not began:
+            used, began = processor_seconds(pid), time.monotonic()
+
+    def on_diagnostics(message) -> None:
+        words.update({pair.key: pair.value for status in message.status for pair in status.values})
+
+    node.create_subscription(DerivativeEstimates, "/identifier/derivatives", on_estimates, 100)
+    node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
+    while flight.is_alive():
+        rclpy.spin_once(node, timeout_sec=0.2)
+    share = (processor_seconds(pid) - used) / (time.monotonic() - began)
+    end = time.monotonic() + 1.5  # diagnostics come once a second
+    while time.monotonic() < end:
+        rclpy.spin_once(node, timeout_sec=0.2)
+    return latencies, words, share
+
+
+def main() -> None:
+    """Measure both kinds of sampling and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    seconds = parser.parse_args().seconds
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    rclpy.init()
+    print(f"{seconds:g} s of {IMU_RATE} Hz IMU + 100 Hz air data + 100 Hz actuators, estimates at {PUBLISH_RATE:g} Hz")
+    print(
+        f"{'sampling':<10}{'sent':>8}{'lost':>6}{'rejected':>10}{'estimates':>11}{'p50 ms':>8}{'p99 ms':>8}{'CPU %':>7}"
+    )
+    for together in (True, False):
+        node = rclpy.create_node("bench")
+        flight = get_context("spawn").Process(target=publish, args=(seconds, together))
+        with identifier() as process:
+            flight.start()
+            latencies, words, share = listen(node, flight, process.pid)
+        node.destroy_node()
+        ticks = int(seconds * IMU_RATE) + 1
+        sent = ticks + 2 * (1 + (ticks - 1) // SLOW_EVERY)
+        received = sum(int(words[f"{topic}: received"]) for topic in ("imu/data", "air_data", "actuators"))
+        rejected = sum(int(count) for key, count in words.items() if key.startswith("rejected"))
+        p50, p99 = 1e3 * np.percentile(latencies, (50, 99))
+        print(
+            f"{'together' if together else 'free':<10}{sent:>8}{sent - received:>6}{rejected:>10}{len(latencies):>11}"
+            f"{p50:>8.2f}{p99:>8.2f}{100 * share:>7.1f}"
+        )
+    rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""Imports point downwards only, ROS stays in its layer, and the online path starts light."""
+
+import ast
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "sysid_node"
+
+#: What each layer may import of the package, besides itself.
+BELOW = {
+    "aircraft": set(),
+    "flight": {"aircraft"},
+    "sim": {"aircraft", "flight"},
+    "online": {"aircraft", "flight"},
+    "control": {"aircraft", "flight"},
+    "batch": {"aircraft", "flight", "sim"},
+    "excite": {"aircraft", "flight", "sim"},
+    "gap": {"aircraft", "flight", "sim", "online", "batch", "control", "excite"},
+    "ros": {"aircraft", "flight", "sim", "online", "batch", "control", "excite", "gap"},
+}
+BELOW["report"] = {*BELOW["ros"], "ros"}
+BELOW["cli"] = {*BELOW["report"], "report"}
+
+ROS_PACKAGES = {"rclpy", "ament_index_python", "rosidl_runtime_py", "launch", "launch_ros", "sysid_msgs"}
+ONLINE_PACKAGES = {"numpy", "scipy"}
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Names of all modules that a file imports, inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import; write the full name"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0]
+
+
+def is_ros(name: str) -> bool:
+    top = name.partition(".")[0]
+    return top in ROS_PACKAGES or top.endswith(("_msgs", "_interfaces", "_srvs"))
+
+
+@pytest.mark.parametrize("layer", sorted(p.name for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"))
+def test_imports_point_downwards(layer: str) -> None:
+    assert layer in BELOW, f"{layer} is no layer; say in BELOW what it may import"
+    for path in (PACKAGE / layer).rglob("*.py"):
+        for name in imports(path):
+            parts = name.split(".")
+            if parts[0] == "sysid_node" and len(parts) > 1 and (PACKAGE / parts[1]).is_dir():
+                assert parts[1] in {layer, *BELOW[layer]}, f"{path.relative_to(PACKAGE)} imports {name}"
+
+
+def test_modules_outside_layers_import_none() -> None:
+    for path in PACKAGE.glob("*.py"):
+        assert not [name for name in imports(path) if name.startswith("sysid_node.")], path.name
+
+
+def test_only_ros_and_above_import_ros() -> None:
+    for path in modules():
+        if layer_of(path) not in {"ros", "cli"}:
+            assert not [name for name in imports(path) if is_ros(name)], path.relative_to(PACKAGE)
+
+
+def test_online_imports_numpy_and_scipy_only() -> None:
+    """Directly by its own text, and in all by what is loaded once every module of the layer is."""
+    names = [f"sysid_node.online.{path.stem}" for path in (PACKAGE / "online").glob("*.py") if path.stem != "__init__"]
+    program = (
+        "import importlib, json, sys\n"
+        "before = set(sys.modules)\n"
+        f"for name in {names!r}: importlib.import_module(name)\n"
+        "print(json.dumps(sorted({name.partition('.')[0] for name in set(sys.modules) - before})))"
+    )
+    loaded = json.loads(
+        subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=PACKAGE.parent
+        ).stdout
+    )
+    foreign = {name for name in loaded if name not in sys.stdlib_module_names and not name.startswith("_")}
+    assert foreign <= {"sysid_node", *ONLINE_PACKAGES}
