@@ -90,6 +90,7 @@ class RunResult:
     flight: FlightRecord | None = None  # the aligned samples, for the drawn time histories
     spectra: Spectra | None = None
     responses: Mapping[str, Response] = field(default_factory=dict)  # by output or coefficient
+    response_note: str = ""  # a sentence: how the responses were made, e.g. averaged
     rejected: Mapping[str, int] = field(default_factory=dict)  # "<topic>: <reason>" -> messages left out
     holdout: Holdout = field(default_factory=dict)
     remarks: Sequence[str] = ()  # sentences: convergence, parameters that cannot be told apart, warnings
@@ -115,4 +116,11 @@ def prior_of(aircraft: Aircraft) -> dict[str, Prior]:
     return {
         name: Prior(derivative.value, np.nan if derivative.tolerance is None else derivative.tolerance)
         for name, derivative in aircraft.derivatives.items()
+    }
+
+
+def rejections(by_topic: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+    """Counts by topic and reason as ``RunResult`` and ``summary.json`` hold them: ``"<topic>: <reason>"``."""
+    return {
+        f"{topic}: {reason}": count for topic, reasons in by_topic.items() for reason, count in reasons.items() if count
     }

@@ -113,7 +113,7 @@ _AXIS: dict[str, Any] = {
     "tickcolor": "#b8c0ca",
     "nticks": 6,
     "automargin": True,
-    "exponentformat": "power",
+    "exponentformat": "none",
 }
 
 _LAYOUT: dict[str, Any] = {

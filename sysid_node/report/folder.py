@@ -64,6 +64,7 @@ def read_run(folder: Path) -> RunResult:
         rejected=found.get("rejected", {}),
         holdout=_from_json(found.get("holdout", {})),
         remarks=found.get("remarks", []),
+        response_note=found.get("response_note", ""),
     )
 
 
@@ -82,6 +83,7 @@ def summary(run: RunResult) -> dict[str, Any]:
         "fits": {name: _without(asdict(f), "coefficient") for name, f in final.fits.items()},
         "holdout": run.holdout,
         "remarks": list(run.remarks),
+        "response_note": run.response_note,
     }
     plain: dict[str, Any] = _to_json(content)
     return plain

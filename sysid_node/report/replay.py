@@ -22,6 +22,7 @@ from sysid_node.report.spectrum import amplitude_spectrum
 
 THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
 POINTS_A_PERIOD = 8  # of the highest frequency in use, in drawn responses
+RESPONSE_NOTE = "Both are averaged over half the shortest period in use; measured moments hold differentiated rates."
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ def replay_result(
         flight=_flight(aircraft, time, samples),
         spectra=_spectra(aircraft, settings, motion, modelled) if motion else None,
         responses=_responses(settings, motion, modelled) if motion else {},
+        response_note=RESPONSE_NOTE,
         rejected=rejected,
         remarks=remarks,
     )

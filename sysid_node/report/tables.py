@@ -18,6 +18,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
@@ -158,7 +159,7 @@ def read_responses(path: Path) -> dict[str, Response]:
 
 
 def _estimate_cells(d: DerivativeEstimate) -> Row:
-    return (d.name, d.value, d.standard_error, d.lower, d.upper, d.valid, d.status)
+    return (d.name, d.value, d.standard_error, d.lower, d.upper, "true" if d.valid else "false", d.status)
 
 
 def _estimate(row: list[str]) -> tuple[float, DerivativeEstimate]:
@@ -179,17 +180,11 @@ def _number(cell: str) -> float:
     return float(cell) if cell else math.nan
 
 
-def _cell(value: object) -> object:
-    """A cell that reads back as it was: floats by their shortest exact decimal, NaN empty."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return "" if math.isnan(value) else repr(float(value))
-    return value
-
-
 def _write(path: Path, header: Sequence[str], rows: Iterable[Row]) -> None:
-    """A header and the rows; without rows, no file, nor one left from before."""
+    """A header and the rows, NaN as an empty cell; without rows, no file, nor one left from before.
+
+    The csv module writes a float by its shortest decimal that reads back as the same bits.
+    """
     iterator = iter(rows)
     first = next(iterator, None)
     if first is None:
@@ -198,8 +193,8 @@ def _write(path: Path, header: Sequence[str], rows: Iterable[Row]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
-        writer.writerow([_cell(value) for value in first])
-        writer.writerows([_cell(value) for value in row] for row in iterator)
+        # only NaN differs from itself
+        writer.writerows(["" if cell != cell else cell for cell in row] for row in chain([first], iterator))  # noqa: PLR0124
 
 
 def _read(path: Path, header: Sequence[str], parse: Callable[[list[str]], T]) -> Iterator[T]:

@@ -167,16 +167,18 @@ def with_interval(value: float, half_width: float) -> str:
     largest = math.floor(math.log10(max(abs(value), half_width)))
     if exponent >= -5 and largest < 6:
         decimals = max(1 - exponent, 0)
-        return f"{value:.{decimals}f} \u00b1 {half_width:.{decimals}f}".replace("-", MINUS)
+        return f"{value:z.{decimals}f} \u00b1 {half_width:.{decimals}f}".replace("-", MINUS)
     scale, decimals = 10.0**largest, max(largest - exponent + 1, 0)
-    pair = f"({value / scale:.{decimals}f} \u00b1 {half_width / scale:.{decimals}f})".replace("-", MINUS)
+    pair = f"({value / scale:z.{decimals}f} \u00b1 {half_width / scale:.{decimals}f})".replace("-", MINUS)
     return f"{pair}\u202f\u00d7\u202f10{str(largest).translate(_SUPERSCRIPTS)}"
 
 
 def seconds(value: float) -> str:
     """``"60 s"``, ``"12 min 30 s"``."""
-    if not math.isfinite(value) or value < 300:
-        return f"{number(value) if value < 10 or not math.isfinite(value) else format(value, '.4g')}\u202fs"
+    if not math.isfinite(value):
+        return NONE
+    if value < 300:
+        return f"{value:.4g}\u202fs"
     minutes, rest = divmod(round(value), 60)
     return f"{minutes}\u202fmin {rest}\u202fs"
 

@@ -119,7 +119,7 @@ def test_the_opening_counts_what_is_known(full):
     [
         ((-0.6, -0.4), "tends back to trim", "further away"),
         ((0.4, 0.6), "tends further away from trim", "back to trim"),
-        ((-0.1, 0.1), "1 derivatives", "trim ("),
+        ((-0.1, 0.1), "all 1 derivatives", "trim ("),
     ],
 )
 def test_handling_is_only_claimed_where_the_interval_has_one_sign(interval, said, not_said):
@@ -134,7 +134,7 @@ def test_invalid_estimates_make_no_claims():
     d = DerivativeEstimate("Cm_alpha", -0.5, 0.01, -0.52, -0.48, False, "outside model")
     words = outline(single(d)).words
     assert "tends back" not in words
-    assert "0 of 1 derivatives are known" in words
+    assert "none of the 1 derivative is known" in words
     assert "flown where the model does not hold" in words
 
 

@@ -23,7 +23,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
                 "name": fit.coefficient,
                 "symbol": symbol(fit.coefficient),
                 "words": COEFFICIENT_WORDS.get(fit.coefficient, ""),
-                "explained": number(100 * fit.r_squared, 3) + ("\u202f%" if math.isfinite(fit.r_squared) else ""),
+                "explained": _percent(fit.r_squared),
                 "bar": min(max(100 * fit.r_squared, 0.0), 100.0) if math.isfinite(fit.r_squared) else 0.0,
                 "residual": number(fit.residual_std, 2),
                 "freedom": number(fit.degrees_of_freedom, 3),
@@ -31,9 +31,17 @@ def context(run: RunResult) -> Mapping[str, Any]:
             }
             for fit in fits
         ],
+        "response_note": run.response_note,
         "responses": [(name, symbol(name), r.unit, _figure(name, r)) for name, r in run.responses.items()],
         "holdout": [_flight(name, outputs) for name, outputs in run.holdout.items()],
     }
+
+
+def _percent(share: float) -> str:
+    """A share in percent; what is not quite all is not rounded up to it."""
+    if not math.isfinite(share):
+        return number(share)
+    return ">\u202f99.9\u202f%" if 0.9995 <= share < 1 else f"{number(100 * share, 3)}\u202f%"
 
 
 def _figure(name: str, response: Response) -> Figure:

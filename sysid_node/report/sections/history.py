@@ -105,10 +105,10 @@ def _references(run: RunResult, name: str) -> list[dict[str, Any]]:
 
 def _limits(run: RunResult, name: str, c: _Curves) -> list[float]:
     """Axis limits for where the estimate ends up; the wide intervals of the first seconds run off the panel."""
-    settled = c.time >= c.time[0] + 0.25 * (c.time[-1] - c.time[0])
-    shown = settled & (c.valid > 0.5)
+    progress = (c.time - c.time[0]) / max(c.time[-1] - c.time[0], 1e-9)
+    shown = (progress >= 0.25) & (c.valid > 0.5)
     if not shown.any():
-        shown = settled
+        shown = progress >= 0.6
     wanted = [*_percentiles(c.value[shown], 1, 99), *_percentiles(c.lower[shown], 15, 85)]
     wanted += [*_percentiles(c.upper[shown], 15, 85), c.lower[-1], c.upper[-1], c.value[-1]]
     wanted += [run.truth[name]] if name in run.truth else []

@@ -50,6 +50,10 @@ def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
             "what was rejected."
         ).format(length, run.aircraft)
     valid = sum(d.valid for d in derivatives)
+    if not valid:
+        return Markup("From {} of {}, <strong>none of the {} is known well enough to use</strong>.").format(
+            length, run.aircraft, plural(len(derivatives), "derivative")
+        )
     share = f"all {len(derivatives)}" if valid == len(derivatives) else f"{valid} of {len(derivatives)}"
     return Markup(
         "From {} of {}, <strong>{} derivatives are known well enough to use</strong>, each with an interval "
