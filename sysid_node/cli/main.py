@@ -26,6 +26,7 @@ COMMANDS = {
     "convert": "turn a flight log into a bag",
     "export": "write an estimate as another simulator's model",
     "report": "write report.html again from the files of a run",
+    "demo": "identify a recorded flight live, over DDS",
 }
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130

@@ -1,0 +1,192 @@
+"""``sysid demo``: a recorded flight on real topics, identified live in another process, watched in the terminal."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console, RenderableType
+from rich.live import Live
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.cli.live_table import Moment, Reference, live_table
+from sysid_node.errors import InputError
+from sysid_node.flight.bag import read_streams
+from sysid_node.flight.topics import INPUT_TOPICS
+from sysid_node.online.alignment import Aligned, align_streams
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
+from sysid_node.report.folder import write_run
+from sysid_node.report.replay import replay_result
+
+if TYPE_CHECKING:
+    from sysid_node.ros.follower import Follower
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+PUBLISH_RATE = 10.0  # Hz
+AFTERWARDS = 0.2  # s to listen after the flight's end, before its estimates are called stale
+DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics says how it went in all
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What is played, and what is believed and true of the aircraft."""
+
+    bag: Path
+    aircraft: Aircraft
+    aligned: Aligned
+    truth: dict[str, float]  # empty where it is not known
+
+    @property
+    def start_ns(self) -> int:
+        """The header stamp of time zero."""
+        return int(self.aligned.stamps[0]) - round(1e9 * float(self.aligned.time[0]))
+
+    @property
+    def reference(self) -> Reference:
+        """The truth where it is known, else the aircraft file."""
+        if self.truth:
+            return Reference("true", self.truth)
+        return Reference("file", {name: d.value for name, d in self.aircraft.derivatives.items()})
+
+
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser("demo", help="identify a recorded flight live, over DDS", description=__doc__)
+    parser.add_argument("bag", metavar="BAG", type=Path, help="a bag; BAG.truth.json beside it holds the true values")
+    parser.add_argument("--aircraft", default="cdrw", help="file or name (default: cdrw)")
+    parser.add_argument("--rate", type=float, default=1.0, help="how many times as fast as flown (default: 1)")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/demo"), help="default: out/demo")
+    return parser
+
+
+def run(args: argparse.Namespace) -> None:
+    """Plays, identifies, watches; then writes the report and says how it went."""
+    if not args.rate > 0.0:
+        raise InputError(f"--rate {args.rate:g}: expected a number over zero")
+    flight = _read(args.bag, load_aircraft(args.aircraft))
+    args.out.mkdir(parents=True, exist_ok=True)
+    # A domain of its own: neither hears nor disturbs other ROS programs, here or on the network.
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    history, rejected = _fly(flight, args.aircraft, args.rate, args.out)
+    result = replay_result(
+        flight.aircraft,
+        Settings(),
+        time=flight.aligned.time,
+        samples=flight.aligned.samples,
+        history=history,
+        rejected=rejected,
+        truth=flight.truth,
+        title=f"{flight.bag.name}, identified live",
+    )
+    write_run(args.out, result)
+    print(_summary(flight, history[-1], args.out))
+
+
+def _read(bag: Path, aircraft: Aircraft) -> Flight:
+    aligned = align_streams(aircraft, read_streams(bag), Settings().max_gap)
+    if not aligned.time.size:
+        raise InputError(f"bag {bag}: its topics have no time in common; give another")
+    truth = bag.with_name(f"{bag.name}.truth.json")
+    values = json.loads(truth.read_text(encoding="utf-8"))["derivatives"] if truth.is_file() else {}
+    return Flight(bag, aircraft, aligned, values)
+
+
+def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[list[Estimates], dict[str, int]]:
+    """Run player and identifier in processes of their own, and show what comes until the flight is over.
+
+    Returns the estimates over time, and the messages left out by reason.
+    """
+    import rclpy  # noqa: PLC0415  # reads its domain from the environment
+
+    from sysid_node.ros.follower import Follower  # noqa: PLC0415
+
+    rclpy.init()
+    follower = Follower(flight.start_ns)
+    try:
+        identifier = ["--ros-args", "-p", f"aircraft:={aircraft}", "-p", f"publish_rate:={PUBLISH_RATE}"]
+        player = [str(flight.bag), "--rate", str(rate), "--wait", "20"]
+        with _node("identifier", identifier, out) as identifying, _node("player", player, out) as playing:
+            _watch(flight, follower, identifying, playing)
+            history = list(follower.history)
+            follower.listen(DIAGNOSTICS_PERIOD)
+    finally:
+        follower.close()
+        rclpy.try_shutdown()
+    if not history:
+        raise RuntimeError(f"no estimate came; {out / 'identifier.log'} may say why")
+    return history, _rejected(follower)
+
+
+@contextlib.contextmanager
+def _node(name: str, arguments: list[str], out: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A node in a process of its own, its log in ``<out>/<name>.log``; interrupted at the end."""
+    with (out / f"{name}.log").open("wb") as log:
+        command = [sys.executable, "-m", f"sysid_node.ros.{name}", *arguments]
+        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+    if process.returncode:
+        lines = (out / f"{name}.log").read_text(encoding="utf-8").splitlines() or ["no word of why"]
+        raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
+
+
+def _watch(
+    flight: Flight, follower: Follower, identifying: subprocess.Popen[bytes], playing: subprocess.Popen[bytes]
+) -> None:
+    """Show the live table until the flight is over, or one of the nodes is."""
+    console = Console()
+    with Live(console=console, auto_refresh=False) as live:
+        while playing.poll() is None and identifying.poll() is None:
+            follower.listen(0.1)
+            live.update(_picture(flight, follower, console.width), refresh=True)
+        follower.listen(AFTERWARDS)
+        live.update(_picture(flight, follower, console.width), refresh=True)
+    console.print()
+
+
+def _picture(flight: Flight, follower: Follower, width: int) -> RenderableType:
+    rates = [(topic, follower.word("input", f"{topic}: rate (Hz)")) for topic in INPUT_TOPICS]
+    moment = Moment(
+        title=f"{flight.aircraft.name}, {flight.bag.name}",
+        seconds=follower.history[-1].time if follower.history else 0.0,
+        duration=float(flight.aligned.time[-1]),
+        remark=" · ".join(f"{topic} {float(rate):.0f} Hz" for topic, rate in rates if rate),
+        estimates=follower.history[-1] if follower.history else None,
+    )
+    return live_table(moment, tuple(flight.aircraft.derivatives), flight.reference, width)
+
+
+def _rejected(follower: Follower) -> dict[str, int]:
+    """Messages that the identifier left out, as it last said on /diagnostics."""
+    values = follower.words["input"].values if "input" in follower.words else ()
+    prefix = "rejected, "
+    return {pair.key.removeprefix(prefix): int(pair.value) for pair in values if pair.key.startswith(prefix)}
+
+
+def _summary(flight: Flight, final: Estimates, out: Path) -> str:
+    """How it went, in three lines."""
+    valid = [d for d in final.derivatives.values() if d.valid]
+    expected = flight.reference.values
+    inside = sum(d.lower <= expected[d.name] <= d.upper for d in valid)
+    what = "true value" if flight.truth else "aircraft file's value"
+    return (
+        f"{len(valid)} of {len(final.derivatives)} derivatives valid after {final.time:.0f} s of flight\n"
+        f"{inside} of these {len(valid)} intervals hold the {what}\n"
+        f"report: {out / 'report.html'}"
+    )
