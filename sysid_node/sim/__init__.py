@@ -1,0 +1,28 @@
+"""Layer ``sim``: a six-degree-of-freedom flight simulator, one JAX function from commands to messages.
+
+    simulator = Simulator(aircraft, rate=100.0)
+    theta = simulator.vector(["actuator_lag:time_constant=0.05"])     # (P,) all parameters of all effects
+    trim = trim_flight(simulator, airspeed=18.0)                     # .initial (13,), .command (controls + 1,)
+    inputs = simulator.inputs(commands)                              # (N, controls + 1): rad, and thrust in N
+    flight = simulator.rollout(theta, trim.initial, inputs)          # .outputs (N, 12), .states, .surfaces, ...
+    slopes = simulator.jacobian(theta, trim.initial, inputs)         # (N, 12, P)
+
+``simulator.neutral()`` is the aircraft as its file has it; ``simulator.names``, ``.parameters``, ``.scales`` describe
+the vector's entries (``derivative_error.Cm_alpha`` is added to the file's Cm_alpha, and so is every other derivative).
+``simulator.initial(V, alpha, beta, euler, rates)`` makes a state and can be differentiated through. ``rollout`` and
+``initial`` are pure: ``jax.vmap`` and ``jax.jacfwd`` them as you like. Surfaces, thrust and gusts are linear between
+samples.
+
+Everything is SI, radians, body axes forward-right-down, float64.
+"""
+
+from sysid_node.sim import xla
+
+xla.configure()
+
+from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter  # noqa: E402
+from sysid_node.sim.rollout import Flight, Inputs  # noqa: E402
+from sysid_node.sim.simulator import Simulator  # noqa: E402
+from sysid_node.sim.trim import Trim, trim_flight  # noqa: E402
+
+__all__ = ["EFFECTS", "STATIONS", "Effect", "Flight", "Inputs", "Parameter", "Simulator", "Trim", "trim_flight"]

@@ -1,0 +1,21 @@
+"""Free play between actuator and surface."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, per_control
+from sysid_node.sim.layout import Scalar, Values
+from sysid_node.sim.smooth import soft_dead_zone
+
+EFFECT = Effect(
+    name="actuator_backlash",
+    station="actuator",
+    summary="Surfaces stay where they are until the actuator has taken up the free play.",
+    equation="x' = x + D(u - x), D the dead zone of +-width/2 with rounded corners",
+    source="Nordin & Gutman (2002), Automatica 38(10), sec. 2 (friction-driven hysteresis model)",
+    parameters=per_control("rad", "width of the free play", 0.02, lower=0.0, upper=0.5),
+)
+
+
+def advance(values: Values, control: str, x: Scalar, u: Scalar) -> Scalar:
+    """The surface's position (rad), from x, as its actuator goes to u."""
+    return x + soft_dead_zone(u - x, 0.5 * values[control])

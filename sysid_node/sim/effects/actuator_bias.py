@@ -1,0 +1,20 @@
+"""A surface rigged off its zero."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, per_control
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="actuator_bias",
+    station="actuator",
+    summary="Surfaces stand off what was commanded by a constant.",
+    equation="x' = x + bias",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2",
+    parameters=per_control("rad", "offset", 0.01, lower=-0.5, upper=0.5),
+)
+
+
+def apply(values: Values, control: str, x: Scalar) -> Scalar:
+    """The surface's position, rad."""
+    return x + values[control]

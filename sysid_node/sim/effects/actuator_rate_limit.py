@@ -1,0 +1,23 @@
+"""Largest rate of every actuator."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+from sysid_node.sim.smooth import soft_clip
+
+EFFECT = Effect(
+    name="actuator_rate_limit",
+    station="actuator",
+    summary="Surfaces move no faster than a rate.",
+    equation="x' = x + clip(u - x, -+ rate step), the clip's corner rounded: d / (1 + (d / limit)^16)^(1/16)",
+    source="Klyde & Mitchell (1998), J. Guidance 21(6) (rate limiting elements)",
+    parameters=fixed(
+        Parameter("inverse_rate", "s/rad", "1 / largest rate", 0.5, lower=0.0, upper=50.0, reciprocal="rate")
+    ),
+)
+
+
+def advance(values: Values, x: Scalar, u: Scalar, step: Scalar) -> Scalar:
+    """The position (rad) one step (s) on, on its way from x towards u."""
+    return x + soft_clip(u - x, values["inverse_rate"] / step)

@@ -1,0 +1,21 @@
+"""Pneumatic and mechanical lag of the air data."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.actuator_lag import first_order
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="air_data_lag",
+    station="sensors",
+    summary="Airspeed and flow angles follow the truth with a first-order lag.",
+    equation="time_constant dy/dt + y = truth, solved exactly for a truth linear between samples",
+    source="Haering (1995), NASA TM-104316 (pneumatic lag)",
+    parameters=fixed(Parameter("time_constant", "s", "time constant", 0.05, lower=0.0, upper=2.0)),
+)
+
+
+def advance(values: Values, y: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:
+    """The reading one step (s) on."""
+    return first_order(values["time_constant"], y, truth0, truth1, step)

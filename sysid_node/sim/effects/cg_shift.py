@@ -1,0 +1,25 @@
+"""A centre of gravity that is not where the file has it."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="cg_shift",
+    station="mass",
+    summary="Aerodynamic and thrust forces act about another point; sensors sit elsewhere from it.",
+    equation="moment' = moment - shift x force; arm' = arm - shift of every sensor",
+    source="Klein & Morelli (2006), Aircraft System Identification, eq. 3.73 (transfer of moments)",
+    parameters=fixed(
+        Parameter("x", "m", "CG forward of the file's", 0.02, lower=-2.0, upper=2.0),
+        Parameter("y", "m", "CG to the right of the file's", 0.005, lower=-2.0, upper=2.0),
+        Parameter("z", "m", "CG below the file's", 0.01, lower=-2.0, upper=2.0),
+    ),
+)
+
+
+def shift(values: Values) -> Vector:
+    """The CG from the file's, m."""
+    return Vector(values["x"], values["y"], values["z"])

@@ -1,0 +1,14 @@
+"""Transport delay between a command and the actuator that obeys it."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+
+EFFECT = Effect(
+    name="command_delay",
+    station="command",
+    summary="Commands reach the actuators late.",
+    equation="u'(t) = u(t - delay); commands are linear between samples",
+    source="Hodgkinson (1999), Aircraft Handling Qualities, ch. 2 (equivalent time delay)",
+    parameters=fixed(Parameter("delay", "s", "transport delay", 0.05, lower=0.0, upper=0.5)),
+)

@@ -1,0 +1,29 @@
+"""Offsets of accelerometers and gyroscopes."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="imu_bias",
+    station="sensors",
+    summary="Accelerometers and gyroscopes read off by a constant.",
+    equation="a' = a + (ax, ay, az), w' = w + (p, q, r)",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (instrument errors)",
+    parameters=fixed(
+        *(Parameter(n, "m/s^2", f"offset of {n}", 0.1, lower=-20.0, upper=20.0) for n in ("ax", "ay", "az")),
+        *(Parameter(n, "rad/s", f"offset of {n}", 0.01, lower=-2.0, upper=2.0) for n in ("p", "q", "r")),
+    ),
+)
+
+
+def accelerometers(values: Values, reading: Vector) -> Vector:
+    """Specific force, m/s^2."""
+    return reading.plus(Vector(values["ax"], values["ay"], values["az"]))
+
+
+def gyroscopes(values: Values, reading: Vector) -> Vector:
+    """Angular rates, rad/s."""
+    return reading.plus(Vector(values["p"], values["q"], values["r"]))

@@ -1,0 +1,28 @@
+"""An IMU that sits elsewhere than the file says."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="imu_lever_arm",
+    station="sensors",
+    summary="Accelerometers off their stated place feel rotation otherwise.",
+    equation="a' = a + dw/dt x arm + w x (w x arm), arm' = arm + (x, y, z)",
+    source="Klein & Morelli (2006), Aircraft System Identification, eq. 3.80 ff. (accelerometer position)",
+    parameters=fixed(
+        *(Parameter(n, "m", f"IMU off its stated place along body {n}", 0.1, lower=-5.0, upper=5.0) for n in "xyz")
+    ),
+)
+
+
+def arm(values: Values) -> Vector:
+    """The error of the arm, m."""
+    return Vector(values["x"], values["y"], values["z"])
+
+
+def transfer(specific_force: Vector, rates: Vector, acceleration: Vector, arm: Vector) -> Vector:
+    """Specific force (m/s^2) at an arm (m) from the CG; angular acceleration in rad/s^2."""
+    return specific_force.plus(acceleration.cross(arm)).plus(rates.cross(rates.cross(arm)))

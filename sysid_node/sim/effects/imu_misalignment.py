@@ -1,0 +1,27 @@
+"""An IMU not mounted along the body axes."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="imu_misalignment",
+    station="sensors",
+    summary="The IMU is turned against the body by small angles.",
+    equation="a' = a - e x a, w' = w - e x w, e the small rotation (roll, pitch, yaw)",
+    source="Titterton & Weston (2004), Strapdown Inertial Navigation Technology, sec. 12.3 (small misalignments)",
+    parameters=fixed(
+        *(
+            Parameter(n, "rad", f"rotation about body {axis}", 0.02, lower=-0.5, upper=0.5)
+            for n, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
+        ),
+    ),
+)
+
+
+def apply(values: Values, reading: Vector) -> Vector:
+    """What the turned instrument reads of a body-axes vector."""
+    rotation = Vector(values["roll"], values["pitch"], values["yaw"])
+    return reading.minus(rotation.cross(reading))

@@ -1,0 +1,29 @@
+"""Scale errors of accelerometers and gyroscopes."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="imu_scale",
+    station="sensors",
+    summary="Accelerometers and gyroscopes read too much or too little by a factor.",
+    equation="a' = a (1 + error), w' = w (1 + error), each axis its own",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (instrument errors)",
+    parameters=fixed(
+        *(Parameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("ax", "ay", "az")),
+        *(Parameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("p", "q", "r")),
+    ),
+)
+
+
+def accelerometers(values: Values, reading: Vector) -> Vector:
+    """Specific force, m/s^2."""
+    return Vector(*(reading[i] * (1.0 + values[n]) for i, n in enumerate(("ax", "ay", "az"))))
+
+
+def gyroscopes(values: Values, reading: Vector) -> Vector:
+    """Angular rates, rad/s."""
+    return Vector(*(reading[i] * (1.0 + values[n]) for i, n in enumerate(("p", "q", "r"))))

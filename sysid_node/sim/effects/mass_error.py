@@ -1,0 +1,20 @@
+"""An aircraft heavier or lighter than its file."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="mass_error",
+    station="mass",
+    summary="The mass differs from the file's; the inertia does not.",
+    equation="m' = m (1 + error)",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 9.4 (mass properties)",
+    parameters=fixed(Parameter("error", "1", "share of the mass", 0.05, lower=-0.8, upper=3.0)),
+)
+
+
+def apply(values: Values, mass: Scalar) -> Scalar:
+    """Mass, kg."""
+    return mass * (1.0 + values["error"])

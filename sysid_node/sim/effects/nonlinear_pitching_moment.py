@@ -1,0 +1,23 @@
+"""Pitching moment that is not linear in the angle of attack."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="nonlinear_pitching_moment",
+    station="aerodynamics",
+    summary="Static stability changes with the angle of attack.",
+    equation="Cm' = Cm + quadratic (alpha - alpha0)^2 + cubic (alpha - alpha0)^3, alpha0 at the reference condition",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 3.4.2 (polynomial models)",
+    parameters=fixed(
+        Parameter("quadratic", "1/rad^2", "quadratic term", 1.0),
+        Parameter("cubic", "1/rad^3", "cubic term", 10.0),
+    ),
+)
+
+
+def pitching_moment(values: Values, alpha: Scalar) -> Scalar:
+    """Added Cm; alpha (rad) from that of the reference condition."""
+    return alpha * alpha * (values["quadratic"] + values["cubic"] * alpha)

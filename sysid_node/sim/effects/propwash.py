@@ -1,0 +1,27 @@
+"""Tail surfaces in the propeller's slipstream."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+#: Controls that sit behind the propeller.
+IN_SLIPSTREAM = ("elevator", "rudder")
+
+EFFECT = Effect(
+    name="propwash",
+    station="propulsion",
+    summary="Elevator and rudder do more the more the propeller pulls.",
+    equation="delta' = delta (1 + gain T / (qbar S)), of elevator and rudder",
+    source="Stinton (2001), The Design of the Airplane, ch. 8; actuator disc: q_slip = q (1 + T / (q A))",
+    parameters=fixed(
+        Parameter("gain", "1", "S over disc area, times the share of the tail in the slipstream", 1.0, 0.0, -5.0, 50.0)
+    ),
+)
+
+
+def factor(values: Values, control: str, thrust: Scalar, pressure_area: Scalar) -> Scalar | float:
+    """What the control's effect is multiplied by; pressure_area is qbar S, N."""
+    if control not in IN_SLIPSTREAM:
+        return 1.0
+    return 1.0 + values["gain"] * thrust / pressure_area

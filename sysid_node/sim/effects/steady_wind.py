@@ -1,0 +1,25 @@
+"""Wind, the same everywhere and always."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="steady_wind",
+    station="airflow",
+    summary="The air moves over the ground. Nothing on board feels it; the path over the ground does.",
+    equation="d(position)/dt = R (u, v, w) + wind; the state's velocity is relative to the steadily moving air",
+    source="Etkin (1972), Dynamics of Atmospheric Flight, sec. 5.3 (Galilean change of frame)",
+    parameters=fixed(
+        Parameter("north", "m/s", "air's velocity to the north", 3.0, lower=-60.0, upper=60.0),
+        Parameter("east", "m/s", "air's velocity to the east", 3.0, lower=-60.0, upper=60.0),
+        Parameter("down", "m/s", "air's velocity downwards", 0.5, lower=-30.0, upper=30.0),
+    ),
+)
+
+
+def apply(values: Values, velocity: Vector) -> Vector:
+    """Velocity over the ground (m/s, north-east-down) from that through the air."""
+    return velocity.plus(Vector(values["north"], values["east"], values["down"]))

@@ -1,0 +1,41 @@
+"""One elastic mode of the airframe, felt by the inertial sensors."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="structural_mode",
+    station="structure",
+    summary="The fuselage or wing rings after manoeuvres: the IMU feels it, the flight path does not.",
+    equation=(
+        "d2x/dt2 + 2 damping w dx/dt + w^2 x = az, w = 2 pi frequency; az' = az + gain d2x/dt2, q' = q + slope dx/dt"
+    ),
+    source="Waszak & Schmidt (1988), J. Aircraft 25(6) (mean axes, one in-vacuo mode)",
+    parameters=fixed(
+        Parameter("gain", "1", "modal acceleration felt along body z", 0.3, lower=-5.0, upper=5.0),
+        Parameter("slope", "rad/m", "modal slope felt as pitch rate", 1.0, lower=-20.0, upper=20.0),
+        Parameter("frequency", "Hz", "natural frequency", 2.0, 8.0, 0.5, 40.0, False),
+        Parameter("damping", "1", "damping ratio", 0.02, 0.05, 0.001, 1.0, False),
+    ),
+)
+
+
+def acceleration(values: Values, x: Scalar, v: Scalar, load: Scalar) -> Scalar:
+    """The modal acceleration (m/s^2) of its displacement (m), speed (m/s), and the specific force along z."""
+    w = 2.0 * jnp.pi * values["frequency"]
+    return load - 2.0 * values["damping"] * w * v - w * w * x
+
+
+def steady(values: Values, load: Scalar) -> Scalar:
+    """The modal displacement (m) at rest."""
+    w = 2.0 * jnp.pi * values["frequency"]
+    return load / (w * w)
+
+
+def felt(values: Values, acceleration: Scalar, speed: Scalar) -> tuple[Scalar, Scalar]:
+    """Added specific force along z (m/s^2) and pitch rate (rad/s)."""
+    return values["gain"] * acceleration, values["slope"] * speed

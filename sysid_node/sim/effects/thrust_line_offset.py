@@ -1,0 +1,20 @@
+"""A thrust line that misses the centre of gravity."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="thrust_line_offset",
+    station="propulsion",
+    summary="The thrust line passes below (nose up) or above (nose down) where the file has it.",
+    equation="M' = M + T arm",
+    source="Etkin & Reid (1996), Dynamics of Flight, sec. 2.5 (influence of the propulsive system)",
+    parameters=fixed(Parameter("arm", "m", "thrust line below the nominal", 0.02, lower=-2.0, upper=2.0)),
+)
+
+
+def pitching_moment(values: Values, thrust: Scalar) -> Scalar:
+    """Added pitching moment, N m."""
+    return values["arm"] * thrust

@@ -1,0 +1,37 @@
+"""Lift and pitching moment that come with the rate of the angle of attack."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="unsteady_aerodynamics",
+    station="aerodynamics",
+    summary="The wing's downwash reaches the tail late: forces depend on dalpha/dt.",
+    equation="CL' = CL + CL_alphadot a, Cm' = Cm + Cm_alphadot a, a = dalpha/dt cbar / 2V",
+    source="Etkin & Reid (1996), Dynamics of Flight, sec. 5.5 (the alpha-dot derivatives)",
+    parameters=fixed(
+        Parameter("CL_alphadot", "1/rad", "lift with the rate of alpha", 1.5, lower=-20.0, upper=20.0),
+        Parameter("Cm_alphadot", "1/rad", "pitching moment with the rate of alpha", 3.0, lower=-60.0, upper=60.0),
+    ),
+)
+
+
+def lift(values: Values, rate: Scalar) -> Scalar:
+    """Added CL; rate is dalpha/dt cbar / 2V."""
+    return values["CL_alphadot"] * rate
+
+
+def pitching_moment(values: Values, rate: Scalar) -> Scalar:
+    """Added Cm; rate is dalpha/dt cbar / 2V."""
+    return values["Cm_alphadot"] * rate
+
+
+def solve_rate(values: Values, rate: Scalar, relief: Scalar) -> Scalar:
+    """dalpha/dt (rad/s) from what it would be without this lift.
+
+    The lift is normal to the flow, so it takes relief * CL_alphadot * dalpha/dt off the rate:
+    relief = qbar S cbar / (2 V m) / (speed in the x-z plane). Linear, hence solved here and not iterated.
+    """
+    return rate / (1.0 + relief * values["CL_alphadot"])

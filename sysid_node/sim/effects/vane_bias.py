@@ -1,0 +1,23 @@
+"""Offsets of the flow angles."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="vane_bias",
+    station="sensors",
+    summary="The vanes read off by a constant.",
+    equation="alpha' = alpha + bias, beta' = beta + bias",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (instrument errors)",
+    parameters=fixed(
+        Parameter("alpha", "rad", "offset of alpha", 0.01, lower=-0.5, upper=0.5),
+        Parameter("beta", "rad", "offset of beta", 0.01, lower=-0.5, upper=0.5),
+    ),
+)
+
+
+def apply(values: Values, alpha: Scalar, beta: Scalar) -> tuple[Scalar, Scalar]:
+    """Flow angles, rad."""
+    return alpha + values["alpha"], beta + values["beta"]

@@ -1,0 +1,23 @@
+"""Air-data probe elsewhere than the file says."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Values
+
+EFFECT = Effect(
+    name="vane_lever_arm",
+    station="sensors",
+    summary="Vanes off their stated place see the rotation otherwise.",
+    equation="(u, v, w)' = (u, v, w) + w x arm, arm' = arm + (x, y, z)",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (vane position)",
+    parameters=fixed(
+        *(Parameter(n, "m", f"probe off its stated place along body {n}", 0.1, lower=-10.0, upper=10.0) for n in "xyz")
+    ),
+)
+
+
+def arm(values: Values) -> Vector:
+    """The error of the arm, m."""
+    return Vector(values["x"], values["y"], values["z"])

@@ -1,0 +1,23 @@
+"""Scale errors of the flow angles."""
+
+from __future__ import annotations
+
+from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.layout import Scalar, Values
+
+EFFECT = Effect(
+    name="vane_scale",
+    station="sensors",
+    summary="The vanes read too much or too little (upwash ahead of wing and fuselage).",
+    equation="alpha' = alpha (1 + error), beta' = beta (1 + error)",
+    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (upwash at the vanes)",
+    parameters=fixed(
+        Parameter("alpha", "1", "scale error of alpha", 0.1, lower=-0.9, upper=2.0),
+        Parameter("beta", "1", "scale error of beta", 0.1, lower=-0.9, upper=2.0),
+    ),
+)
+
+
+def apply(values: Values, alpha: Scalar, beta: Scalar) -> tuple[Scalar, Scalar]:
+    """Flow angles, rad."""
+    return alpha * (1.0 + values["alpha"]), beta * (1.0 + values["beta"])

@@ -1,0 +1,30 @@
+"""Smooth stand-ins for corners and jumps, so that an optimiser can use their derivatives.
+
+Each tends to the exact function away from its corner and has finite derivatives everywhere, zero width included.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+
+def soft_clip(x: jax.Array, inverse_limit: jax.Array | float = 1.0) -> jax.Array:
+    """``clip(x, -limit, limit)`` with a rounded corner; exactly ``x`` where the limit is infinite (its inverse 0).
+
+    ``x / (1 + |x / limit|^16)^(1/16)``: 4.3 % below the exact clip at its corner, 0.1 % at 1.3 times the limit.
+    """
+    return x / (1.0 + (x * inverse_limit) ** 16) ** (1.0 / 16.0)
+
+
+def soft_dead_zone(x: jax.Array, half_width: jax.Array) -> jax.Array:
+    """``x - clip(x, -half_width, half_width)`` with rounded corners; exactly ``x`` where half_width is 0.
+
+    Its derivative to ``half_width`` at 0 is -sign(x), rounded over 1e-5 of x's unit.
+    """
+    return x - half_width * soft_clip(x / jnp.maximum(half_width, 1e-5))
+
+
+def soft_onset(time: jax.Array, onset: jax.Array, width: float = 0.05) -> jax.Array:
+    """From 0 before ``onset`` to 1 after it (s), logistic: 10 to 90 % in 4.4 ``width``."""
+    return 0.5 * (1.0 + jnp.tanh((time - onset) / (2.0 * width)))

@@ -1,0 +1,36 @@
+"""Station ``propulsion``: thrust and its moments."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from sysid_node.sim.body import Vector
+from sysid_node.sim.effects import motor_lag, thrust_line_offset, thrust_scale, thrust_yaw
+from sysid_node.sim.layout import Model, Scalar, Values
+
+
+def commanded(model: Model, thrust: Scalar) -> Scalar:
+    """The thrust (N) that the motor can give of that commanded."""
+    return jnp.clip(thrust, 0.0, model.max_thrust)
+
+
+def advance(effects: dict[str, Values], state: Scalar, command0: Scalar, command1: Scalar, step: Scalar) -> Scalar:
+    """The motor's thrust (N) one sample on."""
+    return motor_lag.advance(effects["motor_lag"], state, command0, command1, step)
+
+
+def thrust(effects: dict[str, Values], state: Scalar) -> Scalar:
+    """Thrust, N."""
+    return thrust_scale.apply(effects["thrust_scale"], state)
+
+
+def load(model: Model, effects: dict[str, Values], thrust: Scalar, alpha: Scalar) -> tuple[Vector, Vector]:
+    """Force (N) and moment about the file's CG (N m), body axes."""
+    along, up = jnp.cos(model.thrust_inclination), jnp.sin(model.thrust_inclination)
+    force = Vector(thrust * along, jnp.zeros_like(thrust), -thrust * up)
+    moment = Vector(
+        thrust_yaw.rolling_moment(effects["thrust_yaw"], thrust),
+        model.thrust_arm * thrust + thrust_line_offset.pitching_moment(effects["thrust_line_offset"], thrust),
+        thrust_yaw.yawing_moment(effects["thrust_yaw"], thrust, alpha),
+    )
+    return force, moment

@@ -1,0 +1,69 @@
+"""Station ``sensors``: what the instruments read of the motion."""
+
+from __future__ import annotations
+
+from sysid_node.sim.body import MassProperties, Vector
+from sysid_node.sim.effects import (
+    air_data_lag,
+    airspeed_scale,
+    imu_bias,
+    imu_lever_arm,
+    imu_misalignment,
+    imu_scale,
+    sensor_noise,
+    vane_bias,
+    vane_lever_arm,
+    vane_scale,
+)
+from sysid_node.sim.layout import Model, Scalar, Values
+from sysid_node.sim.stations.airflow import flow_angles
+
+
+def imu_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
+    """From the CG to the IMU, m."""
+    return Vector(*model.imu).plus(imu_lever_arm.arm(effects["imu_lever_arm"])).minus(body.cg)
+
+
+def air_data_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
+    """From the CG to the air-data probe, m."""
+    return Vector(*model.air_data).plus(vane_lever_arm.arm(effects["vane_lever_arm"])).minus(body.cg)
+
+
+def at_imu(specific_force: Vector, rates: Vector, acceleration: Vector, arm: Vector) -> Vector:
+    """Specific force (m/s^2) where the IMU sits, from that at the CG."""
+    return imu_lever_arm.transfer(specific_force, rates, acceleration, arm)
+
+
+def accelerometers(effects: dict[str, Values], specific_force: Vector) -> Vector:
+    """Readings (m/s^2) of a specific force at the IMU."""
+    turned = imu_misalignment.apply(effects["imu_misalignment"], specific_force)
+    return imu_bias.accelerometers(effects["imu_bias"], imu_scale.accelerometers(effects["imu_scale"], turned))
+
+
+def gyroscopes(effects: dict[str, Values], rates: Vector) -> Vector:
+    """Readings (rad/s) of angular rates."""
+    turned = imu_misalignment.apply(effects["imu_misalignment"], rates)
+    return imu_bias.gyroscopes(effects["imu_bias"], imu_scale.gyroscopes(effects["imu_scale"], turned))
+
+
+def at_probe(velocity: Vector, rates: Vector, arm: Vector) -> tuple[Scalar, Scalar, Scalar]:
+    """Airspeed (m/s), alpha, beta (rad) where the probe sits."""
+    return flow_angles(velocity.plus(rates.cross(arm)))
+
+
+def lagged(effects: dict[str, Values], state: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:
+    """The probe's reading one sample on, before its calibration errors."""
+    return air_data_lag.advance(effects["air_data_lag"], state, truth0, truth1, step)
+
+
+def air_data(
+    effects: dict[str, Values], airspeed: Scalar, alpha: Scalar, beta: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Readings of airspeed (m/s), alpha and beta (rad)."""
+    vanes = vane_bias.apply(effects["vane_bias"], *vane_scale.apply(effects["vane_scale"], alpha, beta))
+    return airspeed_scale.apply(effects["airspeed_scale"], airspeed), *vanes
+
+
+def noisy(model: Model, effects: dict[str, Values], reading: Scalar, realisation: Scalar) -> Scalar:
+    """Readings (12,) with noise."""
+    return sensor_noise.apply(effects["sensor_noise"], reading, model.noise, realisation)
