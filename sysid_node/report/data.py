@@ -117,10 +117,3 @@ def prior_of(aircraft: Aircraft) -> dict[str, Prior]:
         name: Prior(derivative.value, np.nan if derivative.tolerance is None else derivative.tolerance)
         for name, derivative in aircraft.derivatives.items()
     }
-
-
-def rejections(by_topic: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-    """Counts by topic and reason as ``RunResult`` and ``summary.json`` hold them: ``"<topic>: <reason>"``."""
-    return {
-        f"{topic}: {reason}": count for topic, reasons in by_topic.items() for reason, count in reasons.items() if count
-    }

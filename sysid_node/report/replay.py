@@ -118,15 +118,21 @@ def _spectra(aircraft: Aircraft, settings: Settings, motion: Motion, modelled: M
     measured = [motion.coefficients[c] for c in modelled]
     residuals = [motion.coefficients[c] - values for c, values in modelled.items()]
     columns = np.stack([*inputs, *measured, *residuals], axis=1)
-    first, *rest = np.split(
-        amplitude_spectrum(motion.time, columns, frequency).T, np.cumsum([len(inputs), len(measured)])
-    )
+    every = max(int(1.0 / (POINTS_A_PERIOD * 2 * stop * np.median(np.diff(motion.time)))), 1)
+    amplitude = amplitude_spectrum(_averaged(motion.time, every), _averaged(columns, every), frequency)
+    first, *rest = np.split(amplitude.T, np.cumsum([len(inputs), len(measured)]))
     return Spectra(
         frequency,
         dict(zip(symbols, first, strict=True)),
         dict(zip(modelled, rest[0], strict=True)),
         dict(zip(modelled, rest[1], strict=True)),
     )
+
+
+def _averaged(values: Array, every: int) -> Array:
+    """Means over so many samples (N, ...) each: at sixteen a period they take 0.6 % off an amplitude."""
+    whole = values[: values.shape[0] // every * every]
+    return np.asarray(whole.reshape(-1, every, *values.shape[1:]).mean(axis=1))
 
 
 def _responses(settings: Settings, motion: Motion, modelled: Mapping[str, Array]) -> dict[str, Response]:
