@@ -63,12 +63,13 @@ class Actuation:
         """``of_message`` of each row of (N, J): values (N, 1 + controls), faults (N,) (None = good)."""
         absent = np.full(len(positions), np.nan)
         *angles, throttle = [positions[:, i] if i >= 0 else absent for i in self.places(names)]
-        columns = [throttle if self.max_thrust is None else self.max_thrust * throttle]
-        for offset, terms in self.controls:
-            total = np.full(len(positions), offset)
-            for i, scale in terms:
-                total = total + scale * angles[i]
-            columns.append(total)
+        with np.errstate(over="ignore", invalid="ignore"):  # in rows that are at fault
+            columns = [throttle if self.max_thrust is None else self.max_thrust * throttle]
+            for offset, terms in self.controls:
+                total = np.full(len(positions), offset)
+                for i, scale in terms:
+                    total = total + scale * angles[i]
+                columns.append(total)
         return np.column_stack(columns), self._faults(angles, throttle)
 
     def _faults(self, angles: Sequence[Array], throttle: Array) -> NDArray[np.object_]:
@@ -83,11 +84,11 @@ class Actuation:
                 faults[bad] = [joint_fault(name, x) for x in angle[bad].tolist()]
         return faults
 
-    def require(self, names: Sequence[str]) -> None:
-        """Raises InputError where ``names`` lack a joint of the aircraft's controls; it names those present."""
+    def require(self, names: Sequence[str], said: str) -> None:
+        """Raises InputError where ``names`` lack a joint of the controls; ``said`` is what the error calls the flight."""
         missing = [joint for joint in self.joints if joint not in names]
         if missing:
             raise InputError(
-                f"no joint {', '.join(map(repr, missing))} among those present: {', '.join(names) or 'none'}; "
-                "name the joints as they are under controls in the aircraft file"
+                f"{said}: actuators have no joint {', '.join(map(repr, missing))}; they have "
+                f"{', '.join(map(repr, names)) or 'none'}; name the joints under controls in the aircraft file as they are"
             )

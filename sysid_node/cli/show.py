@@ -1,0 +1,36 @@
+"""What commands show in the terminal: progress on stderr, a table of estimates on stdout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from sysid_node.online.types import Estimates
+
+
+@contextmanager
+def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
+    """A bar on stderr that shows the share (0..1) it is told; nothing where ``quiet``, and no bar in a file."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as progress:
+        task = progress.add_task(title, total=1.0)
+        yield lambda share: progress.update(task, completed=share)
+
+
+def show_estimates(final: Estimates, truth: Mapping[str, float]) -> None:
+    """The final estimates as a table: value, 95 % interval, status, and the truth where it is known."""
+    table = Table(box=None, header_style="bold")
+    for heading, justify in (("derivative", "left"), ("estimate", "right"), ("95 % interval", "left")):
+        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
+    table.add_column("status")
+    if truth:
+        table.add_column("true", justify="right")
+    for d in final.derivatives.values():
+        cells = [d.name, f"{d.value:.4f}", f"{d.lower:.4f} to {d.upper:.4f}", d.status]
+        known = [f"{truth[d.name]:.4f}" if d.name in truth else ""] if truth else []
+        table.add_row(*cells, *known, style="" if d.valid else "dim")
+    Console().print(table)

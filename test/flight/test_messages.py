@@ -1,0 +1,39 @@
+"""The type store holds sysid_msgs as its .msg files define it, wherever they are."""
+
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from sysid_node.errors import InputError
+from sysid_node.flight import messages
+
+SOURCE = Path(__file__).resolve().parents[2] / "msg_defs" / "msg"
+
+
+def test_every_msg_file_is_a_type_with_its_fields():
+    store = messages.type_store()
+    files = sorted(SOURCE.glob("*.msg"))
+    assert len(files) >= 5
+    for path in files:
+        lines = (re.sub("#.*", "", line).split() for line in path.read_text().splitlines())
+        wanted = [words[1] for words in lines if len(words) == 2]
+        assert [name for name, _ in store.fielddefs[f"sysid_msgs/msg/{path.stem}"][1]] == wanted
+
+
+def test_found_where_the_package_is_installed(tmp_path, monkeypatch):
+    share = tmp_path / "share" / "sysid_msgs" / "msg"
+    shutil.copytree(SOURCE, share)
+    monkeypatch.setattr(messages, "__file__", str(tmp_path / "site-packages/sysid_node/flight/messages.py"))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
+    assert messages.message_folder() == share
+
+
+def test_not_found_says_what_to_build(tmp_path, monkeypatch):
+    monkeypatch.setattr(messages, "__file__", str(tmp_path / "a/b/c/messages.py"))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    with pytest.raises(InputError, match=r"sysid_msgs.*build"):
+        messages.message_folder()
