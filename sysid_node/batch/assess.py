@@ -2,40 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
 from sysid_node.batch.identifiability import inseparable_pairs, null_combination, sentences
-from sysid_node.batch.result import Answer, Estimate, Fit, interval
+from sysid_node.batch.likelihood import Problem
+from sysid_node.batch.result import Estimate, Fit, interval
 from sysid_node.batch.unknowns import Unknowns
 from sysid_node.flight.record import Array
 
 
 def assess(
-    method: str,
-    unknowns: Unknowns,
-    z: Array,
-    *,
-    sensitivities: Sequence[Array],
-    answers: Sequence[Answer],
-    noise: Array,
-    converged: bool,
-    iterations: int,
-    message: str,
+    method: str, problem: Problem, z: Array, iterations: int, complaint: str, extras: Mapping[str, float] | None = None
 ) -> Fit:
-    """The Fit at the unknowns ``z`` (n,).
+    """The Fit at the unknowns ``z`` (n,) that a search of ``iterations`` rounds ended with.
 
-    ``sensitivities`` (N, ny, n) and ``answers`` of each manoeuvre; ``noise`` (ny,) the residuals' standard deviation.
+    ``complaint`` says how it failed to converge, or is empty.
     """
-    weighted = [block / noise[None, :, None] for block in sensitivities]
-    residuals = [np.nan_to_num(answer.residuals / noise, nan=0.0) for answer in answers]
-    information = sum(np.einsum("nop,noq->pq", block, block) for block in weighted) + _prior_information(unknowns)
+    unknowns, factor, answers = problem.unknowns, problem.noise(z), problem.answers(z)
+    residuals, sensitivities = problem.whitened(z, factor)
+    information = _information(unknowns, sensitivities)
     count = len(unknowns.free)
     lost = null_combination(_condensed(information, count), unknowns.names)
-    inverse = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
-    covariance = coloured_covariance(inverse, weighted, residuals)[:count, :count]
+    inverse = np.asarray(np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=np.float64)
+    covariance = coloured_covariance(inverse, sensitivities, residuals)[:count, :count]
     white = np.sqrt(np.clip(np.diag(inverse)[:count], 0.0, None))
     freedom = degrees_of_freedom([len(answer.time) for answer in answers])
     status = _status(unknowns, z, lost)
@@ -43,25 +35,29 @@ def assess(
         name: _estimate(name, float(z[i]), float(np.sqrt(covariance[i, i])), freedom, status[name], float(white[i]))
         for i, name in enumerate(unknowns.names)
     }
+    noise = np.sqrt(np.diag(factor @ factor.T))
     return Fit(
         method=method,
         estimates=estimates,
         covariance=covariance,
         noise=dict(zip(unknowns.model.outputs, (float(s) for s in noise), strict=True)),
-        log_det=float(2.0 * np.sum(np.log(noise))),
+        log_det=float(2.0 * np.sum(np.log(np.diag(factor)))),
         answers=answers,
-        converged=converged,
+        converged=not complaint,
         iterations=iterations,
-        message=message,
+        message=complaint or f"converged after {iterations} rounds of noise relaxation",
         remarks=_remarks(status, covariance, unknowns.names, lost),
         nuisance=unknowns.nuisance(z),
+        extras=extras or {},
     )
 
 
-def _prior_information(unknowns: Unknowns) -> Array:
-    information = np.zeros((unknowns.size, unknowns.size))
+def _information(unknowns: Unknowns, sensitivities: Sequence[Array]) -> Array:
+    """Fisher information (n, n), the priors' included."""
+    parts = [np.tensordot(block, block, axes=([0, 1], [0, 1])) for block in sensitivities]
+    information: Array = np.sum(parts, axis=0)
     index, _, sigma = unknowns.priors()
-    information[index, index] = 1.0 / sigma**2
+    information[index, index] += 1.0 / sigma**2
     return information
 
 
@@ -76,7 +72,7 @@ def _condensed(information: Array, count: int) -> Array:
 
 
 def _status(unknowns: Unknowns, z: Array, lost: Sequence[str]) -> dict[str, str]:
-    """"ok", or why a parameter deserves no trust."""
+    """ "ok", or why a parameter deserves no trust."""
     lower, upper = unknowns.bounds()
     status = {}
     for i, name in enumerate(unknowns.names):

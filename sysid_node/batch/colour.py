@@ -40,7 +40,9 @@ def degrees_of_freedom(lengths: Sequence[int]) -> float:
     return _PARZEN_FREEDOM * sum(lengths) / _lag_width(max(lengths))
 
 
-def coloured_covariance(inverse_information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]) -> Array:
+def coloured_covariance(
+    inverse_information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
+) -> Array:
     """Covariance (P, P) of estimates with residuals of any colour.
 
     ``inverse_information`` (P, P) is the covariance that would hold for white residuals of unit variance;
@@ -51,14 +53,14 @@ def coloured_covariance(inverse_information: Array, sensitivities: Sequence[Arra
     width = _lag_width(max(len(r) for r in residuals))
     transforms = [rfft(s, size, axis=0) for s in sensitivities]
     pairs = _pair_counts(residuals)
-    periodogram = sum(_periodogram(r, size) for r in residuals) / pairs
+    periodogram = np.sum([_periodogram(r, size) for r in residuals], axis=0) / pairs
     spectrum = _smooth(periodogram, size, width)
-    leverage = sum(_projected(s, inverse_information) for s in transforms) / pairs
+    leverage = np.sum([_projected(s, inverse_information) for s in transforms], axis=0) / pairs
     for _ in range(_ROUNDS):
         covariance = inverse_information @ _inner(transforms, spectrum, size) @ inverse_information
         absorbed = leverage @ spectrum
         absorbed = absorbed + np.conj(np.swapaxes(absorbed, 1, 2))
-        fitted = sum(_projected(s, covariance) for s in transforms) / pairs
+        fitted = np.sum([_projected(s, covariance) for s in transforms], axis=0) / pairs
         spectrum = _smooth(periodogram + absorbed - fitted, size, width)
     covariance = inverse_information @ _inner(transforms, spectrum, size) @ inverse_information
     return 0.5 * (covariance + covariance.T)
@@ -70,11 +72,9 @@ def _lag_width(samples: int) -> int:
 
 def _pair_counts(residuals: Sequence[Array]) -> Array:
     """How often each pair of channels was measured together (ny, ny); at least 1."""
-    counts = 0.0
-    for residual in residuals:
-        measured = (residual != 0.0).astype(float)
-        counts = counts + measured.T @ measured
-    return np.maximum(counts, 1.0)
+    masks = [(residual != 0.0).astype(np.float64) for residual in residuals]
+    counts: Array = np.maximum(np.sum([mask.T @ mask for mask in masks], axis=0), 1.0)
+    return counts
 
 
 def _periodogram(residual: Array, size: int) -> Complex:
@@ -104,8 +104,8 @@ def _inner(transforms: Sequence[Complex], spectrum: Complex, size: int) -> Array
     weight[0] = 1.0
     if size % 2 == 0:
         weight[-1] = 1.0
-    total = 0.0
-    for transform in transforms:
-        filtered = (spectrum @ transform) * weight[:, None, None]
-        total = total + np.tensordot(transform.conj(), filtered, axes=([0, 1], [0, 1])).real / size
-    return np.asarray(total)
+    parts = [
+        np.tensordot(s.conj(), (spectrum @ s) * weight[:, None, None], axes=([0, 1], [0, 1])).real for s in transforms
+    ]
+    total: Array = np.sum(parts, axis=0) / size
+    return total

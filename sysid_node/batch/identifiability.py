@@ -1,7 +1,8 @@
 """Which parameters a flight cannot tell apart, and which it says nothing about, in words.
 
-Klein & Morelli (2006), sec. 5.3.4 and 6.1: pairwise correlations above 0.9 call for caution; the singular vectors of the
-scaled sensitivities (Belsley, Kuh & Welsch, "Regression Diagnostics", 1980, ch. 3) find combinations of three and more.
+Klein & Morelli (2006), sec. 5.3.4 and 6.1: pairwise correlations above 0.9 call for caution; the singular vectors of
+the scaled sensitivities (Belsley, Kuh & Welsch, "Regression Diagnostics", 1980, ch. 3) find combinations of three and
+more.
 """
 
 from __future__ import annotations

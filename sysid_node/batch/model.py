@@ -1,9 +1,9 @@
-"""A model that every estimator understands: states, inputs, outputs, parameters, x' = f(x, u, theta), y = g(x, u, theta)."""
+"""A model that every estimator understands: x' = f(x, u, theta), y = g(x, u, theta), all of it named."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import jax
@@ -84,7 +84,7 @@ class Model:
         """The same model with some fields replaced."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    def started_at(self, values: dict[str, float]) -> Model:
+    def started_at(self, values: Mapping[str, float]) -> Model:
         """The same model with other start values (clipped into the bounds) for some parameters."""
         unknown = sorted(set(values) - set(self.names))
         if unknown:
@@ -151,7 +151,7 @@ def check_manoeuvres(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
             row, column = np.argwhere(gaps)[0]
             raise InputError(
                 f"{manoeuvre.name}: input {model.inputs[column]} is missing at {manoeuvre.time[row]:.3f} s "
-                f"({int(gaps[:, column].sum())} samples in all); cut the flight there or leave that input out of the model"
+                f"({int(gaps[:, column].sum())} samples in all); cut the flight there or leave it out of the model"
             )
     for column, name in enumerate(model.outputs):
         if not any(np.isfinite(manoeuvre.outputs[:, column]).any() for manoeuvre in manoeuvres):

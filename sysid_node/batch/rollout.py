@@ -16,9 +16,7 @@ from sysid_node.batch.model import Manoeuvre, Model
 from sysid_node.flight.record import Array
 
 
-def rk4_step(
-    model: Model, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array
-) -> jax.Array:
+def rk4_step(model: Model, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array) -> jax.Array:
     """State (nx,) after ``dt`` s, the input going linearly from ``u0`` to ``u1``."""
     f = model.derivative
     middle = 0.5 * (u0 + u1)
@@ -66,7 +64,8 @@ def _sensitivities(
         moved_x0 = x0.at[jnp.array(free_states, dtype=int)].add(change[len(free) :])
         return _outputs(model, time, inputs, moved_x0, moved_theta)
 
-    return jax.jacfwd(of)(jnp.zeros(len(free) + len(free_states)))
+    jacobian: jax.Array = jax.jacfwd(of)(jnp.zeros(len(free) + len(free_states)))
+    return jacobian
 
 
 def outputs(model: Model, manoeuvre: Manoeuvre, theta: Array, x0: Array | None = None) -> Array:

@@ -98,9 +98,7 @@ class Unknowns:
         """Each manoeuvre's own unknowns by name: ``alpha(0)``, ``bias_az``."""
         names = [f"{self.model.states[i]}(0)" for i in self.states]
         names += [f"bias_{self.model.outputs[i]}" for i in self.biases]
-        return [
-            dict(zip(names, (float(v) for v in z[self.own(i)]), strict=True)) for i in range(len(self.manoeuvres))
-        ]
+        return [dict(zip(names, (float(v) for v in z[self.own(i)]), strict=True)) for i in range(len(self.manoeuvres))]
 
 
 def _indices(wanted: Sequence[str], known: Sequence[str], complaint: str) -> tuple[int, ...]:

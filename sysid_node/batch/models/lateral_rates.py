@@ -1,7 +1,8 @@
 """Roll and yaw rate of an aircraft whose sideslip is measured: dimensional derivatives, linear.
 
-Jategaonkar (2015), sec. 4.20.1, eqs. 4.90 and 4.91 (ATTAS). With beta an input the equations of p and r stand alone, and
-neither airspeed, mass nor inertia need be known. The offsets lump initial conditions and biases of the measured inputs.
+Jategaonkar (2015), sec. 4.20.1, eqs. 4.90 and 4.91 (ATTAS). With beta an input the equations of p and r stand alone,
+and neither airspeed, mass nor inertia need be known. The offsets lump initial conditions and biases of the measured
+inputs.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 """The rigid aircraft, as many of its states as are wanted; the others are taken from what was measured.
 
 Flat earth, still air, rigid body, body axes FRD: Klein & Morelli (2006), eqs. 3.33 to 3.37. A state that is not
-integrated enters as an input, and so does the specific force of a coefficient that is not modelled: then a longitudinal
-or lateral model needs nothing of the other axes, and a measured airspeed makes thrust unnecessary (Morelli, SIDPAC, does
-the same). All eight states make it the six-degree-of-freedom simulation of the nominal aircraft.
+integrated enters as an input, and so does the specific force of a coefficient that is not modelled: then a
+longitudinal or lateral model needs nothing of the other axes, and a measured airspeed makes thrust unnecessary
+(Morelli's SIDPAC does the same). All eight states make it the six-degree-of-freedom flight of the nominal aircraft.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import jax
@@ -35,7 +36,16 @@ STATES: dict[str, str | None] = {
 _TOGETHER = {"p": ("Cl", "Cn"), "r": ("Cl", "Cn")}
 #: Outputs, with their units.
 OUTPUTS = {
-    **{"V": "m/s", "alpha": "rad", "beta": "rad", "p": "rad/s", "q": "rad/s", "r": "rad/s", "phi": "rad", "theta": "rad"},
+    **{
+        "V": "m/s",
+        "alpha": "rad",
+        "beta": "rad",
+        "p": "rad/s",
+        "q": "rad/s",
+        "r": "rad/s",
+        "phi": "rad",
+        "theta": "rad",
+    },
     **{"ax": "m/s^2", "ay": "m/s^2", "az": "m/s^2", "pdot": "rad/s^2", "qdot": "rad/s^2", "rdot": "rad/s^2"},
 }
 _MODELLED_FORCE = {"CD": "ax", "CY": "ay", "CL": "az"}
@@ -93,8 +103,8 @@ def _coefficients_needed(aircraft: Aircraft, states: Sequence[str]) -> tuple[str
                 continue
             if coefficient not in aircraft.structure:
                 raise InputError(
-                    f"aircraft {aircraft.name}: state {state} needs derivatives of {coefficient}, and the file has none; "
-                    f"give some or leave {state} out of the states"
+                    f"aircraft {aircraft.name}: state {state} needs derivatives of {coefficient}, and the file has "
+                    f"none; give some or leave {state} out of the states"
                 )
             needed.append(coefficient)
     if not needed:
@@ -193,10 +203,9 @@ class _Motion:
         rates: dict[str, jax.Array] = {}
         if "Cm" in c:
             pitching = pressure * a.geometry.cbar * c["Cm"] + s["thrust"] * (a.throttle.arm if a.throttle else 0.0)
-            coupling = 0.0
-            if Ixx == Ixx and Izz == Izz:  # NaN: not known, and then of no account in this flight
-                coupling = (Izz - Ixx) * s["p"] * s["r"] + Ixz * (s["r"] ** 2 - s["p"] ** 2)
-            rates["q"] = (pitching + coupling) / Iyy
+            if not math.isnan(Ixx + Izz):  # not known: a longitudinal flight, in which they are of no account
+                pitching += (Izz - Ixx) * s["p"] * s["r"] + Ixz * (s["r"] ** 2 - s["p"] ** 2)
+            rates["q"] = pitching / Iyy
         if "Cl" in c and "Cn" in c:
             rolling = pressure * a.geometry.b * c["Cl"] + Ixz * s["p"] * s["q"] + (Iyy - Izz) * s["q"] * s["r"]
             yawing = pressure * a.geometry.b * c["Cn"] - Ixz * s["q"] * s["r"] + (Ixx - Iyy) * s["p"] * s["q"]

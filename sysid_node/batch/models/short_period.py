@@ -1,7 +1,8 @@
 """Short-period motion with everything slower or sideways as measured: nonlinear, body axes, two states.
 
-The model of SIDPAC's output-error example (Morelli; Klein & Morelli, 2006, example 6.3): CZ and Cm linear about the first
-sample's angle of attack and elevator; airspeed, attitude, lateral motion and the longitudinal force enter as measured.
+The model of SIDPAC's output-error example (Morelli; Klein & Morelli, 2006, example 6.3): CZ and Cm linear about the
+first sample's angle of attack and elevator; airspeed, attitude, lateral motion and the longitudinal force enter as
+measured.
 """
 
 from __future__ import annotations

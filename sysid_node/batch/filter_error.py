@@ -1,0 +1,184 @@
+"""Maximum likelihood by filter error: output error for a flight in turbulence.
+
+A Kalman filter follows the aircraft through the gusts, and the constants are those for which its one-step predictions
+are best. Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 5; Maine & Iliff, NASA RP-1168.
+
+The criterion is the determinant of the innovations' covariance, diagonal and found by relaxation (Jategaonkar, eq.
+5.12). The filter's gain comes from process and measurement noise, both estimated: that always gives a stable filter,
+where Jategaonkar's gain from the innovations' covariance needs a constraint. Only the ratio of the two noises shapes
+the gain; their common size follows from the innovations. With no process noise this is output error.
+
+Outputs must be measured independently: a pitch acceleration differentiated from the pitch rate predicts itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.batch import kalman
+from sysid_node.batch.assess import assess
+from sysid_node.batch.likelihood import DEFAULT_SEARCH, Problem, Search, diagonal_noise, maximise
+from sysid_node.batch.model import Manoeuvre, Model, check_manoeuvres
+from sysid_node.batch.result import Answer, Fit
+from sysid_node.batch.unknowns import Unknowns
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+
+#: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
+_NOISE_RANGE = 1e3
+
+
+def filter_error(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    *,
+    initial_states: Sequence[str] = (),
+    biases: Sequence[str] = (),
+    search: Search = DEFAULT_SEARCH,
+) -> Fit:
+    """Estimates the free parameters and the process noise from all manoeuvres together.
+
+    Each manoeuvre has the steady Kalman gain of its first sample's flight condition: cut a flight that changes speed
+    much. ``extras`` of the result holds the noises' standard deviations: ``process_<state>`` (unit of the state per
+    root second) and ``sensor_<output>``. Raises InputError as ``output_error`` does, and on outputs with gaps; a search
+    that does not converge is returned, and says so.
+    """
+    check_manoeuvres(model, manoeuvres)
+    problem = _FilterError(Unknowns.of(model, manoeuvres, initial_states, biases))
+    z, iterations, complaint = maximise(problem, search)
+    return assess("filter_error", problem, z, iterations, complaint, problem.noises(z))
+
+
+def predict_filter(
+    model: Model, manoeuvres: Sequence[Manoeuvre], values: Mapping[str, float], noises: Mapping[str, float]
+) -> list[Answer]:
+    """One-step predictions on other manoeuvres, parameters and noises (a fit's ``extras``) held."""
+    held = model.started_at(values)
+    check_manoeuvres(held, manoeuvres)
+    problem = _FilterError(Unknowns.of(held, manoeuvres, (), ()))
+    logs = np.log([noises[name] for name in _noise_names(model)])
+    z = np.concatenate([problem.unknowns.start(), logs])
+    problem.check(z)
+    return problem.answers(z)
+
+
+class _FilterError(Problem):
+    """One-step predictions; z ends with the logarithms of process and measurement noise, 1 sigma."""
+
+    def __init__(self, unknowns: Unknowns) -> None:
+        super().__init__(unknowns)
+        _check_complete(unknowns)
+        self._noise_start = _rough_noise(unknowns)
+
+    def start(self) -> Array:
+        return np.concatenate([self.unknowns.start(), self._noise_start])
+
+    def bounds(self) -> tuple[Array, Array]:
+        lower, upper = self.unknowns.bounds()
+        reach = np.log(_NOISE_RANGE)
+        return np.concatenate([lower, self._noise_start - reach]), np.concatenate([upper, self._noise_start + reach])
+
+    def answers(self, z: Array) -> list[Answer]:
+        return [
+            Answer(m.name, m.time, self.unknowns.model.outputs, m.outputs, np.asarray(_predict_jit(*self._of(i, z))))
+            for i, m in enumerate(self.unknowns.manoeuvres)
+        ]
+
+    def sensitivities(self, z: Array) -> list[Array]:
+        blocks = []
+        for i, manoeuvre in enumerate(self.unknowns.manoeuvres):
+            block = np.zeros((*manoeuvre.outputs.shape, z.size))
+            block[:, :, self._columns(i, z)] = np.asarray(_predict_jacobian(*self._of(i, z)))
+            blocks.append(block)
+        return blocks
+
+    def noise(self, z: Array) -> Array:
+        return diagonal_noise(self.answers(z))
+
+    def noises(self, z: Array) -> dict[str, float]:
+        """Standard deviations of process and measurement noise, scaled so that the filter expects its innovations."""
+        model, manoeuvre = self.unknowns.model, self.unknowns.manoeuvres[0]
+        logs = z[self.unknowns.size :]
+        q, r = np.split(np.exp(2.0 * logs), [len(model.states)])
+        theta, x0 = self.unknowns.theta(z), self.unknowns.initial_state(z, 0)
+        expected = kalman.innovation_variance(model, manoeuvre.step, manoeuvre.inputs[0], x0, theta, q, r)
+        scale = np.sqrt(np.mean(np.diag(self.noise(z)) ** 2 / np.asarray(expected)))
+        return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
+
+    def _columns(self, index: int, z: Array) -> list[int]:
+        """Where in z the quantities stand that this manoeuvre depends on."""
+        own = self.unknowns.own(index)
+        noises = range(self.unknowns.size, z.size)
+        return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
+
+    def _of(self, index: int, z: Array) -> tuple[Model, Chosen, Array, Array, Array, Array, Array, Array]:
+        u, m = self.unknowns, self.unknowns.manoeuvres[index]
+        chosen = (u.free, u.states, u.biases)
+        local = z[self._columns(index, z)]
+        return u.model, chosen, m.time, m.inputs, m.outputs, m.initial_state, u.model.start, local
+
+
+Chosen = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+
+
+def _predict(
+    model: Model,
+    chosen: Chosen,
+    time: jax.Array,
+    inputs: jax.Array,
+    outputs: jax.Array,
+    x0: jax.Array,
+    theta: jax.Array,
+    local: jax.Array,
+) -> jax.Array:
+    """Predicted outputs (N, ny) for what of z concerns this manoeuvre: parameters, its own unknowns, log noises.
+
+    ``chosen``: indices of the free parameters, of the free initial states, of the biased outputs.
+    """
+    sizes = np.cumsum([*(len(part) for part in chosen), len(model.states)])
+    values, states, bias, log_q, log_r = jnp.split(local, sizes)
+    theta = theta.at[jnp.array(chosen[0], dtype=int)].set(values)
+    x0 = x0.at[jnp.array(chosen[1], dtype=int)].set(states)
+    offset = jnp.zeros(len(model.outputs)).at[jnp.array(chosen[2], dtype=int)].set(bias)
+    q, r = jnp.exp(2.0 * log_q), jnp.exp(2.0 * log_r)
+    return kalman.predictions(model, time, inputs, outputs - offset, x0, theta, q, r) + offset
+
+
+_predict_jit = jax.jit(_predict, static_argnums=(0, 1))
+_predict_jacobian = jax.jit(jax.jacfwd(_predict, argnums=7), static_argnums=(0, 1))
+
+
+def _noise_names(model: Model) -> list[str]:
+    return [f"process_{name}" for name in model.states] + [f"sensor_{name}" for name in model.outputs]
+
+
+def _check_complete(unknowns: Unknowns) -> None:
+    for m in unknowns.manoeuvres:
+        gaps = np.argwhere(~np.isfinite(m.outputs))
+        if gaps.size:
+            raise InputError(
+                f"{m.name}: output {unknowns.model.outputs[gaps[0][1]]} has gaps, the first at "
+                f"{m.time[gaps[0][0]]:.2f} s; filter error needs every sample of an output: cut the flight there, "
+                "leave that output out, or use output_error"
+            )
+
+
+def _rough_noise(unknowns: Unknowns) -> Array:
+    """Logarithms of noise start values (nx + ny,) from how rough the measured signals are.
+
+    Second differences of white noise have six times its variance. A state is given process noise that moves it by as
+    much as its sensor's noise from one sample to the next.
+    """
+    model, first = unknowns.model, unknowns.manoeuvres[0]
+    second = np.concatenate([np.diff(m.outputs, 2, axis=0) for m in unknowns.manoeuvres])
+    size = np.abs(first.outputs).max(axis=0)
+    sensor = np.maximum(np.sqrt(np.mean(second**2, axis=0) / 6.0), 1e-6 * (1.0 + size))
+    moves = [
+        sensor[model.outputs.index(name)] if name in model.outputs else 1e-3 * (1.0 + abs(x))
+        for name, x in zip(model.states, first.initial_state, strict=True)
+    ]
+    return np.asarray(np.log(np.concatenate([np.array(moves) / np.sqrt(first.step), sensor])))
