@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -21,8 +20,10 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.live_table import Moment, Reference, live_table
 from sysid_node.errors import InputError
+from sysid_node.flight.align import why_nothing_aligned
 from sysid_node.flight.bag import read_streams
 from sysid_node.flight.topics import INPUT_TOPICS
+from sysid_node.flight.truth import read_truth
 from sysid_node.online.alignment import Aligned, align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
@@ -96,12 +97,11 @@ def run(args: argparse.Namespace) -> None:
 
 
 def _read(bag: Path, aircraft: Aircraft) -> Flight:
-    aligned = align_streams(aircraft, read_streams(bag), Settings().max_gap)
+    streams = read_streams(bag)
+    aligned = align_streams(aircraft, streams, Settings().max_gap)
     if not aligned.time.size:
-        raise InputError(f"bag {bag}: its topics have no time in common; give another")
-    truth = bag.with_name(f"{bag.name}.truth.json")
-    values = json.loads(truth.read_text(encoding="utf-8"))["derivatives"] if truth.is_file() else {}
-    return Flight(bag, aircraft, aligned, values)
+        raise InputError(why_nothing_aligned(streams, aligned.rejected))
+    return Flight(bag, aircraft, aligned, read_truth(bag))
 
 
 def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[list[Estimates], dict[str, int]]:

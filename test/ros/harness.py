@@ -1,0 +1,124 @@
+"""ROS for tests: a node to speak and listen with, programs in processes of their own, a made-up flight."""
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import Imu, JointState
+from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
+
+from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
+
+ROOT = Path(__file__).resolve().parents[2]
+JOINTS = ("elevator", "aileron", "rudder", "throttle")
+START_NS = 1_700_000_000_000_000_000
+
+
+class Probe:
+    """A node that publishes the inputs, hears the outputs and asks for services."""
+
+    def __init__(self) -> None:
+        self.node = rclpy.create_node("probe")
+        self.estimates: list[Any] = []
+        self.gaps: list[Any] = []
+        self.diagnostics: dict[str, Any] = {}
+        self.imu = self.node.create_publisher(Imu, "imu/data", 100)
+        self.air_data = self.node.create_publisher(AirData, "air_data", 100)
+        self.actuators = self.node.create_publisher(JointState, "actuators", 100)
+        self.node.create_subscription(DerivativeEstimates, "/identifier/derivatives", self.estimates.append, 1000)
+        self.node.create_subscription(ModelGap, "/identifier/model_gap", self.gaps.append, 1000)
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 100)
+
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            self.diagnostics[status.name] = status
+
+    def spin(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            rclpy.spin_once(self.node, timeout_sec=left)
+
+    def until(self, condition: Callable[[], Any], patience: float = 15.0) -> Any:
+        """Spin until the condition holds; its value. Fails, with what /diagnostics said, where it never does."""
+        end = time.monotonic() + patience
+        while not (found := condition()):
+            assert time.monotonic() < end, {name: status.message for name, status in self.diagnostics.items()}
+            rclpy.spin_once(self.node, timeout_sec=0.05)
+        return found
+
+    def heard(self) -> bool:
+        """Whether the identifier listens to all inputs."""
+        return all(p.get_subscription_count() for p in (self.imu, self.air_data, self.actuators))
+
+    def ask(self, kind: Any, name: str, request: Any = None) -> Any:
+        """A service's answer."""
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(timeout_sec=10.0), name
+        future = client.call_async(request or kind.Request())
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=10.0)
+        self.node.destroy_client(client)
+        assert future.done(), f"{name} gave no answer"
+        return future.result()
+
+    def said(self, part: str, key: str) -> str:
+        """The last value of a key on /diagnostics; empty where there is none."""
+        status = self.diagnostics.get(f"identifier: {part}")
+        return next((pair.value for pair in status.values if pair.key == key), "") if status else ""
+
+    def close(self) -> None:
+        self.node.destroy_node()
+
+
+@contextmanager
+def program(name: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A node's program in a process of its own; interrupted at the end, which must be clean."""
+    command = [sys.executable, "-m", f"sysid_node.ros.{name}", *arguments]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        yield process
+        process.send_signal(signal.SIGINT)
+        text, _ = process.communicate(timeout=10.0)
+        assert process.returncode == 0, text
+        assert "Traceback" not in text, text
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+
+
+def identifier(*parameters: str) -> Any:
+    """The identifier with ``name:=value`` parameters."""
+    return program("identifier", "--ros-args", *(word for p in ("aircraft:=cdrw", *parameters) for word in ("-p", p)))
+
+
+def made_up_streams(seconds: float, seed: int = 0) -> Streams:
+    """A well excited flight of no aircraft: 200 Hz IMU, 100 Hz air data and actuators; random phases, some noise."""
+    rng = np.random.default_rng(seed)
+
+    def wave(t: np.ndarray, middle: float, amplitude: float) -> np.ndarray:
+        frequencies = np.arange(0.2, 2.0, 0.1)
+        phases = rng.uniform(0.0, 2.0 * np.pi, frequencies.size)
+        waves = np.sin(2.0 * np.pi * np.outer(t, frequencies) + phases)
+        return middle + amplitude * (waves.mean(axis=1) + 0.01 * rng.normal(size=t.size))
+
+    fast, slow = (START_NS + np.arange(int(seconds * rate)) * (10**9 // rate) for rate in (200, 100))
+    imu, air, joints = arrivals_in_stamp_order(fast, slow, slow)
+    t, u = (fast - START_NS) / 1e9, (slow - START_NS) / 1e9
+    motion = np.column_stack([wave(t, m, 1.0) for m in (0.5, 0.0, -9.8, 0.0, 0.0, 0.0)])
+    attitude = np.full((t.size, 3), np.nan)
+    angles = ((18.0, 2.0), (0.05, 0.2), (0.0, 0.2), (1.2, 0.0))
+    surfaces = ((0.0, 0.3), (0.0, 0.3), (0.0, 0.3), (0.5, 0.1))
+    return Streams(
+        ImuStream(imu, motion, attitude, "base_link"),
+        AirDataStream(air, np.column_stack([wave(u, *pair) for pair in angles])),
+        JointStream(joints, JOINTS, np.column_stack([wave(u, *pair) for pair in surfaces])),
+        "made up",
+    )
