@@ -1,0 +1,121 @@
+"""Predicted standard errors: against the scatter of an estimator, finite differences, and scaling laws."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.excite.prediction import MEASURED, Predictor, _slopes, outputs_of
+from sysid_node.excite.spec import parse_manoeuvre
+
+CDRW = load_aircraft("cdrw")
+SPEC = (
+    "211:elevator:amplitude=0.04:start=0.5",
+    "doublet:aileron:amplitude=0.05:start=3.5",
+    "doublet:rudder:amplitude=0.1:start=5.5",
+)
+RATE, DURATION = 50.0, 10.0
+COMPILED = jax.jit(outputs_of, static_argnums=0)
+
+
+@pytest.fixture(scope="module")
+def predictor():
+    return Predictor(CDRW, RATE)
+
+
+@pytest.fixture(scope="module")
+def prediction(predictor):
+    return predictor.predict(parse_manoeuvre(SPEC, CDRW, RATE, DURATION))
+
+
+def fly(predictor, commands, unknowns):
+    simulator = predictor.simulator
+    return simulator.layout, simulator.model, unknowns, predictor.trim.initial, commands, simulator.step
+
+
+def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
+    """60 noisy flights, each fitted by Gauss-Newton from a start off by a twentieth of the tolerances.
+
+    Errors weighed by the predicted information are chi-square with 27 degrees of freedom a flight: their mean over 27
+    is one within 1/sqrt(30 * 27) = 3.5 % (1 sigma); each scatter within 9 %. Bounds at four of these.
+    """
+    generator = np.random.default_rng(11)
+    columns = [predictor.simulator.outputs.index(name) for name in MEASURED]
+    sigma = np.asarray(predictor.simulator.model.noise)[columns]
+    count = len(predictor.names)
+    offset = np.array([d.tolerance for d in CDRW.derivatives.values()]) / 20
+    clean = prediction.outputs[:, columns]
+    errors = []
+    for _ in range(60):
+        measured = clean + sigma * generator.normal(size=clean.shape)
+        unknowns = np.zeros(count + 8)
+        unknowns[:count] = offset * generator.choice([-1.0, 1.0], count)
+        for _ in range(5):
+            arguments = fly(predictor, prediction.commands, unknowns)
+            residual = (measured - np.asarray(COMPILED(*arguments))[:, columns]) / sigma
+            slopes = np.asarray(_slopes(*arguments))[:, columns] / sigma[:, None]
+            unknowns = unknowns + np.linalg.lstsq(slopes.reshape(-1, unknowns.size), residual.ravel())[0]
+        errors.append(unknowns[:count])
+    scatter = np.array(errors)
+    distance = np.einsum("ni,ij,nj->n", scatter, prediction.information.matrix, scatter) / count
+    assert distance.mean() == pytest.approx(1.0, abs=4 * 0.035)
+    ratio = np.sqrt(np.mean(scatter**2, axis=0)) / prediction.information.standard_errors
+    assert np.all(np.abs(ratio - 1) < 4 * 0.09)
+
+
+def test_slopes_agree_with_differences(predictor, prediction):
+    slopes = np.asarray(_slopes(*fly(predictor, prediction.commands, np.zeros(35))))
+    for i in (1, 9, 10, 11, 18, 27, 30, 34):
+        step = np.zeros(35)
+        step[i] = 1e-5
+        high, low = (np.asarray(COMPILED(*fly(predictor, prediction.commands, s))) for s in (step, -step))
+        difference = (high - low) / 2e-5
+        assert np.allclose(slopes[:, :, i], difference, atol=1e-5 * np.abs(slopes[:, :, i]).max() + 1e-7)
+
+
+def test_less_noise_tells_more_in_proportion(prediction):
+    halved = replace(CDRW, noise={name: sigma / 2 for name, sigma in CDRW.noise.items()})
+    other = Predictor(halved, RATE).predict(prediction.manoeuvre)
+    assert np.allclose(other.information.standard_errors, prediction.information.standard_errors / 2, rtol=1e-9)
+
+
+def test_an_axis_that_is_not_moved_is_hardly_known(predictor, prediction):
+    pitch = predictor.predict(parse_manoeuvre("211:elevator:amplitude=0.04:start=0.5", CDRW, RATE, DURATION))
+    known = dict(zip(prediction.information.names, prediction.information.standard_errors, strict=True))
+    alone = dict(zip(pitch.information.names, pitch.information.standard_errors, strict=True))
+    for name in ("Cl_p", "Cn_beta", "Cl_da", "CY_dr"):
+        assert alone[name] > 1e3 * known[name]
+    assert alone["Cm_alpha"] == pytest.approx(known["Cm_alpha"], rel=0.3)
+
+
+def test_a_throttle_manoeuvre_moves_thrust(predictor):
+    manoeuvre = parse_manoeuvre("doublet:throttle:amplitude=0.1", CDRW, RATE, DURATION)
+    commands = predictor.commands(manoeuvre)
+    assert np.ptp(commands[:, -1]) == pytest.approx(2 * 0.1 * 30.0)
+    assert np.ptp(commands[:, :-1]) == pytest.approx(np.ptp(predictor.trim.command[:-1]))
+
+
+def test_trim_counts_against_the_limit():
+    aircraft = load_aircraft("cdfp")  # trims at -0.057 rad of 0.40
+    predictor = Predictor(aircraft, RATE)
+    manoeuvre = parse_manoeuvre("pulse:elevator:amplitude=-0.39:width=0.1", aircraft, RATE, DURATION)
+    with pytest.raises(InputError, match=r"trim included, elevator reaches -0.44\d* rad at 1.00 s.*limit is 0.4"):
+        predictor.predict(manoeuvre)
+
+
+def test_a_sensor_without_noise_is_an_error():
+    with pytest.raises(InputError, match="noise of alpha is zero"):
+        Predictor(replace(CDRW, noise={**CDRW.noise, "alpha": 0.0}), RATE)
+
+
+def test_a_flight_that_diverges_is_an_error(predictor):
+    manoeuvre = parse_manoeuvre("pulse:elevator:amplitude=-0.3:width=8", CDRW, RATE, DURATION)
+    try:
+        found = predictor.predict(manoeuvre)
+    except InputError as error:
+        assert "diverged" in str(error)
+    else:
+        assert np.all(np.isfinite(found.information.matrix))
