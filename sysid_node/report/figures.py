@@ -92,7 +92,7 @@ def level(value: float, colour: str, dash: str = "solid", width: float = 1.4) ->
     return {**position, "line": {"color": colour, "dash": dash, "width": width}}
 
 
-def moment(time: float, colour: str = VERMILION) -> dict[str, Any]:
+def moment(time: float, colour: str = INK) -> dict[str, Any]:
     """A dotted vertical line at a time (s)."""
     position = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": time, "x1": time}
     return {**position, "line": {"color": colour, "dash": "dot", "width": 1.2}}

@@ -15,7 +15,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.settings import Settings
-from sysid_node.online.signals import array_signals, layout, momentum_matrix
+from sysid_node.online.signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.data import Response, RunResult, Spectra, prior_of
 from sysid_node.report.spectrum import amplitude_spectrum
@@ -91,10 +91,10 @@ def _motion(aircraft: Aircraft, time: Array, samples: Array) -> Motion | None:
     acceleration = np.gradient(filled[:, 3:6], time, axis=0)
     X, Y, Z, L, M, N = (acceleration @ momentum_matrix(aircraft)).T
     inertial = (X * sa - Z * ca, -X * ca - Z * sa, Y, L, M, N)  # of rates and of the IMU's lever arm
-    k = row[len(COEFFICIENTS)]
+    k = row[OFFSET]
     coefficients = {c: (row[i] + inertial[i]) / k for i, c in enumerate(COEFFICIENTS)}
     names = layout(aircraft).regressors
-    regressors = {name: x / k for name, x in zip(names, row[len(COEFFICIENTS) + 1 :], strict=True)}
+    regressors = {name: x / k for name, x in zip(names, row[len(row) - len(names) :], strict=True)}
     return Motion(time, filled, coefficients, {"0": np.ones(time.size), **regressors})
 
 

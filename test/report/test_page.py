@@ -14,6 +14,7 @@ import synthetic
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.data import Prior, RunResult, Spectra
 from sysid_node.report.page import SECTIONS, render_page
+from sysid_node.report.sections import derivatives
 
 VOID = {"meta", "link", "br", "rect", "line", "circle", "path"}
 
@@ -193,6 +194,34 @@ def assert_no_nan_limits(figure):
         low, high = figure["layout"][axis].get("range", (0, 1))
         assert math.isfinite(low)
         assert low < high or axis == "xaxis"
+
+
+@pytest.mark.parametrize(
+    ("value", "believed", "span", "place"),
+    [
+        *[(-0.5, -0.5, "100", 50.0), (-0.75, -0.5, "200", 62.5), (0.75, 0.5, "200", 62.5)],
+        *[(0.25, 0.5, "200", 37.5), (-0.25, -0.5, "200", 37.5), (2.0, 0.5, "200", 100.0)],
+    ],
+)
+def test_picture_shows_weaker_left_and_stronger_right(value, believed, span, place):
+    wide = 0.6 * abs(believed)
+    d = DerivativeEstimate("Cm_de", value, wide / 2, value - wide, value + wide, True, "ok")
+    table = derivatives.context(single(d, truth={"Cm_de": believed}))
+    mark = table["groups"][0][1][0].mark
+    assert table["span"] == f"{span}\u202f%"
+    assert mark.at == pytest.approx(place)
+    assert mark.lower < mark.at
+    assert mark.beyond == ("right" if place == 100.0 else "")
+
+
+def test_an_abrupt_change_is_marked_when_it_was_noticed():
+    ok = DerivativeEstimate("Cm_de", -0.5, 0.01, -0.52, -0.48, True, "ok")
+    changed = replace(ok, valid=False, status="changed")
+    history = [Estimates(float(t), {"Cm_de": changed if 3 <= t < 5 else ok}, {}) for t in range(9)]
+    page = outline(RunResult("kestrel", "sls_rft", history))
+    (panel,) = page.figures
+    assert [shape["x0"] for shape in panel["layout"]["shapes"]] == [3.0]
+    assert "an abrupt change was noticed" in page.words
 
 
 def test_titles_are_escaped():

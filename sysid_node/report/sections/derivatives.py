@@ -106,14 +106,17 @@ def _span(run: RunResult, estimates: Iterable[DerivativeEstimate]) -> float:
 
 
 def _mark(value: float, half: float, reference: float, span: float) -> Mark | None:
-    """Where a value and its interval fall on an axis from -span to +span about the reference."""
+    """Where a value and its interval fall on an axis from -span to +span about the reference: stronger is right."""
     if not math.isfinite(value):
         return None
-    half = half if math.isfinite(half) else 0.0
-    places = [50.0 + 50.0 * (v - reference) / (abs(reference) * span) for v in (value, value - half, value + half)]
-    at, lower, upper = (min(max(place, 0.0), 100.0) for place in places)
-    beyond = "left" if places[0] < 0 else "right" if places[0] > 100 else ""
-    return Mark(at, lower, upper, beyond)
+    at = 50.0 + 50.0 * (value / reference - 1.0) / span
+    reach = 50.0 * half / (abs(reference) * span) if math.isfinite(half) else 0.0
+    beyond = "left" if at < 0 else "right" if at > 100 else ""
+    return Mark(_inside(at), _inside(at - reach), _inside(at + reach), beyond)
+
+
+def _inside(place: float) -> float:
+    return min(max(place, 0.0), 100.0)
 
 
 def _prior_mark(prior: Prior, reference: float, span: float) -> Mark | None:

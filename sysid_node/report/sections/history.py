@@ -52,7 +52,12 @@ def context(run: RunResult) -> Mapping[str, Any]:
         return {"groups": []}
     final = run.final.derivatives
     groups = [(title, [_panel(run, final[name]) for name in names]) for title, names in grouped(final)]
-    return {"groups": groups, "has_prior": bool(run.prior), "has_truth": bool(run.truth)}
+    return {
+        "groups": groups,
+        "has_prior": bool(run.prior),
+        "has_truth": bool(run.truth),
+        "has_changes": any(_changes(run, name) for name in final),
+    }
 
 
 def _panel(run: RunResult, last: DerivativeEstimate) -> Panel:

@@ -80,7 +80,7 @@ def _best(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
     if not ranked:
         return None
     relative, best = ranked[0]
-    return Markup("Best known is {} ({}), to ±{} %.").format(
+    return Markup("Best known is {} ({}), to ±{}\u202f%.").format(
         symbol(best.name), short_meaning(best.name), number(100 * relative, 2)
     )
 
@@ -108,11 +108,21 @@ def _against_prior(run: RunResult, derivatives: list[DerivativeEstimate]) -> Mar
     checked = [d for d in derivatives if d.valid and d.name in run.prior]
     if not checked:
         return None
-    differing = [symbol(d.name) for d in checked if not agrees(d, run.prior[d.name])]
+    differing = [d for d in checked if not agrees(d, run.prior[d.name])]
     if not differing:
         return Markup("None differs from the aircraft file by more than the uncertainties allow.")
-    verb = "differs" if len(differing) == 1 else "differ"
-    return Markup("From the aircraft file {} {} by more than the uncertainties allow.").format(listing(differing), verb)
+    clauses = [
+        Markup("{} is {}").format(symbol(d.name), _difference(d.value, run.prior[d.name].value)) for d in differing
+    ]
+    return Markup("Against the aircraft file, by more than the uncertainties allow: {}.").format(listing(clauses))
+
+
+def _difference(value: float, prior: float) -> str:
+    """``"46 % weaker"``."""
+    if value * prior <= 0:
+        return "of the opposite sign" if value * prior < 0 else "not zero"
+    percent = number(100 * abs(value / prior - 1), 2)
+    return f"{percent}\u202f% {'weaker' if abs(value) < abs(prior) else 'stronger'}"
 
 
 def _named(d: DerivativeEstimate) -> bool:
