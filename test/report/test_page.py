@@ -210,7 +210,7 @@ def test_picture_shows_weaker_left_and_stronger_right(value, believed, span, pla
     mark = table["groups"][0][1][0].mark
     assert table["span"] == f"{span}\u202f%"
     assert mark.at == pytest.approx(place)
-    assert mark.lower < mark.at
+    assert mark.lower <= mark.at <= mark.upper
     assert mark.beyond == ("right" if place == 100.0 else "")
 
 

@@ -10,9 +10,20 @@ from sysid_node.report.sections import Section
 from sysid_node.report.words import setting
 
 
+#: Units of the settings that have one.
+UNITS = {
+    "frequencies": "Hz",
+    "forgetting_time": "s",
+    "window": "s",
+    "settle_time": "s",
+    "max_gap": "s",
+    "publish_rate": "Hz",
+}
+
+
 def context(run: RunResult) -> Mapping[str, Any]:
-    """Keys as they are given to ``--set``, and their values."""
-    return {"rows": [(key, setting(value)) for key, value in run.settings.items()]}
+    """Keys as they are given to ``--set``, their values and units."""
+    return {"rows": [(key, setting(value), UNITS.get(key, "")) for key, value in run.settings.items()]}
 
 
 SECTION: Section[RunResult] = Section("settings", "Settings", "settings.html.j2", context)
