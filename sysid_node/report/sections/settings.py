@@ -9,7 +9,6 @@ from sysid_node.report.data import RunResult
 from sysid_node.report.sections import Section
 from sysid_node.report.words import setting
 
-
 #: Units of the settings that have one.
 UNITS = {
     "frequencies": "Hz",
