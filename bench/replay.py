@@ -1,7 +1,9 @@
 """Replay against bare deserialisation: a 600 s bag of 240,000 messages, both in one run.
 
 The bag (IMU 200 Hz, air data 100 Hz, joints 100 Hz, messages of real size) is made in a temporary folder from a linear
-model of an aircraft under random surface motion. `python bench/replay.py [--seconds 600] [--aircraft cdrw] [--repeat 3]`
+model of an aircraft under random surface motion, with all sensors at the centre of gravity.
+
+    python bench/replay.py [--seconds 600] [--aircraft cdrw] [--repeat 3]
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ import argparse
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,7 @@ from rosbags.rosbag2 import Reader
 from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, Sensors
 from sysid_node.cli.estimates_bag import write_estimates
 from sysid_node.cli.replay import replay, write_replay
 from sysid_node.flight.bag import read_streams
@@ -155,7 +158,7 @@ def main() -> None:
     parser.add_argument("--aircraft", default="cdrw")
     parser.add_argument("--repeat", type=int, default=3)
     args = parser.parse_args()
-    aircraft = load_aircraft(args.aircraft)
+    aircraft = replace(load_aircraft(args.aircraft), sensors=Sensors())
     streams = make_streams(aircraft, args.seconds)
     messages = sum(len(stream.arrival) for stream in streams.by_topic.values())
     for storage in ("sqlite3", "mcap"):
