@@ -17,22 +17,31 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
+from sysid_node.report.compare import changes
 from sysid_node.report.data import Response, RunResult, Spectra, prior_of
 from sysid_node.report.spectrum import amplitude_spectrum
 
 THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
+FEWEST = 10  # samples that anything is drawn from
 POINTS_A_PERIOD = 8  # of the highest frequency in use, in drawn responses
 RESPONSE_NOTE = "Both are averaged over half the shortest period in use; measured moments hold differentiated rates."
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Complete samples as the model sees them: ``coefficients`` and ``regressors`` name -> (N,), non-dimensional."""
+    """Complete samples as the model sees them: coefficients name -> (N,), measured and from the final estimates."""
 
     time: Array  # (N,) s
-    samples: Array  # (N, M)
-    coefficients: Mapping[str, Array]
-    regressors: Mapping[str, Array]
+    controls: Mapping[str, Array]  # symbol -> (N,) rad
+    measured: Mapping[str, Array]
+    modelled: Mapping[str, Array]  # where all derivatives of the coefficient are known
+
+    def since(self, start: float) -> Motion | None:
+        """The part from ``start`` (s) on; None for fewer than ten samples."""
+        first = int(np.searchsorted(self.time, start))
+        groups = (self.controls, self.measured, self.modelled)
+        later = ({name: values[first:] for name, values in group.items()} for group in groups)
+        return Motion(self.time[first:], *later) if self.time.size - first >= FEWEST else None
 
 
 def replay_result(
@@ -51,8 +60,9 @@ def replay_result(
 
     Columns of ``samples`` are ``SAMPLE_COLUMNS``, then the controls in the aircraft's order.
     """
-    motion = _motion(aircraft, time, samples)
-    modelled = _modelled(aircraft, motion, history[-1]) if motion and history else {}
+    noticed = sorted({at for e in history[-1:] for name in e.derivatives for at in changes(history, name)})
+    motion = _motion(aircraft, time, samples, history)
+    counted = motion and motion.since(max(noticed, default=0.0))
     return RunResult(
         aircraft=aircraft.name,
         method=settings.method,
@@ -64,12 +74,19 @@ def replay_result(
         prior=prior_of(aircraft),
         truth=truth or {},
         flight=_flight(aircraft, time, samples),
-        spectra=_spectra(aircraft, settings, motion, modelled) if motion else None,
-        responses=_responses(settings, motion, modelled) if motion else {},
+        spectra=_spectra(settings, counted) if counted else None,
+        responses=_responses(settings, motion) if motion else {},
         response_note=RESPONSE_NOTE,
         rejected=rejected,
-        remarks=remarks,
+        remarks=[*remarks, *_change_remark(noticed)],
     )
+
+
+def _change_remark(noticed: Sequence[float]) -> list[str]:
+    if not noticed:
+        return []
+    when = " and ".join(f"{at:.1f} s" for at in noticed)
+    return [f"An abrupt change was noticed at {when}: estimates and spectra rest on what was flown since."]
 
 
 def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | None:
@@ -79,12 +96,12 @@ def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | N
     return FlightRecord(time, {n: samples[:, i] for i, n in enumerate(names) if i != AIR_INTERVAL})
 
 
-def _motion(aircraft: Aircraft, time: Array, samples: Array) -> Motion | None:
+def _motion(aircraft: Aircraft, time: Array, samples: Array, history: Sequence[Estimates]) -> Motion | None:
     """The complete samples, unknown thrust taken as none, as the estimator does; None for fewer than ten."""
     filled = samples.copy()
     filled[np.isnan(filled[:, THRUST]), THRUST] = 0.0
     complete = np.isfinite(filled).all(axis=1)
-    if complete.sum() < 10:
+    if complete.sum() < FEWEST:
         return None
     time, filled = time[complete], filled[complete]
     row, (ca, sa) = array_signals(aircraft)(list(filled.T))
@@ -92,41 +109,36 @@ def _motion(aircraft: Aircraft, time: Array, samples: Array) -> Motion | None:
     X, Y, Z, L, M, N = (acceleration @ momentum_matrix(aircraft)).T
     inertial = (X * sa - Z * ca, -X * ca - Z * sa, Y, L, M, N)  # of rates and of the IMU's lever arm
     k = row[OFFSET]
-    coefficients = {c: (row[i] + inertial[i]) / k for i, c in enumerate(COEFFICIENTS)}
+    measured = {c: (row[i] + inertial[i]) / k for i, c in enumerate(COEFFICIENTS)}
     names = layout(aircraft).regressors
     regressors = {name: x / k for name, x in zip(names, row[len(row) - len(names) :], strict=True)}
-    return Motion(time, filled, coefficients, {"0": np.ones(time.size), **regressors})
+    modelled = _modelled(aircraft, {"0": np.ones(time.size), **regressors}, history[-1]) if history else {}
+    controls = {symbol: filled[:, len(SAMPLE_COLUMNS) + i] for i, symbol in enumerate(aircraft.control_symbols)}
+    return Motion(time, controls, measured, modelled)
 
 
-def _modelled(aircraft: Aircraft, motion: Motion, final: Estimates) -> dict[str, Array]:
+def _modelled(aircraft: Aircraft, regressors: Mapping[str, Array], final: Estimates) -> dict[str, Array]:
     """Each coefficient (N,) from the final estimates; left out where one of its derivatives is unknown."""
     modelled = {}
-    for coefficient, regressors in aircraft.structure.items():
-        values = [final.derivatives[f"{coefficient}_{r}"].value for r in regressors]
+    for coefficient, names in aircraft.structure.items():
+        values = [final.derivatives[f"{coefficient}_{r}"].value for r in names]
         if np.isfinite(values).all():
-            pairs = zip(values, regressors, strict=True)
-            modelled[coefficient] = np.sum([value * motion.regressors[r] for value, r in pairs], axis=0)
+            pairs = zip(values, names, strict=True)
+            modelled[coefficient] = np.sum([value * regressors[r] for value, r in pairs], axis=0)
     return modelled
 
 
-def _spectra(aircraft: Aircraft, settings: Settings, motion: Motion, modelled: Mapping[str, Array]) -> Spectra:
+def _spectra(settings: Settings, motion: Motion) -> Spectra:
     """Inputs, coefficients and residuals at the frequencies in use."""
     start, step, stop = settings.frequencies
     frequency = np.arange(start, stop + 0.5 * step, step)
-    symbols = aircraft.control_symbols
-    inputs = [motion.samples[:, len(SAMPLE_COLUMNS) + i] for i in range(len(symbols))]
-    measured = [motion.coefficients[c] for c in modelled]
-    residuals = [motion.coefficients[c] - values for c, values in modelled.items()]
-    columns = np.stack([*inputs, *measured, *residuals], axis=1)
+    measured = {c: motion.measured[c] for c in motion.modelled}
+    residuals = {c: motion.measured[c] - values for c, values in motion.modelled.items()}
+    groups = (motion.controls, measured, residuals)
+    columns = np.stack([values for group in groups for values in group.values()], axis=1)
     every = max(int(1.0 / (POINTS_A_PERIOD * 2 * stop * np.median(np.diff(motion.time)))), 1)
-    amplitude = amplitude_spectrum(_averaged(motion.time, every), _averaged(columns, every), frequency)
-    first, *rest = np.split(amplitude.T, np.cumsum([len(inputs), len(measured)]))
-    return Spectra(
-        frequency,
-        dict(zip(symbols, first, strict=True)),
-        dict(zip(modelled, rest[0], strict=True)),
-        dict(zip(modelled, rest[1], strict=True)),
-    )
+    amplitudes = iter(amplitude_spectrum(_averaged(motion.time, every), _averaged(columns, every), frequency).T)
+    return Spectra(frequency, *({name: next(amplitudes) for name in group} for group in groups))
 
 
 def _averaged(values: Array, every: int) -> Array:
@@ -135,7 +147,7 @@ def _averaged(values: Array, every: int) -> Array:
     return np.asarray(whole.reshape(-1, every, *values.shape[1:]).mean(axis=1))
 
 
-def _responses(settings: Settings, motion: Motion, modelled: Mapping[str, Array]) -> dict[str, Response]:
+def _responses(settings: Settings, motion: Motion) -> dict[str, Response]:
     """Measured and modelled coefficients, averaged over half the shortest period in use: noise above is left out."""
     step = float(np.median(np.diff(motion.time)))
     width = max(round(0.5 / (settings.frequencies[2] * step)), 1)
@@ -147,4 +159,4 @@ def _responses(settings: Settings, motion: Motion, modelled: Mapping[str, Array]
     if motion.time.size < width:
         return {}
     time = smooth(motion.time)
-    return {c: Response("", time, smooth(motion.coefficients[c]), smooth(values)) for c, values in modelled.items()}
+    return {c: Response("", time, smooth(motion.measured[c]), smooth(values)) for c, values in motion.modelled.items()}

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from sysid_node.flight.record import Array
 from sysid_node.online.types import DerivativeEstimate
 from sysid_node.report import figures
-from sysid_node.report.compare import half_width
+from sysid_node.report.compare import changes, half_width
 from sysid_node.report.data import RunResult
 from sysid_node.report.figures import Figure, Mask
 from sysid_node.report.sections import Section
@@ -56,7 +56,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
         "groups": groups,
         "has_prior": bool(run.prior),
         "has_truth": bool(run.truth),
-        "has_changes": any(_changes(run, name) for name in final),
+        "has_changes": any(changes(run.history, name) for name in final),
     }
 
 
@@ -85,7 +85,7 @@ def _figure(run: RunResult, last: DerivativeEstimate, c: _Curves) -> Figure:
     layout = {
         "xaxis": figures.axis("time, s", range=[min(run.history[0].time, 0.0), run.history[-1].time]),
         "yaxis": figures.axis(unit(last.name), range=_limits(run, last.name, c)),
-        "shapes": _references(run, last.name) + [figures.moment(time) for time in _changes(run, last.name)],
+        "shapes": _references(run, last.name) + [figures.moment(time) for time in changes(run.history, last.name)],
     }
     ends = f"ends at {with_interval(last.value, half_width(last))} {unit(last.name)}, {last.status}"
     return Figure(f"{last.name} against time with its 95 % interval; {ends}", traces, layout, height=200)
@@ -129,13 +129,6 @@ def _limits(run: RunResult, name: str, c: _Curves) -> list[float]:
 def _percentiles(values: Array, low: float, high: float) -> list[float]:
     known = values[np.isfinite(values)]
     return [float(p) for p in np.percentile(known, [low, high])] if known.size else []
-
-
-def _changes(run: RunResult, name: str) -> list[float]:
-    """Times (s) at which this derivative was announced as changed."""
-    states = [(e.time, e.derivatives[name].status.startswith("changed")) for e in run.history if name in e.derivatives]
-    before = [False, *(changed for _, changed in states)]
-    return [time for (time, changed), was in zip(states, before, strict=False) if changed and not was]
 
 
 SECTION: Section[RunResult] = Section("history", "Estimates against time", "history.html.j2", context)
