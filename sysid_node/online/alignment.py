@@ -10,7 +10,8 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import Alignment, Rejected, Screened, align, buffer_ns
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps, Streams
-from sysid_node.online.intake import Sample, init, on_actuators, on_air_data, on_imu, stamp_of
+from sysid_node.online.intake import KEPT_BUFFERS, Sample, init, on_actuators, on_air_data, on_imu, stamp_of
+from sysid_node.online.types import SAMPLE_COLUMNS
 
 
 class Aligned(NamedTuple):
@@ -46,7 +47,7 @@ def _is_regular(bulk: Alignment, streams: Streams, max_gap: float) -> bool:
     in_time = complete < dropped
     for other, right in zip(bulk.others, bulk.right, strict=True):
         left = np.maximum(right[decided] - 1, 0)
-        in_time &= complete < _order_after(other, other.stamps[left] + buffer)
+        in_time &= complete < _order_after(other, other.stamps[left] + KEPT_BUFFERS * buffer)
     return bool(in_time.all())
 
 
@@ -77,5 +78,6 @@ def _align_one_by_one(aircraft: Aircraft, streams: Streams, max_gap: float) -> A
             new = on_actuators(state, stamps[2][row], actuators.names, values[2][row])
         complete += new
         sources += [stamp_of(state, time) for time, _ in new]
-    samples = np.array([sample for _, sample in complete]).reshape(len(complete), -1)
+    width = len(SAMPLE_COLUMNS) + len(aircraft.controls)
+    samples = np.array([sample for _, sample in complete]).reshape(len(complete), width)
     return Aligned(np.array([time for time, _ in complete]), samples, state.rejected, np.array(sources, np.int64))

@@ -36,6 +36,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 FOLLOWS_NS = 1_000_000_000  # a message this soon after a leap of the stamps confirms it
 BREAK_NS = 1_000_000_000  # beyond max_gap: the break in the samples' time where a clock was set
+KEPT_BUFFERS = 2  # an IMU message that has waited for one topic finds its neighbours in the other still there
 
 Sample = tuple[float, ...]
 Values = tuple[float, ...]
@@ -207,7 +208,8 @@ def _on_neighbour(
     before = topic.newest if topic.newest is not None and topic.newest.epoch == epoch else None
     topic.newest = _Entry(epoch, stamp, min(stamp - before.stamp, state.gap) if before else 0, values)
     entries.append(topic.newest)
-    while entries[0].epoch < epoch - 1 or (entries[0].epoch == epoch and stamp - entries[0].stamp > state.buffer):
+    horizon = stamp - KEPT_BUFFERS * state.buffer
+    while entries[0].epoch < epoch - 1 or (entries[0].epoch == epoch and entries[0].stamp < horizon):
         entries.popleft()
     return _release(state)
 
