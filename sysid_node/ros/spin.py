@@ -7,6 +7,7 @@ from collections.abc import Callable
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 from sysid_node.errors import InputError
@@ -15,14 +16,19 @@ from sysid_node.errors import InputError
 def run_program(program: Callable[[], None]) -> int:
     """Run ``program`` with ROS initialised; returns the exit code.
 
-    0 when it is done or stopped by Ctrl-C, SIGTERM or a shutdown of its context; 2 where it raises InputError, which
-    becomes one line of the log.
+    0 when it is done or stopped by Ctrl-C, SIGTERM or a shutdown of its context; 2 where it raises InputError, or ROS
+    cannot make sense of its arguments, which becomes one line of the log.
     """
-    rclpy.init()
     try:
+        rclpy.init()
         program()
     except InputError as error:
         rclpy.logging.get_logger("sysid").fatal(str(error))
+        return 2
+    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        if rclpy.ok():
+            raise
+        rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
         return 2
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -4,22 +4,25 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
+from sysid_node.ros import conversion
 
 ROOT = Path(__file__).resolve().parents[2]
 JOINTS = ("elevator", "aileron", "rudder", "throttle")
 START_NS = 1_700_000_000_000_000_000
+IMU_SIGNS = np.array([1.0, -1.0, -1.0] * 2)  # FRD to FLU
 
 
 class Probe:
@@ -58,6 +61,56 @@ class Probe:
         """Whether the identifier listens to all inputs."""
         return all(p.get_subscription_count() for p in (self.imu, self.air_data, self.actuators))
 
+    def await_identifier(self) -> None:
+        """Until the identifier listens, and is heard."""
+        self.until(lambda: self.heard() and self.node.count_publishers("/identifier/derivatives"))
+        self.spin(0.3)
+
+    def play(self, bag: Path, *options: str) -> None:
+        """Have the player play a bag four times as fast as recorded, and listen until it is done."""
+        with ended(start("player", str(bag), "--rate", "4", "--wait", "20", *options)) as player:
+            self.until(lambda: player.poll() is not None, 30.0)
+
+    def speak(self, flight: Streams, start: float = 0.0, stop: float = np.inf, air_data: bool = True) -> None:
+        """Publish a flight's messages stamped from ``start`` to ``stop`` s, as fast as they are surely heard."""
+        topics = [
+            (flight.imu, flight.imu.values * IMU_SIGNS, self.say_imu),
+            (
+                flight.actuators,
+                flight.actuators.positions,
+                lambda s, v: self.say_actuators(s, flight.actuators.names, v),
+            ),
+        ]
+        if air_data:
+            topics.append((flight.air_data, flight.air_data.values, self.say_air_data))
+        messages = sorted(
+            (int(order), int(stamp), say, row)
+            for stream, values, say in topics
+            for order, stamp, row in zip(stream.arrival.order, stream.arrival.stamp_ns, values.tolist(), strict=True)
+            if start <= (stamp - START_NS) / 1e9 < stop
+        )
+        for count, (_, stamp, say, row) in enumerate(messages):
+            say(stamp, row)
+            if count % 20 == 0:
+                self.spin(0.01)
+
+    def say_imu(self, stamp: int, values: Sequence[float]) -> None:
+        """Specific force and rates, forward-left-up."""
+        force, rate = (Vector3(x=float(x), y=float(y), z=float(z)) for x, y, z in (values[:3], values[3:]))
+        header = conversion.header(stamp, "base_link")
+        self.imu.publish(Imu(header=header, linear_acceleration=force, angular_velocity=rate))
+
+    def say_air_data(self, stamp: int, values: Sequence[float]) -> None:
+        """True airspeed, angle of attack, sideslip, air density."""
+        names = ("true_airspeed", "angle_of_attack", "sideslip", "air_density")
+        header = conversion.header(stamp, "air_data")
+        self.air_data.publish(AirData(header=header, **dict(zip(names, values, strict=True))))
+
+    def say_actuators(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
+        """Joint positions."""
+        header = conversion.header(stamp, "")
+        self.actuators.publish(JointState(header=header, name=list(names), position=list(positions)))
+
     def ask(self, kind: Any, name: str, request: Any = None) -> Any:
         """A service's answer."""
         client = self.node.create_client(kind, name)
@@ -77,11 +130,15 @@ class Probe:
         self.node.destroy_node()
 
 
-@contextmanager
-def program(name: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A node's program in a process of its own; interrupted at the end, which must be clean."""
+def start(name: str, *arguments: str) -> subprocess.Popen[str]:
+    """A node's program in a process of its own."""
     command = [sys.executable, "-m", f"sysid_node.ros.{name}", *arguments]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+@contextmanager
+def ended(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
+    """The process, interrupted at the end, which must be clean."""
     try:
         yield process
         process.send_signal(signal.SIGINT)
@@ -94,9 +151,15 @@ def program(name: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
             process.communicate()
 
 
-def identifier(*parameters: str) -> Any:
-    """The identifier with ``name:=value`` parameters."""
-    return program("identifier", "--ros-args", *(word for p in ("aircraft:=cdrw", *parameters) for word in ("-p", p)))
+def start_identifier(*parameters: str) -> subprocess.Popen[str]:
+    """The identifier with ``name:=value`` parameters; of the cdrw where none of them says otherwise."""
+    pairs = ("aircraft:=cdrw", *parameters)
+    return start("identifier", "--ros-args", *(word for pair in pairs for word in ("-p", pair)))
+
+
+def identifier(*parameters: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    """The same, ended when the block is."""
+    return ended(start_identifier(*parameters))
 
 
 def made_up_streams(seconds: float, seed: int = 0) -> Streams:

@@ -1,0 +1,272 @@
+"""The live node, in a process of its own, over DDS."""
+
+import json
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness import START_NS, Probe, identifier, made_up_streams, start_identifier
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+from std_srvs.srv import Trigger
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag_writer import write_streams
+from sysid_node.flight.streams import Streams
+from sysid_node.online.alignment import align_streams
+from sysid_node.online.run import run
+from sysid_node.online.schedule import due_times
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
+from sysid_node.ros.conversion import estimates_from_message, stamp_ns
+
+RELIABLE = [
+    f"qos_overrides./{topic}.subscription.reliability:=reliable" for topic in ("imu/data", "air_data", "actuators")
+]
+
+
+def expected_of(streams: Streams) -> dict[int, Estimates]:
+    """What the desk makes of a flight at the default publish rate: header stamp -> estimates."""
+    aircraft, settings = load_aircraft("cdrw"), Settings()
+    aligned = align_streams(aircraft, streams, settings.max_gap)
+    due = due_times(aligned.time, 20.0)
+    results = run(aircraft, settings, aligned.time, aligned.samples, due)
+    stamps = aligned.stamps[np.searchsorted(aligned.time, due)]
+    return dict(zip(stamps.tolist(), results, strict=True))
+
+
+def words(probe: Probe, part: str, level: int) -> str:
+    """What a part of /diagnostics says, once it does at that level."""
+    status = probe.diagnostics.get(f"identifier: {part}")
+    return status.message if status and status.level == bytes([level]) else ""
+
+
+def set_parameter(probe: Probe, name: str, value: ParameterValue) -> SetParametersResult:
+    request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+    return probe.ask(SetParameters, "/identifier/set_parameters", request).results[0]
+
+
+def bits(estimates: Estimates) -> list[object]:
+    """All numbers of an estimate so that equality is to the last bit, NaN included."""
+    derivatives = [
+        (d.name, d.value, d.standard_error, d.lower, d.upper, d.valid, d.status) for d in estimates.derivatives.values()
+    ]
+    fits = [
+        (f.coefficient, f.r_squared, f.residual_std, f.degrees_of_freedom, f.samples) for f in estimates.fits.values()
+    ]
+    return [[x.hex() if isinstance(x, float) else x for x in row] for row in derivatives + fits]
+
+
+def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Probe, bag: Path) -> None:
+    expected = expected_of(read_streams(bag))
+    assert len(expected) == 239
+    with identifier(*RELIABLE):
+        probe.await_identifier()
+        probe.play(bag)
+        probe.spin(0.3)
+    heard = {stamp_ns(message.header.stamp): message for message in probe.estimates}
+    assert heard.keys() >= expected.keys()
+    for stamp, estimates in expected.items():
+        live = estimates_from_message(heard[stamp], START_NS)
+        assert bits(live) == bits(estimates), f"at {(stamp - START_NS) / 1e9} s"
+    assert any(d.valid for d in heard[max(expected)].derivatives), "the comparison must have something to compare"
+    assert {heard[stamp].header.frame_id for stamp in expected} == {"base_link"}
+
+
+def test_forward_right_down_messages_give_the_same(probe: Probe, bag: Path, tmp_path: Path) -> None:
+    turned = tmp_path / "frd"
+    write_streams(turned, made_up_streams(4.0), frame="frd")
+    expected = expected_of(made_up_streams(4.0))
+    with identifier(*RELIABLE, "body_frame:=frd"):
+        probe.await_identifier()
+        probe.play(turned)
+        probe.spin(0.3)
+    last = max(expected)
+    live = next(m for m in probe.estimates if stamp_ns(m.header.stamp) == last)
+    assert bits(estimates_from_message(live, START_NS)) == bits(expected[last])
+
+
+def test_simulated_time(probe: Probe, bag: Path) -> None:
+    """With use_sim_time and /clock the lag is counted in the flight's time."""
+    with identifier(*RELIABLE, "use_sim_time:=true"):
+        probe.await_identifier()
+        probe.play(bag, "--clock")
+        probe.until(lambda: probe.said("computation", "lag (s)"))
+        assert abs(float(probe.said("computation", "lag (s)"))) < 1.0
+
+
+def test_silence_makes_estimates_stale(probe: Probe) -> None:
+    flight = made_up_streams(4.0)
+    with identifier():
+        probe.await_identifier()
+        probe.speak(flight)
+        probe.until(lambda: probe.estimates and {d.status for d in probe.estimates[-1].derivatives} == {"stale input"})
+        assert not any(d.valid for d in probe.estimates[-1].derivatives)
+        assert "imu/data silent for" in probe.until(lambda: words(probe, "input", level=3))
+
+
+def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
+    """NaN, degrees, repeated, reversed and absent stamps, a clock that leaps: each is named, and the flight goes on."""
+    flight = made_up_streams(4.0)
+    with identifier() as process:
+        probe.await_identifier()
+        probe.speak(flight, stop=1.0)
+        now = START_NS + 10**9
+        for values in ((np.nan,) * 6, (1e9, 0, 0, 0, 0, 0), (0, 0, 9.8, 200.0, 0, 0)):
+            probe.say_imu(now + 1, values)
+        good = (0.0, 0.0, 9.8, 0.0, 0.0, 0.0)
+        for stamp in (now, now, now - 500_000_000, 0, now - 100 * 10**9):
+            probe.say_imu(stamp, good)
+        probe.say_air_data(now + 1, (np.nan, 0.0, 0.0, 1.2))
+        probe.say_air_data(now + 1, (18.0, 5.7, 0.0, 1.2))
+        probe.say_actuators(now + 1, ("flaps",), (0.1,))
+        probe.say_actuators(now + 1, (), ())
+        probe.speak(flight, start=1.0)
+        probe.until(lambda: probe.said("input", "rejected, actuators: joint 'elevator' missing or not finite"))
+        for reason in (
+            "imu/data: not finite",
+            "imu/data: specific force over 300 m/s^2",
+            "imu/data: angular rate over 35 rad/s (deg/s?)",
+            "imu/data: duplicate stamp",
+            "imu/data: out of order",
+            "imu/data: no stamp",
+            "imu/data: clock step",
+            "air_data: true_airspeed not measured",
+            "air_data: angle_of_attack over pi/2 rad (degrees?)",
+        ):
+            assert int(probe.said("input", f"rejected, {reason}")) >= 1, reason
+        probe.until(lambda: float(probe.said("estimate", "flight time (s)")) > 3.5)
+        assert probe.said("state", "exceptions in callbacks") == "0"
+        assert process.poll() is None
+
+
+def test_a_missing_topic_is_named(probe: Probe) -> None:
+    flight = made_up_streams(2.0)
+    with identifier():
+        probe.await_identifier()
+        probe.speak(flight, air_data=False)
+        assert "air_data never received" in probe.until(lambda: words(probe, "input", level=3))
+        assert not probe.estimates
+
+
+def test_reset_and_save(probe: Probe, tmp_path: Path) -> None:
+    folder = tmp_path / "made" / "here"
+    with identifier(f"save_directory:={folder}"):
+        probe.await_identifier()
+        empty = probe.ask(Trigger, "/identifier/save")
+        assert not empty.success
+        assert "no aligned sample" in empty.message
+        probe.speak(made_up_streams(3.0))
+        saved = probe.ask(Trigger, "/identifier/save")
+        assert saved.success, saved.message
+        content = json.loads(Path(saved.message).read_text(encoding="utf-8"))
+        assert content["aircraft"] == "cdrw"
+        assert content["samples"] == 599
+        assert content["settings"]["frequencies"] == list(Settings().frequencies)
+        assert content["derivatives"].keys() == load_aircraft("cdrw").derivatives.keys()
+        assert {"value", "standard_error", "lower", "upper", "valid", "status"} == content["derivatives"]["Cm_q"].keys()
+        assert [path.name for path in folder.iterdir()] == [Path(saved.message).name]
+        assert probe.ask(Trigger, "/identifier/reset").success
+        assert not probe.ask(Trigger, "/identifier/save").success
+
+
+def test_a_folder_that_cannot_be_written_is_said(probe: Probe, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    with identifier(f"save_directory:={tmp_path / 'file'}"):
+        probe.await_identifier()
+        probe.speak(made_up_streams(1.0))
+        answer = probe.ask(Trigger, "/identifier/save")
+        assert not answer.success
+        assert "cannot be written" in answer.message
+
+
+def test_lifecycle_by_requests(probe: Probe) -> None:
+    def state() -> str:
+        return probe.ask(GetState, "/identifier/get_state").current_state.label
+
+    def change(transition: int) -> bool:
+        request = ChangeState.Request()
+        request.transition.id = transition
+        return probe.ask(ChangeState, "/identifier/change_state", request).success
+
+    configure, cleanup, activate, deactivate, shutdown = 1, 2, 3, 4, 5
+    with identifier("autostart:=false"):
+        assert state() == "unconfigured"
+        assert not change(99), "rclpy alone does not answer this, and the node ends"
+        assert not change(activate)
+        assert change(configure)
+        assert state() == "inactive"
+        assert change(activate)
+        probe.await_identifier()
+        probe.speak(made_up_streams(1.0))
+        probe.until(lambda: probe.estimates)
+        assert change(deactivate)
+        assert change(cleanup)
+        assert change(configure), "a second time"
+        assert change(activate)
+        assert change(deactivate)
+        assert change(cleanup)
+        assert change(shutdown)
+        assert state() == "finalized"
+
+
+def test_parameters_describe_themselves_and_refuse(probe: Probe) -> None:
+    with identifier():
+        probe.await_identifier()
+        request = DescribeParameters.Request(names=["publish_rate"])
+        (described,) = probe.ask(DescribeParameters, "/identifier/describe_parameters", request).descriptors
+        assert "[Hz]" in described.description
+        assert "Default: 20.0" in described.description
+        assert described.floating_point_range[0].to_value == 1000.0
+        fixed = set_parameter(probe, "window", ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=5.0))
+        assert not fixed.successful
+        assert "takes effect when the node is configured" in fixed.reason
+        live = set_parameter(
+            probe, "save_directory", ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="x")
+        )
+        assert live.successful
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        (["aircraft:=nonesuch"], "aircraft 'nonesuch' is not known"),
+        (['aircraft:=""'], "parameter aircraft is empty"),
+        (["body_frame:=ned"], "parameter body_frame = 'ned': expected a string, flu | frd"),
+        (["publish_rate:=5"], "parameter publish_rate = 5 (integer): expected a double, 0.01 to 1000 Hz"),
+        (["publish_rate:=-5.0"], "parameter publish_rate = -5.0"),
+        (["frequencies:=[3.0, 0.1, 1.0]"], "frequencies"),
+    ],
+)
+def test_a_start_that_cannot_be_is_one_line_and_code_2(ros: None, parameters: list[str], words: str) -> None:
+    process = start_identifier(*parameters)
+    text, _ = process.communicate(timeout=20.0)
+    assert process.returncode == 2, text
+    assert len(text.strip().splitlines()) == 1, text
+    assert words in text
+
+
+def test_malformed_ros_arguments_end_it_with_code_2(ros: None) -> None:
+    process = start_identifier("aircraft:=")
+    text, _ = process.communicate(timeout=20.0)
+    assert process.returncode == 2, text
+    assert "arguments after --ros-args" in text
+    assert "Traceback" not in text
+
+
+def test_a_misspelt_parameter_is_said(ros: None) -> None:
+    process = start_identifier("aircraft:=nonesuch", "windwo:=3.0")
+    text, _ = process.communicate(timeout=20.0)
+    assert "'windwo' is not known and has no effect; did you mean 'window'?" in text
+
+
+def test_sigterm_ends_it_cleanly(probe: Probe) -> None:
+    process = start_identifier()
+    probe.await_identifier()
+    process.send_signal(signal.SIGTERM)
+    text, _ = process.communicate(timeout=10.0)
+    assert process.returncode == 0, text
+    assert "Traceback" not in text

@@ -1,0 +1,48 @@
+"""An exception in the middle of a flight: said on /diagnostics, and the node can be started again."""
+
+from collections.abc import Iterator
+from threading import Thread
+
+import pytest
+from harness import Probe, made_up_streams
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+
+from sysid_node.ros.identifier import Identifier
+from sysid_node.ros.session import Session
+
+
+@pytest.fixture
+def node(ros: None) -> Iterator[Identifier]:
+    """An active identifier, served by a thread of this process."""
+    one = Identifier()
+    one.set_parameters([Parameter("aircraft", value="cdrw")])
+    one.trigger_configure()
+    one.trigger_activate()
+    executor = SingleThreadedExecutor()
+    executor.add_node(one)
+    thread = Thread(target=executor.spin)
+    thread.start()
+    yield one
+    executor.shutdown()
+    thread.join()
+    one.destroy_node()
+
+
+def test_it_says_so_and_flies_again(node: Identifier, probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    probe.await_identifier()
+    with monkeypatch.context() as patched:
+        patched.setattr(Session, "imu", lambda *_: 1 / 0)
+        probe.speak(made_up_streams(0.1))
+        probe.until(lambda: probe.said("state", "state") == "unconfigured")
+    assert probe.said("state", "last fault") == "on_message: ZeroDivisionError: division by zero"
+    assert probe.diagnostics["identifier: state"].level == b"\x02"
+    assert not probe.estimates
+    node.trigger_configure()
+    node.trigger_activate()
+    probe.await_identifier()
+    probe.speak(made_up_streams(2.0))
+    probe.until(lambda: probe.estimates)
+    probe.until(lambda: probe.said("state", "state") == "active")
+    assert probe.diagnostics["identifier: state"].level == b"\x00"
+    assert probe.said("state", "exceptions in callbacks") == "1"

@@ -1,0 +1,71 @@
+"""A session: messages in, estimates out, in the time of the data."""
+
+import math
+
+import pytest
+from harness import START_NS, made_up_streams
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.streams import Streams
+from sysid_node.online.settings import Settings
+from sysid_node.ros.save import save_estimates
+from sysid_node.ros.session import Due, Session
+
+
+def fly(session: Session, flight: Streams, order: str) -> list[Due]:
+    """Feed a flight, topics at equal stamps in the given order; what falls due."""
+    names = flight.actuators.names
+    take = {
+        "i": (flight.imu, flight.imu.values, session.imu),
+        "a": (flight.air_data, flight.air_data.values, session.air_data),
+        "j": (flight.actuators, flight.actuators.positions, lambda stamp, row: session.actuators(stamp, names, row)),
+    }
+    messages = sorted(
+        (stamp, order.index(letter), letter, row)
+        for letter, (stream, values, _) in take.items()
+        for stamp, row in zip(stream.arrival.stamp_ns.tolist(), values.tolist(), strict=True)
+    )
+    return [due for stamp, _, letter, row in messages for due in take[letter][2](stamp, tuple(row))]
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(load_aircraft("cdrw"), Settings(), 10.0)
+
+
+def test_estimates_fall_due_in_the_time_of_the_data(session: Session) -> None:
+    due = fly(session, made_up_streams(3.0), "iaj")
+    assert [stamp - START_NS for stamp, _ in due] == [k * 100_000_000 for k in range(1, 30)]
+    assert session.samples == 599
+
+
+def test_the_order_of_arrival_does_not_matter() -> None:
+    one, other = (
+        fly(Session(load_aircraft("cdrw"), Settings(), 10.0), made_up_streams(5.0), order) for order in ("iaj", "jai")
+    )
+    assert repr(one) == repr(other)
+
+
+def test_reset_forgets(session: Session) -> None:
+    first = fly(session, made_up_streams(3.0), "iaj")
+    session.reset()
+    assert (session.samples, session.rejected) == (0, {})
+    assert repr(fly(session, made_up_streams(3.0), "iaj")) == repr(first)
+
+
+def test_silence_is_stale(session: Session) -> None:
+    fly(session, made_up_streams(5.0), "iaj")
+    assert {d.status for d in session.now(10.0).estimates.derivatives.values()} == {"stale input"}
+    assert {d.status for d in session.now().estimates.derivatives.values()} != {"stale input"}
+
+
+def test_a_save_replaces_nothing_half(session: Session, tmp_path) -> None:
+    fly(session, made_up_streams(1.0), "iaj")
+    path = save_estimates(tmp_path, session)
+    assert path.name == f"cdrw-{START_NS + 990_000_000}.json"
+    assert save_estimates(tmp_path, session) == path
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    assert not any(math.isnan(x) for x in session.settings.frequencies)
+    with pytest.raises(InputError, match="save_directory"):
+        save_estimates(path, session)
