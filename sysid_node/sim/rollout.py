@@ -77,8 +77,8 @@ def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state
     coming = (_next(inputs.commands), _next(gusts), time + chain.step, inputs.noise)
     carry = _start(chain, initial, inputs.commands[0], gusts[0], pilot_state)
     _, flight = jax.lax.scan(lambda c, new: _step(chain, pilot, c, *new), carry, coming)
-    outputs = _continuous_angles(flight.outputs)
-    return flight._replace(outputs=clock.stamp(chain.effects, outputs, chain.step))
+    stamped = clock.stamp(chain.effects, _continuous_angles(flight.outputs), chain.step)
+    return flight._replace(outputs=sensors.noisy(chain.model, chain.effects, stamped, inputs.noise))
 
 
 def _step(
@@ -88,14 +88,14 @@ def _step(
     h = chain.step
     k1, motion = derivative(chain, carry.x, carry.drive)
     truth, probe, reading = _read(chain, carry, motion)
-    outputs = sensors.noisy(chain.model, chain.effects, reading, noise)
-    given, arriving, pilot_state = pilot(carry.pilot, outputs, planned)
+    seen = sensors.noisy(chain.model, chain.effects, reading, noise)
+    given, arriving, pilot_state = pilot(carry.pilot, seen, planned)
     actuators = actuator.advance(chain.layout, chain.model, chain.effects, carry.actuators, arriving[:-1], h)
     motor_command = propulsion.commanded(chain.model, arriving[-1])
     motor = propulsion.advance(chain.effects, carry.motor, carry.motor_command, motor_command, h)
     drive, surfaces = drive_of(chain, actuators, motor, gusts, time)
     x = _runge_kutta(chain, carry.x, k1, carry.drive, drive)
-    flight = Flight(outputs, carry.x[:13], carry.surfaces, carry.command, jnp.stack(motion.coefficients))
+    flight = Flight(reading, carry.x[:13], carry.surfaces, carry.command, jnp.stack(motion.coefficients))
     return Carry(x, actuators, motor, motor_command, drive, surfaces, given, truth, probe, pilot_state), flight
 
 

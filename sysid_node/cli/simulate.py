@@ -1,0 +1,141 @@
+"""``sysid simulate``: fly a simulated aircraft into a bag, and write the truth beside it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.bag_writer import STORAGES, write_streams
+from sysid_node.flight.frames import BODY_FRAMES
+from sysid_node.flight.streams import Streams
+from sysid_node.flight.truth import truth_path
+
+if TYPE_CHECKING:
+    from sysid_node.excite.manoeuvre import Manoeuvre
+    from sysid_node.sim.simulator import Simulator
+    from sysid_node.sim.sortie import Sortie
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+#: Rate of the integration, Hz; raised to the IMU's where that is higher.
+_RATE = 200.0
+
+
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser("simulate", help="fly a simulated aircraft into a bag", description=__doc__)
+    add = parser.add_argument
+    add("--aircraft", required=True, help="file or name")
+    add("--manoeuvre", action="append", default=[], metavar="SPEC", help="e.g. 3211:elevator:amplitude=0.05:start=2")
+    add("--effect", action="append", default=[], metavar="NAME:KEY=VALUE", help="by which the aircraft differs")
+    add("--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist")
+    add("--seed", type=int, default=0, help="of turbulence, noise and jitter (default: 0)")
+    add("--duration", type=float, help="s (default: until 3 s after the manoeuvre; 60 s without one)")
+    add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
+    add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
+    add("--height", type=float, default=100.0, help="m above the ground, for turbulence (default: 100)")
+    add("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
+    add("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
+    add("--noise", type=float, default=1.0, help="of the aircraft file's sensor noise (default: 1)")
+    add("--rate", type=float, default=200.0, help="of the IMU, Hz (default: 200)")
+    add("--air-data-rate", type=float, default=100.0, help="Hz (default: 100)")
+    add("--actuator-rate", type=float, default=100.0, help="Hz (default: 100)")
+    add("--surfaces", choices=["commanded", "measured"], default="commanded", help="what is recorded of them")
+    add("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
+    add("--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu, REP-103)")
+    add("--quiet", action="store_true", help="say nothing")
+    return parser
+
+
+def run(args: argparse.Namespace) -> None:
+    """Flies, writes the bag, then the truth."""
+    from sysid_node.sim.recording import Recorder  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
+    from sysid_node.sim.sortie import Conditions, fly_sortie  # noqa: PLC0415
+
+    if args.out.exists():
+        raise InputError(f"bag {args.out}: exists already; remove it or choose another name")
+    recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
+    simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate))
+    conditions = Conditions(
+        args.effect, args.airspeed, args.turbulence, args.height, args.autopilot, args.noise, args.seed
+    )
+    sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
+    streams = recorder.record(sortie)
+    write_streams(args.out, streams, args.storage, args.body_frame)
+    truth_path(args.out).write_text(json.dumps(_truth(args, sortie), indent=2) + "\n", encoding="utf-8")
+    if not args.quiet:
+        print(_summary(args.out, sortie, streams))
+
+
+def _deflections(simulator: Simulator, specs: list[str], duration: float | None) -> NDArray[np.float64]:
+    """Planned deflections from trim (N, controls + 1), rad and N."""
+    from sysid_node.excite.spec import parse_manoeuvre  # noqa: PLC0415
+
+    if duration is not None and not 0.1 <= duration <= 36000.0:
+        raise InputError(f"--duration {duration:g}: expected 0.1 to 36000 s")
+    if not specs:
+        return np.zeros((round((duration or 60.0) * simulator.rate) + 1, len(simulator.commands)))
+    manoeuvre = parse_manoeuvre(specs, simulator.aircraft, simulator.rate, duration)
+    return np.column_stack([manoeuvre.surfaces(), _thrust(simulator, manoeuvre)])
+
+
+def _thrust(simulator: Simulator, manoeuvre: Manoeuvre) -> NDArray[np.float64]:
+    """Planned thrust from trim (N,), N."""
+    from sysid_node.excite.manoeuvre import THROTTLE  # noqa: PLC0415
+
+    throttle = simulator.aircraft.throttle
+    if throttle is None:
+        return np.zeros(manoeuvre.time.size)
+    return manoeuvre.deflections[THROTTLE] * (throttle.max_thrust or 1.0)
+
+
+def _truth(args: argparse.Namespace, sortie: Sortie) -> dict[str, Any]:
+    """What was flown, apart from the bag."""
+    return {
+        "aircraft": sortie.simulator.aircraft.name,
+        "derivatives": sortie.derivatives,
+        "effects": sortie.effects,
+        "trim": {
+            "airspeed": float(np.linalg.norm(sortie.trim.initial[3:6])),
+            "alpha": sortie.trim.alpha,
+            "command": dict(zip(sortie.simulator.commands, sortie.trim.command.tolist(), strict=True)),
+        },
+        "manoeuvre": args.manoeuvre,
+        "autopilot": args.autopilot,
+        "turbulence": args.turbulence,
+        "seed": args.seed,
+        "recorded_surfaces": args.surfaces,
+        "command": _command(args),
+    }
+
+
+def _command(args: argparse.Namespace) -> str:
+    """The command that flies this again, defaults spelled out; the bag by its name only."""
+    words = ["sysid", "simulate"]
+    for name, value in {**vars(args), "out": args.out.name}.items():
+        option = f"--{name.replace('_', '-')}"
+        if isinstance(value, list):
+            words += [word for item in value for word in (option, item)]
+        elif isinstance(value, bool):
+            words += ["--open-loop"] if name == "autopilot" and not value else []
+        elif value is not None and name != "command":
+            words += [option, str(value)]
+    return shlex.join(words)
+
+
+def _summary(bag: Path, sortie: Sortie, streams: Streams) -> str:
+    """What was written, in one line."""
+    outputs = np.asarray(sortie.flight.outputs)
+    alpha = np.rad2deg(outputs[:, sortie.simulator.outputs.index("alpha")])
+    counts = ", ".join(f"{len(stream.arrival)} on {topic}" for topic, stream in streams.by_topic.items())
+    seconds = (len(outputs) - 1) * sortie.simulator.step
+    return f"{bag}: {seconds:.1f} s, {counts}; alpha {alpha.min():.1f} to {alpha.max():.1f} deg"
