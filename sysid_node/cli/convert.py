@@ -27,10 +27,17 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument(
         "--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu, REP-103)"
     )
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
     return parser
 
 
 def run(args: argparse.Namespace) -> None:
     """Converts the log."""
     aircraft = load_aircraft(args.aircraft) if args.aircraft else None
-    write_streams(args.out, streams_of(read_log(args.log), aircraft), args.storage, args.body_frame)
+    flight = read_log(args.log)
+    streams = streams_of(flight, aircraft)
+    write_streams(args.out, streams, args.storage, args.body_frame)
+    if not args.quiet:
+        print(
+            f"{args.out}: {flight.duration:.1f} s, {len(flight)} samples; joints {', '.join(streams.actuators.names)}"
+        )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import flat, why_nothing_aligned
 from sysid_node.flight.bag import read_streams
 from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
+from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
 from sysid_node.online.alignment import Aligned, align_streams
@@ -50,14 +51,9 @@ class Replay:
     publish_rate: float  # Hz
     aligned: Aligned
     history: Sequence[Estimates]
+    stamps_ns: Stamps  # (K,) header stamps at which each of ``history`` (K,) fell due
     final: Estimates  # after the last sample, whether or not one was due
     frame_id: str
-
-    @property
-    def stamps_ns(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-        """Header stamps of the samples that ``history`` (K,) includes last."""
-        places = np.searchsorted(self.aligned.time, [estimates.time for estimates in self.history])
-        return self.aligned.stamps[places]
 
 
 def replay(
@@ -85,7 +81,8 @@ def replay(
     share = (lambda t: progress(t / last if last else 1.0)) if progress else None
     history = run_online(aircraft, settings, time, aligned.samples, np.union1d(due, time[-1:]), share)
     published = history if due.size and due[-1] == last else history[:-1]
-    return Replay(aircraft, settings, publish_rate, aligned, published, history[-1], streams.imu.frame_id)
+    stamps = aligned.stamps[np.searchsorted(time, due)]
+    return Replay(aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams.imu.frame_id)
 
 
 def write_replay(folder: Path, done: Replay, truth: Mapping[str, float] | None = None) -> None:
@@ -94,19 +91,19 @@ def write_replay(folder: Path, done: Replay, truth: Mapping[str, float] | None =
     What an earlier replay left there is replaced. Raises InputError where the folder cannot be written.
     """
     every = max(len(done.history) // TABLE_ROWS, 1)
-    shown = [*done.history[every - 1 :: every]]
-    if not shown or shown[-1].time < done.final.time:
-        shown.append(done.final)
+    # While the estimator settles nothing is included yet, and estimates have the same time.
+    shown = {estimates.time: estimates for estimates in (*done.history[every - 1 :: every], done.final)}
     result = replay_result(
         done.aircraft,
         done.settings,
         time=done.aligned.time,
         samples=done.aligned.samples,
-        history=shown,
+        history=list(shown.values()),
         rejected=flat(done.aligned.rejected),
         truth=truth,
     )
-    write_run(folder, result)
+    settings = {**result.settings, "publish_rate": done.publish_rate}
+    write_run(folder, replace(result, settings=settings))
     bag = folder / ESTIMATES_BAG
     _remove_old_bag(bag)
     write_estimates(

@@ -1,0 +1,119 @@
+"""``sysid``: exit codes, one line a mistake, and no import that is not needed."""
+
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+from sysid_node.cli import convert
+from sysid_node.cli.main import COMMANDS, main
+from sysid_node.errors import InputError
+
+CONVERT = ["convert", "log.csv", "--out", "bag"]
+
+
+def raising(error):
+    def run(_):
+        raise error
+
+    return run
+
+
+def said(capsys) -> str:
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    return captured.err.strip()
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (InputError("bag x: cut short;\n  try this"), 2, "sysid convert: bag x: cut short; try this"),
+        (KeyboardInterrupt(), 130, "sysid convert: interrupted"),
+        (RuntimeError("a\nb"), 1, "sysid convert: failed: RuntimeError: a b (more with --debug)"),
+        (
+            OSError(28, "No space left"),
+            1,
+            "sysid convert: failed: OSError: [Errno 28] No space left (more with --debug)",
+        ),
+    ],
+)
+def test_errors_are_one_line_and_a_code(monkeypatch, capsys, error, code, line):
+    monkeypatch.setattr(convert, "run", raising(error))
+    assert main(CONVERT) == code
+    assert said(capsys) == line
+
+
+@pytest.mark.parametrize("arguments", [["--debug", *CONVERT], [*CONVERT, "--debug"]])
+def test_debug_shows_the_traceback(monkeypatch, capsys, arguments):
+    monkeypatch.setattr(convert, "run", raising(InputError("no")))
+    assert main(arguments) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_done_is_zero(monkeypatch):
+    monkeypatch.setattr(convert, "run", lambda _: None)
+    assert main(CONVERT) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["convert"], "sysid convert: the following arguments are required: LOG, --out; see sysid convert --help"),
+        ([*CONVERT, "--fast"], "sysid: unrecognized arguments: --fast; see sysid --help"),
+        ([*CONVERT, "--storage", "x"], "sysid convert: argument --storage: invalid choice: 'x'"),
+        (["land"], "sysid: argument COMMAND: invalid choice: 'land'"),
+    ],
+)
+def test_wrong_arguments_are_one_line(capsys, arguments, line):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert said(capsys).startswith(line)
+
+
+def test_no_command_shows_what_there_is(capsys):
+    assert main([]) == 2
+    assert "replay" in capsys.readouterr().out
+
+
+def test_help_is_quick_because_it_imports_no_command():
+    code = "import sys; from sysid_node.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
+    code += "print([m for m in ('numpy', 'rosbags', 'jax', 'rclpy', 'rich') if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip().endswith("[]")
+    assert "convert" in result.stdout
+
+
+def test_runs_as_a_module():
+    command = [sys.executable, "-m", "sysid_node.cli", "convert", "none.csv", "--out", "bag"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (
+        2,
+        "",
+        "sysid convert: none.csv: does not exist\n",
+    )
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if find_spec(f"sysid_node.cli.{name}")])
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([command, "--help"])
+    assert caught.value.code == 0
+    assert f"usage: sysid {command}" in capsys.readouterr().out
+
+
+def test_a_reader_that_leaves_is_no_error():
+    code = (
+        "import sys; from sysid_node.cli import convert, main\n"
+        "def run(_):\n    print('x' * 10**6)\n    sys.stdout.flush()\n"
+        "convert.run = run\n"
+        "sys.exit(main.main(['convert', 'a', '--out', 'b']))"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    assert process.wait() == 1

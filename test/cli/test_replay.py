@@ -1,0 +1,245 @@
+"""``sysid replay``: the live functions on a bag, the files it leaves, and one line for whatever is wrong."""
+
+import csv
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from made_flights import JOINTS, made_aircraft, made_streams
+from rosbags.rosbag2 import Reader
+
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.cli.main import main
+from sysid_node.cli.replay import parse_settings, replay
+from sysid_node.errors import InputError
+from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag_writer import write_streams
+from sysid_node.flight.messages import type_store
+from sysid_node.flight.streams import Arrival
+from sysid_node.online import estimates, estimator, intake
+from sysid_node.online.schedule import Schedule, due
+from sysid_node.online.settings import Settings
+
+AIRCRAFT = made_aircraft()
+SETTINGS = Settings(frequencies=(0.2, 0.2, 2.0))
+KEYS = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return made_streams(12.0)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory, flight):
+    path = tmp_path_factory.mktemp("replay") / "flight"
+    write_streams(path, flight)
+    return path
+
+
+@pytest.fixture
+def arguments(tmp_path, bag):
+    """Of a replay of the bag into a new folder."""
+    (tmp_path / "made.yaml").write_text(dump_aircraft(AIRCRAFT))
+    aircraft, out = str(tmp_path / "made.yaml"), str(tmp_path / "out")
+    return ["replay", str(bag), "--aircraft", aircraft, "--out", out, "--frequencies", "0.2:0.2:2.0"]
+
+
+def one_by_one(path, settings, rate):
+    """The live node's loop: each message through the intake, each sample into the estimator."""
+    streams = read_streams(path)
+    state, taken, schedule = estimator.init(AIRCRAFT, settings), intake.init(AIRCRAFT, settings.max_gap), Schedule(rate)
+    imu, air, joints = streams.imu, streams.air_data, streams.actuators
+    calls = [
+        *((intake.on_imu, imu.arrival, i, (tuple(v),)) for i, v in enumerate(imu.values.tolist())),
+        *((intake.on_air_data, air.arrival, i, (tuple(v),)) for i, v in enumerate(air.values.tolist())),
+        *((intake.on_actuators, joints.arrival, i, (list(JOINTS), v)) for i, v in enumerate(joints.positions.tolist())),
+    ]
+    history = []
+    for on_message, arrival, i, values in sorted(calls, key=lambda call: call[1].order[call[2]]):
+        for time, sample in on_message(taken, int(arrival.stamp_ns[i]), *values):
+            estimator.update(state, time, sample)
+            if due(schedule, time):
+                history.append((intake.stamp_of(taken, time), estimates.estimate(state)))
+    return history
+
+
+def bits(known):
+    """Everything that estimates say, as text that shows every bit."""
+    return [
+        known.time.hex(),
+        *(repr(dataclasses.astuple(x)) for x in (*known.derivatives.values(), *known.fits.values())),
+    ]
+
+
+@pytest.mark.parametrize("rate", [20.0, 3.0])
+def test_a_replay_is_the_live_run_to_the_last_bit(bag, rate):
+    done, live = replay(bag, AIRCRAFT, SETTINGS, publish_rate=rate), one_by_one(bag, SETTINGS, rate)
+    assert len(done.history) == len(live) > 10
+    assert done.stamps_ns.tolist() == [stamp for stamp, _ in live]
+    for ours, (_, theirs) in zip(done.history, live, strict=True):
+        assert bits(ours) == bits(theirs)
+
+
+def test_files_and_summary_are_the_contracts(arguments, tmp_path, capsys):
+    assert main([*arguments, "--quiet", "--set", "publish_rate=10", "--set", "settle_time=1"]) == 0
+    assert capsys.readouterr() == ("", "")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary.keys() >= KEYS
+    assert summary["aircraft"] == "made"
+    assert summary["settings"]["publish_rate"] == 10.0
+    assert summary["settings"]["settle_time"] == 1.0
+    assert summary["settings"]["frequencies"] == [0.2, 0.2, 2.0]
+    assert summary["derivatives"].keys() == AIRCRAFT.derivatives.keys()
+    wanted = {"value", "standard_error", "lower", "upper", "valid", "status"}
+    assert all(d.keys() == wanted for d in summary["derivatives"].values())
+    assert summary["samples"] > 2000
+    for name in ("report.html", "derivatives.csv", "estimates.csv", "signals.csv", "estimates/estimates.mcap"):
+        assert (tmp_path / "out" / name).stat().st_size > 100
+
+
+def test_the_bag_of_estimates_holds_every_one(arguments, tmp_path, bag):
+    assert main([*arguments, "--quiet"]) == 0
+    done, store = replay(bag, AIRCRAFT, SETTINGS), type_store()
+    with Reader(tmp_path / "out" / "estimates") as reader:
+        (connection,) = reader.connections
+        assert connection.topic == "/identifier/derivatives"
+        messages = [(t, store.deserialize_cdr(raw, connection.msgtype)) for _, t, raw in reader.messages()]
+    assert len(messages) == len(done.history)
+    for (log_ns, m), known, stamp in zip(messages, done.history, done.stamps_ns.tolist(), strict=True):
+        assert log_ns == m.header.stamp.sec * 10**9 + m.header.stamp.nanosec == stamp
+        assert (m.aircraft, m.method, m.header.frame_id) == ("made", "sls_rft", "imu")
+        for told, d in zip(m.derivatives, known.derivatives.values(), strict=True):
+            assert (told.name, told.status, told.valid) == (d.name, d.status, d.valid)
+            ours, theirs = ([getattr(x, f) for f in ("value", "standard_error", "lower", "upper")] for x in (told, d))
+            np.testing.assert_array_equal(ours, theirs)
+        for told, f in zip(m.fits, known.fits.values(), strict=True):
+            assert (told.coefficient, told.samples, told.r_squared) == (f.coefficient, f.samples, f.r_squared)
+            assert (told.residual_std, told.degrees_of_freedom) == (f.residual_std, f.degrees_of_freedom)
+
+
+def test_a_second_replay_replaces_the_first(arguments, tmp_path, capsys):
+    assert main([*arguments, "--quiet"]) == 0
+    assert main([*arguments, "--quiet", "--set", "publish_rate=1"]) == 0
+    with Reader(tmp_path / "out" / "estimates") as reader:
+        assert reader.message_count == 11
+    (tmp_path / "out" / "estimates" / "mine.txt").write_text("keep me")
+    assert main([*arguments, "--quiet"]) == 2
+    assert "holds mine.txt, which no replay wrote" in capsys.readouterr().err
+    assert (tmp_path / "out" / "estimates" / "mine.txt").read_text() == "keep me"
+
+
+def test_it_shows_the_estimates_and_the_truth_beside_the_bag(arguments, tmp_path, bag, flight, capsys):
+    own = tmp_path / "own"
+    write_streams(own, flight)
+    (tmp_path / "own.truth.json").write_text(json.dumps({"derivatives": {"Cm_alpha": -0.4242}}))
+    assert main(["replay", str(own), *arguments[2:]]) == 0
+    captured = capsys.readouterr()
+    assert "-0.4242" in captured.out
+    assert "report.html" in captured.out
+    with (tmp_path / "out" / "derivatives.csv").open() as file:
+        assert {row["name"]: row["truth"] for row in csv.DictReader(file)}["Cm_alpha"] == "-0.4242"
+
+
+def test_frame_and_topics_are_options(arguments, tmp_path, flight, bag):
+    write_streams(tmp_path / "frd", flight, "sqlite3", "frd")
+    options = ["--body-frame", "frd", "--topic", "air_data:=/air_data", "--quiet"]
+    assert main(["replay", str(tmp_path / "frd"), *arguments[2:], *options]) == 0
+    frd = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert main([*arguments, "--quiet"]) == 0
+    assert frd["derivatives"] == json.loads((tmp_path / "out" / "summary.json").read_text())["derivatives"]
+
+
+def line_of(capsys, arguments) -> str:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    lines = captured.err.strip().splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("sysid replay: ")
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--set", "windoww=3"], "'windoww' is not known"),
+        (["--set", "window"], "'window': expected KEY=VALUE"),
+        (["--set", "window=-3"], "window -3.0: expected"),
+        (["--set", "publish_rate=0"], "publish_rate = '0': expected 0.01 to 1000 Hz"),
+        (["--set", "publish_rate=fast"], "publish_rate = 'fast'"),
+        (["--frequencies", "1:2"], "frequencies = '1:2': expected START:STEP:STOP"),
+        (["--topic", "imu:=x"], "'imu' is none of imu/data"),
+        (["--topic", "imu/data:=/none"], "no topic /none"),
+        (["--aircraft", "nonesuch"], "'nonesuch' is not known"),
+    ],
+)
+def test_wrong_options_are_one_line(arguments, capsys, options, said):
+    assert said in line_of(capsys, [*arguments, *options])
+
+
+def replaced(flight, topic, **fields):
+    return dataclasses.replace(flight, **{topic: dataclasses.replace(getattr(flight, topic), **fields)})
+
+
+def test_what_is_wrong_with_a_bag_is_one_line(arguments, tmp_path, flight, capsys):
+    joints, air = flight.actuators, flight.air_data
+    later = Arrival(air.arrival.stamp_ns + 10**12, air.arrival.log_ns, air.arrival.order)
+    cases = {
+        "degrees": (replaced(flight, "actuators", positions=joints.positions * 57.3 + 3), "joint 'elevator' over pi/2"),
+        "joint": (
+            replaced(flight, "actuators", names=("a", "b", *joints.names[2:])),
+            "no joint 'elevator'; they have 'a'",
+        ),
+        "apart": (replaced(flight, "air_data", arrival=later), "header stamps do not overlap"),
+    }
+    for name, (streams, said) in cases.items():
+        write_streams(tmp_path / name, streams)
+        assert said in line_of(capsys, ["replay", str(tmp_path / name), *arguments[2:]])
+        assert not (tmp_path / "out").exists()
+
+
+def test_an_out_that_is_a_file(arguments, tmp_path, capsys):
+    (tmp_path / "out").write_text("mine")
+    assert main([*arguments, "--quiet"]) == 2
+    assert "out" in capsys.readouterr().err
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_settings_from_texts():
+    settings, rate = parse_settings(["window = 12", "publish_rate=5", "detect_changes=false"], "0.1:0.1:1")
+    assert (settings.window, settings.detect_changes, settings.frequencies, rate) == (12.0, False, (0.1, 0.1, 1.0), 5.0)
+    with pytest.raises(InputError):
+        parse_settings(["="])
+
+
+def test_faulty_messages_are_counted_in_the_summary(arguments, tmp_path, flight):
+    values = flight.air_data.values.copy()
+    values[100:103, 0] = np.nan
+    write_streams(tmp_path / "faulty", replaced(flight, "air_data", values=values))
+    assert main(["replay", str(tmp_path / "faulty"), *arguments[2:], "--quiet"]) == 0
+    rejected = json.loads((tmp_path / "out" / "summary.json").read_text())["rejected"]
+    assert rejected["air_data: true_airspeed not measured"] == 3
+
+
+def test_a_real_flight_through_the_two_commands(tmp_path, flights, capsys):
+    """Twin Otter 018, converted and replayed: Cm_alpha as SIDPAC's recursive transform finds it, -1.466 (.018)."""
+    aircraft = {
+        "name": "twin_otter",
+        "mass": 4944.0,
+        "inertia": {"Ixx": 28353.0, "Iyy": 32910.0, "Izz": 52168.0, "Ixz": 1528.0},
+        "geometry": {"S": 39.250, "b": 19.810, "cbar": 1.980},
+        "reference": {"airspeed": 72.0, "air_density": 1.03},
+        "controls": {"elevator": {"joint": "elevator"}, "throttle": {"joint": "throttle", "unit": "newton"}},
+        "derivatives": {f"Cm_{name}": {"value": 0.0} for name in ("0", "alpha", "q", "de")},
+    }
+    (tmp_path / "twin.yaml").write_text(json.dumps(aircraft))
+    bag, out = str(tmp_path / "bag"), tmp_path / "out"
+    assert main(["convert", str(flights / "twin_otter_018.csv"), "--out", bag, "--quiet"]) == 0
+    options = ["--frequencies", "0.1:0.04:1.5", "--set", "settle_time=0", "--quiet"]
+    assert main(["replay", bag, "--aircraft", str(tmp_path / "twin.yaml"), "--out", str(out), *options]) == 0
+    found = json.loads((out / "summary.json").read_text())
+    assert found["samples"] == 401
+    assert found["rejected"] == {}
+    assert found["derivatives"]["Cm_alpha"]["value"] == pytest.approx(-1.466, abs=2 * 0.018)
