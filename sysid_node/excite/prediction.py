@@ -13,7 +13,8 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.information import Information, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
-from sysid_node.sim import Inputs, Simulator, parameters
+from sysid_node.sim import Flight, Inputs, Simulator, parameters
+from sysid_node.sim.autopilot import autopilot_for, fly_held
 from sysid_node.sim.layout import OUTPUTS, Layout, Model
 from sysid_node.sim.rollout import rollout
 from sysid_node.sim.trim import Trim, trim_flight
@@ -32,7 +33,8 @@ _INITIAL = (3, 4, 5, 7, 8, 10, 11, 12)
 class Prediction:
     """A manoeuvre, the flight that it gives, and the information in it.
 
-    ``outputs`` (N, 12), columns ``Simulator.outputs``; ``commands`` (N, controls + 1), rad and N, trim included.
+    ``outputs`` (N, 12), columns ``Simulator.outputs``; ``commands`` (N, controls + 1) as flown, rad and N,
+    trim and autopilot included.
     """
 
     manoeuvre: Manoeuvre
@@ -42,13 +44,20 @@ class Prediction:
 
 
 class Predictor:
-    """Predictions for one aircraft from one trim; programs are compiled once for each length of flight."""
+    """Predictions for one aircraft from one trim; programs are compiled once for each length of flight.
 
-    def __init__(self, aircraft: Aircraft, rate: float = 100.0, airspeed: float | None = None) -> None:
+    With ``autopilot`` the simulator's attitude hold flies along. What it does to the controls is part of the input
+    then: the estimator is taken to know the controls that were flown, not the plan.
+    """
+
+    def __init__(
+        self, aircraft: Aircraft, rate: float = 100.0, airspeed: float | None = None, autopilot: bool = True
+    ) -> None:
         """Raises InputError where the aircraft cannot be simulated, or not trimmed at ``airspeed`` (m/s)."""
         self.aircraft = aircraft
         self.simulator = Simulator(aircraft, rate)
         self.trim: Trim = trim_flight(self.simulator, airspeed)
+        self.autopilot = autopilot_for(self.simulator, self.trim) if autopilot else None
         self.names = tuple(aircraft.derivatives)
         self.values = np.array([derivative.value for derivative in aircraft.derivatives.values()])
         self._columns = np.array([self.simulator.outputs.index(name) for name in MEASURED])
@@ -60,10 +69,12 @@ class Predictor:
             )
 
     def predict(self, manoeuvre: Manoeuvre) -> Prediction:
-        """Fly it open loop from trim. Raises InputError where a control saturates or the flight diverges."""
-        commands = self.commands(manoeuvre)
-        outputs, slopes = self._fly(commands)
-        matrix = fisher(slopes[:, self._columns], self._sigma)
+        """Fly it from trim. Raises InputError where a control saturates or the flight diverges."""
+        flight = self._fly(self.commands(manoeuvre))
+        outputs, commands = np.asarray(flight.outputs), np.asarray(flight.commands)
+        simulator, unknowns = self.simulator, np.zeros(len(self.names) + len(_INITIAL))
+        slopes = _slopes(simulator.layout, simulator.model, unknowns, self.trim.initial, commands, simulator.step)
+        matrix = fisher(np.asarray(slopes)[:, self._columns], self._sigma)
         information = Information(self.names, self.values, eliminate(matrix, len(self.names)))
         return Prediction(manoeuvre, outputs, commands, information)
 
@@ -77,14 +88,11 @@ class Predictor:
         _check_travel(self.aircraft, manoeuvre, commands)
         return commands
 
-    def _fly(self, commands: Array) -> tuple[Array, Array]:
-        """Outputs (N, 12) and their slopes (N, 12, derivatives + initial states)."""
-        simulator = self.simulator
-        flight = simulator.rollout(simulator.neutral(), self.trim.initial, simulator.inputs(commands))
-        outputs = np.asarray(simulator.check(flight).outputs)
-        unknowns = np.zeros(len(self.names) + len(_INITIAL))
-        arguments = (simulator.layout, simulator.model, unknowns, self.trim.initial, commands, simulator.step)
-        return outputs, np.asarray(_slopes(*arguments))
+    def _fly(self, commands: Array) -> Flight:
+        simulator, inputs, theta = self.simulator, self.simulator.inputs(commands), self.simulator.neutral()
+        if self.autopilot is None:
+            return simulator.check(simulator.rollout(theta, self.trim.initial, inputs))
+        return simulator.check(fly_held(simulator, theta, self.trim, inputs, self.autopilot))
 
 
 def outputs_of(
