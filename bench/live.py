@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates  # found once sysid_node.ros is there
@@ -112,12 +113,15 @@ def listen(node, flight: BaseProcess, pid: int) -> tuple[list[float], dict[str, 
 
     node.create_subscription(DerivativeEstimates, "/identifier/derivatives", on_estimates, 100)
     node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
+    executor = EventsExecutor()
+    executor.add_node(node)
     while flight.is_alive():
-        rclpy.spin_once(node, timeout_sec=0.2)
+        executor.spin_once(timeout_sec=0.2)
     share = (processor_seconds(pid) - used) / (time.monotonic() - began)
     end = time.monotonic() + 1.5  # diagnostics come once a second
     while time.monotonic() < end:
-        rclpy.spin_once(node, timeout_sec=0.2)
+        executor.spin_once(timeout_sec=0.2)
+    executor.shutdown()
     return latencies, words, share
 
 
