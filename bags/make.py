@@ -50,7 +50,8 @@ FLIGHTS = {
     ),
     "cdrw_near_stall": (
         "Slow flight, elevator steps into flow separation (Kirchhoff stall with hysteresis); still air.",
-        f"--aircraft cdrw --seed 5 {_SMALL} --duration 60 --airspeed 13 --effect stall_separation:depth=1:alpha_star=0.26 "
+        f"--aircraft cdrw --seed 5 {_SMALL} --duration 60 --airspeed 13 "
+        "--effect stall_separation:depth=1:alpha_star=0.26 "
         "--manoeuvre 3211:elevator:amplitude=0.1:width=0.4:start=2:every=10:repeat=5 "
         "--manoeuvre doublet:aileron:amplitude=0.06:width=0.4:start=6:every=10:repeat=5 "
         "--manoeuvre doublet:rudder:amplitude=0.1:width=0.4:start=8:every=10:repeat=5",

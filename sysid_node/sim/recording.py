@@ -95,7 +95,7 @@ class Recorder:
 
 
 def _grid(sortie: Sortie) -> Array:
-    return np.arange(len(sortie.flight.outputs)) * sortie.simulator.step
+    return np.arange(len(sortie.flight.outputs), dtype=float) * np.float64(sortie.simulator.step)
 
 
 def _noise(sortie: Sortie) -> Array:
@@ -118,8 +118,8 @@ def _joints(aircraft: Aircraft, controls: Array) -> tuple[tuple[str, ...], Array
     names = tuple(dict.fromkeys(joint for control in surfaces for joint in control.joints))
     scales = np.array([[control.joints.get(name, 0.0) for name in names] for control in surfaces])
     offsets = np.array([control.offset for control in surfaces])
-    positions = (controls[:, :-1] - offsets) @ np.linalg.pinv(scales).T
+    positions: Array = np.asarray((controls[:, :-1] - offsets) @ np.linalg.pinv(scales).T, dtype=float)
     if aircraft.throttle is None:
         return names, positions
-    lever = controls[:, -1:] / (aircraft.throttle.max_thrust or 1.0)
-    return (*names, aircraft.throttle.joint), np.hstack([positions, lever])
+    lever = controls[:, -1] / (aircraft.throttle.max_thrust or 1.0)
+    return (*names, aircraft.throttle.joint), np.column_stack([positions, lever])

@@ -63,7 +63,7 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: Conditions 
     conditions = conditions or Conditions()
     effects = _all_effects(conditions)
     theta = simulator.vector(effects)
-    trim = trim_flight(simulator, conditions.airspeed, _calm(simulator, theta))
+    trim = trim_flight(simulator, conditions.airspeed, theta)
     commands = trim.command + deflections
     _check_travel(simulator, commands)
     inputs = _inputs(simulator, trim, commands, conditions)
@@ -85,21 +85,6 @@ def _all_effects(conditions: Conditions) -> dict[str, dict[str, float]]:
         if value and name not in effects:
             effects[name] = {key: value}
     return effects
-
-
-def _calm(simulator: Simulator, theta: Array) -> Array:
-    """The same aircraft in the weather and with the instruments that a trim does not know of."""
-    calm = theta.copy()
-    for i, (name, (effect, parameter)) in enumerate(zip(simulator.names, simulator.parameters, strict=True)):
-        if effect == "gust" or name.endswith(".onset"):
-            calm[i] = (
-                1e9
-                if name.endswith(".onset") and theta[i] > 0.0
-                else parameter.neutral
-                if effect == "gust"
-                else theta[i]
-            )
-    return calm
 
 
 def _check_travel(simulator: Simulator, commands: Array) -> None:
