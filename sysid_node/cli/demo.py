@@ -22,6 +22,7 @@ from sysid_node.cli.live_table import Moment, Reference, live_table
 from sysid_node.errors import InputError
 from sysid_node.flight.align import why_nothing_aligned
 from sysid_node.flight.bag import read_streams
+from sysid_node.flight.streams import Streams
 from sysid_node.flight.topics import INPUT_TOPICS
 from sysid_node.flight.truth import read_truth
 from sysid_node.online.alignment import Aligned, align_streams
@@ -38,6 +39,12 @@ if TYPE_CHECKING:
 PUBLISH_RATE = 10.0  # Hz
 AFTERWARDS = 0.2  # s to listen after the flight's end, before its estimates are called stale
 DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics says how it went in all
+#: A played bag comes faster than a flight does; nothing of it may be lost to a busy processor.
+RELIABLE = [
+    f"qos_overrides./{topic}.subscription.{policy}"
+    for topic in INPUT_TOPICS
+    for policy in ("reliability:=reliable", "depth:=5000")
+]
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,7 @@ class Flight:
 
     bag: Path
     aircraft: Aircraft
+    streams: Streams
     aligned: Aligned
     truth: dict[str, float]  # empty where it is not known
 
@@ -81,19 +89,22 @@ def run(args: argparse.Namespace) -> None:
     # A domain of its own: neither hears nor disturbs other ROS programs, here or on the network.
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    history, rejected = _fly(flight, args.aircraft, args.rate, args.out)
+    follower, history = _fly(flight, args.aircraft, args.rate, args.out)
     result = replay_result(
         flight.aircraft,
         Settings(),
         time=flight.aligned.time,
         samples=flight.aligned.samples,
         history=history,
-        rejected=rejected,
+        rejected=_rejected(follower),
         truth=flight.truth,
         title=f"{flight.bag.name}, identified live",
     )
     write_run(args.out, result)
     print(_summary(flight, history[-1], args.out))
+    lost = _lost(flight, follower)
+    if lost:
+        print(f"{lost} messages were lost on the way; a lower --rate loses fewer")
 
 
 def _read(bag: Path, aircraft: Aircraft) -> Flight:
@@ -101,13 +112,13 @@ def _read(bag: Path, aircraft: Aircraft) -> Flight:
     aligned = align_streams(aircraft, streams, Settings().max_gap)
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
-    return Flight(bag, aircraft, aligned, read_truth(bag))
+    return Flight(bag, aircraft, streams, aligned, read_truth(bag))
 
 
-def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[list[Estimates], dict[str, int]]:
+def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[Follower, list[Estimates]]:
     """Run player and identifier in processes of their own, and show what comes until the flight is over.
 
-    Returns the estimates over time, and the messages left out by reason.
+    Returns who listened, and the estimates over time.
     """
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
 
@@ -117,6 +128,7 @@ def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[list[Es
     follower = Follower(flight.start_ns)
     try:
         identifier = ["--ros-args", "-p", f"aircraft:={aircraft}", "-p", f"publish_rate:={PUBLISH_RATE}"]
+        identifier += [word for override in RELIABLE for word in ("-p", override)]
         player = [str(flight.bag), "--rate", str(rate), "--wait", "20"]
         with _node("identifier", identifier, out) as identifying, _node("player", player, out) as playing:
             _watch(flight, follower, identifying, playing)
@@ -127,7 +139,7 @@ def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[list[Es
         rclpy.try_shutdown()
     if not history:
         raise RuntimeError(f"no estimate came; {out / 'identifier.log'} may say why")
-    return history, _rejected(follower)
+    return follower, history
 
 
 @contextlib.contextmanager
@@ -177,6 +189,12 @@ def _rejected(follower: Follower) -> dict[str, int]:
     values = follower.words["input"].values if "input" in follower.words else ()
     prefix = "rejected, "
     return {pair.key.removeprefix(prefix): int(pair.value) for pair in values if pair.key.startswith(prefix)}
+
+
+def _lost(flight: Flight, follower: Follower) -> int:
+    """Messages that the player sent and the identifier did not receive."""
+    sent = sum(len(stream.arrival) for stream in flight.streams.by_topic.values())
+    return sent - sum(int(follower.word("input", f"{topic}: received") or 0) for topic in INPUT_TOPICS)
 
 
 def _summary(flight: Flight, final: Estimates, out: Path) -> str:

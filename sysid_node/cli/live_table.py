@@ -57,9 +57,8 @@ def _headline(moment: Moment) -> RenderableType:
         ProgressBar(total=moment.duration, completed=min(moment.seconds, moment.duration), width=24),
         f"{moment.seconds:5.1f} of {moment.duration:.0f} s",
         Text(f"{valid} valid", style="green" if valid else "dim"),
-        Text(moment.remark, style="dim"),
     )
-    return line
+    return Group(line, Text(moment.remark, style="dim"))
 
 
 def _table(names: Sequence[str], known: Mapping[str, DerivativeEstimate], reference: Reference) -> Table:
