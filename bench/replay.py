@@ -61,7 +61,7 @@ def linear_flight(aircraft: Aircraft, seconds: float, rate: float = 200.0) -> tu
     rng = np.random.default_rng(3)
     lowpass = butter(2, 2.0, fs=rate, output="sos")
     controls = 0.3 * sosfilt(lowpass, rng.normal(size=(count, 3)), axis=0)
-    step = cont2discrete((A, B, np.eye(5), np.zeros((5, 3))), 1.0 / rate)
+    step = cont2discrete((A, B, np.eye(5), np.zeros((5, 3))), 1.0 / rate, method="foh")
     states = dlsim((*step[:4], 1.0 / rate), controls)[1]
     return np.hstack([states, states @ A.T + controls @ B.T]), controls
 
@@ -73,16 +73,14 @@ def make_streams(aircraft: Aircraft, seconds: float) -> Streams:
     alpha, q, beta, p, r, alphadot, _, betadot, *_ = motion.T
     V, noise = aircraft.reference.airspeed, aircraft.noise
     at = np.arange(alpha.size) * 5_000_000 + 1_000_000_000
-    slow = slice(None, None, 2)
-    imu_at, air_at, joint_at = (
-        t + rng.integers(-200_000, 200_000, t.size) for t in (at, at[slow], at[slow] + 3_000_000)
-    )
+    slow, odd = slice(None, None, 2), slice(1, None, 2)
+    imu_at, air_at, joint_at = (t + rng.integers(-200_000, 200_000, t.size) for t in (at, at[slow], at[odd]))
     force = np.column_stack([np.full(at.size, 0.3), V * (betadot + r), V * (alphadot - q) - GRAVITY])
     values = np.column_stack([force, p, q, r])
     values += rng.normal(size=values.shape) * np.repeat([noise["accel"], noise["gyro"]], 3)
     angles = np.column_stack([alpha, beta])[slow] + rng.normal(size=(air_at.size, 2)) * noise["alpha"]
     speed, density = V + noise["airspeed"] * rng.normal(size=air_at.size), np.full(air_at.size, 1.2)
-    joints = {name: controls[slow, i] for i, name in enumerate(("elevator", "aileron", "rudder"))}
+    joints = {name: controls[odd, i] for i, name in enumerate(("elevator", "aileron", "rudder"))}
     joints["throttle"] = np.full(air_at.size, 0.2)
     imu, air, actuators = arrivals_in_stamp_order(imu_at, air_at, joint_at)
     return Streams(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import chain
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def _template(store: Typestore, estimates: Estimates, aircraft: str, method: str
 
 def _columns(field: str, names: Sequence[str], rows: Sequence[Iterable[Any]]) -> dict[str, Any]:
     """Columns of a sequence of parts: ``derivatives.3.value`` -> (n,), of n messages with equally many parts."""
-    flat = [[getattr(part, name) for name in names] for part in chain.from_iterable(rows)]
+    flat = list(map(attrgetter(*names), chain.from_iterable(rows)))
     if not flat:
         return {}
     table = np.array(flat, np.float64).reshape(len(rows), -1, len(names))
