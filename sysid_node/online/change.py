@@ -29,6 +29,7 @@ FALSE_ALARM = 1e-12  # a test, of some 7200 pieces an hour, times six coefficien
 EXPLAINED = 0.6  # share of the misfit that changed derivatives must explain
 MISFIT = 0.05  # share of the motion's energy that the misfit must reach to matter
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
+KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
 
 
@@ -79,7 +80,8 @@ def examine(plan: Plan, watch: Watch, omega: Array, now: float) -> Finding:
         for c in range(len(plan.coefficients)):
             score, unexplained = _test(plan, reference, window, c)
             if score > max(best, 1.0):
-                best, since = score, start
+                # the change fell somewhere in the oldest piece: what came after it is all new
+                best, since = score, watch.pieces[1 - span][0]
             if span == SPANS[2] and unexplained:
                 lost[c] = True
     return Finding(since, lost)
@@ -90,7 +92,7 @@ def _test(plan: Plan, reference: Reference, window: Information, c: int) -> tupl
     mine, y = plan.unknowns(c), plan.outputs[c]
     J = plan.columns[mine]
     density = float(reference.uncertainty.density[c])
-    if density <= 0.0:
+    if reference.uncertainty.freedom[c] < KNOWN:
         return 0.0, False
     gram, scores = window.grams.sum(axis=0), window.scores.sum(axis=0)
     v = np.zeros(gram.shape[0])

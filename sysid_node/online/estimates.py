@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from sysid_node.online import regression, signals, transform
 from sysid_node.online.estimator import Renewed, State
-from sysid_node.online.information import inverse2
+from sysid_node.online.information import about_mean, inverse2
 from sysid_node.online.regression import Solution, student_95
-from sysid_node.online.signals import OUTPUTS
+from sysid_node.online.signals import OFFSET
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apar
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
-_NUISANCES = slice(OUTPUTS, OUTPUTS + 2)
+_NUISANCES = slice(OFFSET + 1, OFFSET + 3)
 
 
 @dataclass
@@ -45,15 +45,14 @@ def present(state: State) -> Present | None:
         return None
     fading = math.exp((state.segment_start - state.transform.last) / (2.0 * state.model.memory))
     part = transform.current(state.transform) - state.segment * fading
-    lines = part[:-1]
+    lines = about_mean(part)
     gram = lines.T @ lines
     border = gram[:, _NUISANCES]
     gram -= border @ inverse2(border[_NUISANCES]) @ border.T
     gram += renewed.base
     energy = renewed.total.energy
     growth = (energy + max(state.transform.last - state.piece_start, 0.0)) / energy if energy > 0.0 else 1.0
-    gram -= renewed.compensation * growth
-    solution = regression.solve(state.model.plan, gram)
+    solution = regression.solve(state.model.plan, gram, renewed.compensation * growth)
     variance = solution.inverse.diagonal()[:, None] * solution.residual * (renewed.factors / growth)
     return Present(solution, np.sqrt(np.maximum(variance, 0.0)), gram, part[-1])
 
@@ -110,7 +109,7 @@ def _offset(state: State, current: Present, c: int, regressor: str) -> tuple[flo
     mine = plan.unknowns(c)
     past = renewed.total.integrals - (state.present.integrals if state.present is not None else 0.0)
     integrals = past + current.integrals
-    weight = float(integrals[OUTPUTS])
+    weight = float(integrals[OFFSET])
     if not weight > 0.0:
         return math.nan, math.inf
     x = integrals[plan.columns[mine]] / weight
@@ -178,5 +177,5 @@ def _size(state: State, name: str, c: int, regressor: str, current: Present) -> 
 
 def _buried(current: Present, renewed: Renewed, column: int) -> bool:
     """Whether the regressor's motion is no larger than its sensor's noise."""
-    motion = float(current.gram[column, column] + renewed.compensation[column, column])
+    motion = float(current.gram[column, column])
     return motion < 3.0 * max(float(renewed.total.bias[column, column]), 1e-12)

@@ -145,12 +145,17 @@ def _completed(state: State, sample: Sequence[float]) -> Sequence[float]:
     if not math.isfinite(filled[THRUST]):
         filled[THRUST] = 0.0
         state.thrust_known = False
-    names = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols)
-    for name, value in zip(names, filled, strict=True):
+    for column, value in enumerate(filled):
         if not math.isfinite(value):
-            state.incomplete[name] = state.incomplete.get(name, 0) + 1
+            leave_out(state, column)
             return ()
     return filled
+
+
+def leave_out(state: State, column: int) -> None:
+    """Count a sample that lacks the value of a column."""
+    name = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols)[column]
+    state.incomplete[name] = state.incomplete.get(name, 0) + 1
 
 
 def add_momentum(matrix, step, before, after, mean):  # type: ignore[no-untyped-def]
@@ -250,7 +255,7 @@ def _solve_all(state: State) -> None:
     spread = regression.uncertainty(plan, plain, total)
     line_seconds = max((state.transform.grid.count - 1) * total.energy, 1e-9)
     compensation = noise.capped(plan, plain, spread.density, total.bias, line_seconds)
-    solution = regression.solve(plan, gram - compensation)
+    solution = regression.solve(plan, gram, compensation)
     if not solution.usable:
         solution, compensation = plain, np.zeros_like(compensation)
     spread = regression.uncertainty(plan, solution, total)
@@ -286,6 +291,7 @@ def _look_for_changes(state: State, lines: Array) -> None:
 
 def _finish_segment(state: State) -> None:
     """Put the present segment to the finished ones."""
-    if state.present is not None and state.present.samples:
+    if state.present is not None and state.renewed is not None:
         state.past.append((state.transform.last, state.present))
+        state.renewed.base = state.renewed.base + state.present.grams.sum(axis=0)
     state.present = None

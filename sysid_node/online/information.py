@@ -1,7 +1,8 @@
 """What a stretch of flight says: Gram matrices of the transformed signals, and how its noise is correlated.
 
-A record is taken in segments no longer than one period of the line spacing. Within a segment the offset and a
-straight drift are projected out of every signal (trim, slow drift and transients leak into all lines otherwise);
+A record is taken in segments no longer than one period of the line spacing. Within a segment every
+signal is taken about its mean, z - k mean(z) / mean(k), which removes the offset k C_0 exactly, and a constant and a straight
+drift are projected out (trim, slow drift and transients leak into all lines otherwise);
 then the Gram matrices of the segments add up: least squares on their sum is sequential over segments and uses all
 that the record holds in the band. On one long transform a coarse grid would skip what lies between its lines, and a
 fine one would count the same information twice.
@@ -23,10 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.signals import OUTPUTS
+from sysid_node.online.signals import OFFSET, OUTPUTS
 
 Array = NDArray[np.float64]
-_N = slice(OUTPUTS, OUTPUTS + 2)  # columns of the nuisances
+_N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
 BANDS = 4
 
 
@@ -63,8 +64,18 @@ def band_edges(lines: int) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
 
 
+def about_mean(transform: Array) -> Array:
+    """(2F, W) lines of a transform (2F + 1, W) whose signals are taken about their means; nuisances are kept.
+
+    The noise of the airspeed is in k: fitting the offset to the lines of k would be a regression on noise. The means know better.
+    """
+    share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
+    share[OFFSET : OFFSET + 3] = 0.0
+    return transform[:-1] - transform[:-1, OFFSET, None] * share
+
+
 def project(lines: Array) -> Array:
-    """(2F, W) with the nuisances' columns projected out of the others; the nuisances themselves are kept."""
+    """(2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
     n = lines[:, _N]
     gram = n.T @ n
     clean = lines - n @ (inverse2(gram) @ (n.T @ lines))
@@ -111,7 +122,7 @@ def window_energy(duration: float, memory: float) -> float:
 def measure(transform: Array, omega: Array, begin: float, end: float, memory: float) -> Information:
     """What the transform (2F + 1, W) of begin..end (s) says; ``bias`` and ``samples`` are left at zero."""
     F = omega.size
-    clean = project(transform[:-1])
+    clean = project(about_mean(transform))
     covariance = noise_covariance(omega, begin, end, memory)
     spread = covariance @ clean
     n = clean[:, _N]

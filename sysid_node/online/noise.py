@@ -8,7 +8,7 @@ noise of that size must show in them too.
 
 To first order: noise n on the angle of attack adds k n to its regressor, -drag n to lift and lift n to drag; noise
 on sideslip adds k n to its regressor; noise on a rate adds to its regressor (and, a quarter period apart, to the moment: nothing).
-Noise on airspeed scales offset and regressor alike and leaves with the projection of the offset.
+Noise on airspeed scales a signal and the k that carries its mean alike, and leaves with the mean.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from sysid_node.online.regression import Plan, Solution
 from sysid_node.online.signals import Layout
 
 Array = NDArray[np.float64]
+DOUBT = 1.5  # a residual's density is itself uncertain: only beyond this does it contradict the aircraft file
 
 
 def gram_bias(aircraft: Aircraft, layout: Layout, mean: Array, step: float, air_interval: float) -> Array:
@@ -61,7 +62,7 @@ def capped(plan: Plan, solution: Solution, density: Array, bias: Array, line_sec
         members = np.append(plan.columns[mine], plan.outputs[c])
         v = np.append(-solution.theta[mine, c], 1.0)
         noise = float(v @ bias[np.ix_(members, members)] @ v) / line_seconds
-        if noise > density[c]:
+        if noise > DOUBT * density[c]:
             share[members] = np.minimum(share[members], density[c] / noise)
     root = np.sqrt(share)
     return bias * root[:, None] * root

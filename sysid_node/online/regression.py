@@ -22,6 +22,8 @@ Index = NDArray[np.intp]
 
 #: Weight of the mean density, in degrees of freedom, when the residual's density in one band is estimated.
 BAND_PRIOR = 20.0
+#: Energy under which a regressor has not moved at all.
+TINY = 1e-18
 
 
 @dataclass(frozen=True)
@@ -80,24 +82,29 @@ class Solution:
     usable: bool
 
 
-def solve(plan: Plan, gram: Array) -> Solution:
-    """Solve the normal equations of a summed Gram matrix (W, W)."""
+def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
+    """Solve the normal equations of a summed Gram matrix (W, W), less what noise adds to it on the average, ``bias``."""
     P = plan.columns.size
     normal = gram.take(plan.normal) * plan.same
     right = gram.take(plan.right) * plan.mine
-    scale = normal.diagonal().copy()
-    usable = bool((scale > 0.0).all())
-    if usable:
-        scale **= -0.5
-        normal *= scale[:, None] * scale
-        _, solved, fault = dposv(normal, np.hstack([np.diag(scale), right * scale[:, None]]))
-        usable = fault == 0
-    if not usable:
-        return Solution(np.zeros_like(right), np.full((P, P), np.inf), gram.take(plan.square), False)
+    squares = gram.take(plan.square)
+    if bias is None:
+        matrix, sides = normal, right
+    else:
+        matrix = normal - bias.take(plan.normal) * plan.same
+        sides = right - bias.take(plan.right) * plan.mine
+    scale = matrix.diagonal()
+    if not (scale > TINY).all():
+        return Solution(np.zeros_like(right), np.zeros((P, P)), squares, False)
+    scale = scale**-0.5
+    _, solved, fault = dposv(matrix * scale[:, None] * scale, np.hstack([np.diag(scale), sides * scale[:, None]]))
+    if fault:
+        return Solution(np.zeros_like(right), np.zeros((P, P)), squares, False)
     solved *= scale[:, None]
     theta = solved[:, P:]
-    residual = gram.take(plan.square) - np.einsum("pc,pc->c", theta, right)
-    return Solution(theta, solved[:, :P], residual, bool((residual > 0.0).all()))
+    # |y - A theta|^2, with the noise in it
+    residual = squares + ((normal @ theta - 2.0 * right) * theta).sum(axis=0)
+    return Solution(theta, solved[:, :P], np.maximum(residual, 0.0), True)
 
 
 @dataclass
@@ -114,7 +121,8 @@ def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertaint
     """Sandwich covariance with the residual's spectral density estimated in each band."""
     C, P = len(plan.coefficients), plan.columns.size
     result = Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
-    total = float(info.traces.sum())
+    if not solution.usable:
+        return result
     for c in range(C):
         mine = plan.unknowns(c)
         columns = plan.columns[mine]

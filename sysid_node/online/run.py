@@ -13,7 +13,7 @@ from sysid_node.online import estimator, signals, transform
 from sysid_node.online.estimates import estimate
 from sysid_node.online.estimator import State
 from sysid_node.online.settings import Settings
-from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
+from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
 CHUNK = 4096  # samples whose weights are held at once
@@ -39,11 +39,11 @@ def run(
         stops = due[(due >= begin) & (due < end)] - begin
         chunk = _prepare(state, time[begin:end], samples[begin:end])
         done = 0
-        for stop in chunk.kept[stops].tolist():
+        for stop in (stops + 1).tolist():
             _advance(state, chunk, done, stop)
             results.append(estimate(state))
             done = stop
-        _advance(state, chunk, done, chunk.time.size)
+        _advance(state, chunk, done, end - begin)
         if progress is not None:
             progress(float(time[end - 1]))
     return results
@@ -53,7 +53,8 @@ def run(
 class _Chunk:
     """Consecutive usable samples (n,), each with the interval that ends in it. Times in s."""
 
-    kept: NDArray[np.intp]  # (N,) usable samples up to and including each given one
+    kept: NDArray[np.intp]  # (N + 1,) usable samples among the first of those given
+    missing: NDArray[np.intp]  # (N,) column that a sample lacks, -1 where it is usable or too early to count
     time: Array  # (n,)
     begins: Array  # (n,) start of the interval; NaN where none leads to the sample
     means: Array  # (n, W)
@@ -65,15 +66,15 @@ class _Chunk:
 
 def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     """What ``update`` computes of each sample by itself, for many."""
-    usable = _usable(state, time, samples)
-    kept = np.cumsum(usable)
+    usable, missing = _usable(state, time, samples)
+    kept = np.concatenate([[0], np.cumsum(usable)])
     time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]
     thrust = estimator.THRUST
     columns[thrust] = np.where(np.isfinite(columns[thrust]), columns[thrust], 0.0)
     grid = state.transform.grid
     if not time.size:
         empty = np.empty((0, state.model.layout.width))
-        return _Chunk(kept, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous)
+        return _Chunk(kept, missing, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -93,11 +94,11 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     transform.weights(grid, (begins + 0.5 * steps)[:, None], steps[:, None], kernels)
     kernels[:, 0, -1] = steps
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
-    return _Chunk(kept, time, begins, means, halves, kernels, columns[estimator.INTERVAL], last)
+    return _Chunk(kept, missing, time, begins, means, halves, kernels, columns[estimator.INTERVAL], last)
 
 
-def _usable(state: State, time: Array, samples: Array) -> NDArray[np.bool_]:
-    """(N,) which samples ``update`` takes in; those that lack a value are counted as it counts them."""
+def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """(N,) which samples ``update`` takes in, and which column the others lack."""
     if np.isnan(state.begin) and time.size:
         state.begin = float(time[0]) + state.model.settings.settle_time
     finite = np.isfinite(samples)
@@ -106,15 +107,18 @@ def _usable(state: State, time: Array, samples: Array) -> NDArray[np.bool_]:
         state.thrust_known = False
     finite[:, estimator.THRUST] = True
     complete = finite.all(axis=1)
-    names = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols)
-    missing, counts = np.unique(np.argmin(finite[late & ~complete], axis=1), return_counts=True)
-    for column, count in zip(missing.tolist(), counts.tolist(), strict=True):
-        state.incomplete[names[column]] = state.incomplete.get(names[column], 0) + count
-    return late & complete
+    return late & complete, np.where(late & ~complete, np.argmin(finite, axis=1), -1)
 
 
-def _advance(state: State, chunk: _Chunk, begin: int, end: int) -> None:
-    """Take in the chunk's samples begin..end (exclusive)."""
+def _advance(state: State, chunk: _Chunk, first: int, stop: int) -> None:
+    """Take in the given samples first..stop (exclusive)."""
+    for column in chunk.missing[first:stop][chunk.missing[first:stop] >= 0].tolist():
+        estimator.leave_out(state, column)
+    _integrate(state, chunk, int(chunk.kept[first]), int(chunk.kept[stop]))
+
+
+def _integrate(state: State, chunk: _Chunk, begin: int, end: int) -> None:
+    """Take in the usable samples begin..end (exclusive)."""
     while begin < end:
         if np.isnan(chunk.begins[begin]):
             estimator.interrupt(state, float(chunk.time[begin]))

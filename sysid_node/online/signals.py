@@ -27,14 +27,15 @@ from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
 
-#: The nuisances of every segment: the offset (times k) and a slow drift.
-NUISANCES = ("0", "t")
+#: What is taken out of every segment: the offset's regressor k, a constant and a slow drift.
+NUISANCES = ("0", "1", "t")
 OUTPUTS = len(COEFFICIENTS)
+OFFSET = OUTPUTS + NUISANCES.index("0")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which column of the signal vector is what: six coefficients, two nuisances, then the regressors."""
+    """Which column of the signal vector is what: six coefficients, three nuisances, then the regressors."""
 
     regressors: tuple[str, ...]
 
@@ -60,11 +61,11 @@ def layout(aircraft: Aircraft) -> Layout:
 
 
 def scalar_signals(aircraft: Aircraft) -> Callable[[Sequence[float]], tuple[list[float], list[float]]]:
-    """Function from one sample to (signals without drift, accelerations per rate of change of p, q, r).
+    """Function from one sample to (signals without the drift, [cos alpha, sin alpha]).
 
     The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
     """
-    return _signals(aircraft, math.cos, math.sin)
+    return _signals(aircraft, math.cos, math.sin, lambda _: 1.0)
 
 
 def array_signals(aircraft: Aircraft) -> Callable[[Sequence[Array]], tuple[list[Array], list[Array]]]:
@@ -73,10 +74,10 @@ def array_signals(aircraft: Aircraft) -> Callable[[Sequence[Array]], tuple[list[
     def mapped(function: Callable[[float], float]) -> Callable[[Array], Array]:
         return lambda x: np.fromiter(map(function, x.tolist()), np.float64, x.size)
 
-    return _signals(aircraft, mapped(math.cos), mapped(math.sin))
+    return _signals(aircraft, mapped(math.cos), mapped(math.sin), np.ones_like)
 
 
-def _signals(aircraft: Aircraft, cos, sin):  # type: ignore[no-untyped-def]
+def _signals(aircraft: Aircraft, cos, sin, one):  # type: ignore[no-untyped-def]
     """Build the signal function over scalars or arrays; see ``scalar_signals``."""
     m, S, b, c = aircraft.mass, aircraft.geometry.S, aircraft.geometry.b, aircraft.geometry.cbar
     rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
@@ -112,9 +113,9 @@ def _signals(aircraft: Aircraft, cos, sin):  # type: ignore[no-untyped-def]
         known = {"alpha": k * alpha, "beta": k * beta, "p": p * b * half, "q": q * c * half, "r": r * b * half}
         known["V"] = k * V / V0
         known["k"] = lift * lift / k
-        row = [lift, drag, FY, L, M, N, k]
+        row = [lift, drag, FY, L, M, N, k, one(k)]
         row.extend(known[n] if n in known else k * sample[controls[n]] for n in names)
-        # per unit of dp/dt, dq/dt, dr/dt: (ca, sa) carry the tangential acceleration into lift and drag
+        # the angles carry the tangential acceleration of the lever arm into lift and drag
         return row, [ca, sa]
 
     return signals
