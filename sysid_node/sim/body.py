@@ -121,18 +121,25 @@ def euler_angles(attitude: tuple[Scalar, ...]) -> Vector:
     )
 
 
+def angular_momentum(body: MassProperties, rates: Vector) -> Vector:
+    """Of a body symmetric about its x-z plane, about the CG, N m s (or, of an acceleration, N m)."""
+    return Vector(body.Ixx * rates.x - body.Ixz * rates.z, body.Iyy * rates.y, body.Izz * rates.z - body.Ixz * rates.x)
+
+
 def angular_acceleration(body: MassProperties, rates: Vector, moment: Vector) -> Vector:
-    """Euler's equation for a body symmetric about its x-z plane, rad/s^2; moment about the CG, N m."""
-    momentum = Vector(
-        body.Ixx * rates.x - body.Ixz * rates.z, body.Iyy * rates.y, body.Izz * rates.z - body.Ixz * rates.x
-    )
-    rest = moment.minus(rates.cross(momentum))
+    """Euler's equation, rad/s^2; moment about the CG, N m."""
+    rest = moment.minus(rates.cross(angular_momentum(body, rates)))
     determinant = body.Ixx * body.Izz - body.Ixz * body.Ixz
     return Vector(
         (body.Izz * rest.x + body.Ixz * rest.z) / determinant,
         rest.y / body.Iyy,
         (body.Ixz * rest.x + body.Ixx * rest.z) / determinant,
     )
+
+
+def moment_for(body: MassProperties, rates: Vector, acceleration: Vector) -> Vector:
+    """Euler's equation turned round: the moment about the CG (N m) behind an angular acceleration (rad/s^2)."""
+    return angular_momentum(body, acceleration).plus(rates.cross(angular_momentum(body, rates)))
 
 
 def attitude_rate(attitude: tuple[Scalar, ...], rates: Vector) -> tuple[Scalar, Scalar, Scalar, Scalar]:

@@ -19,3 +19,8 @@ EFFECT = Effect(
 def advance(values: Values, y: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:
     """The reading one step (s) on."""
     return first_order(values["time_constant"], y, truth0, truth1, step)
+
+
+def undo(values: Values, y: Scalar, rate: Scalar) -> Scalar:
+    """The truth behind a reading, from it and its rate."""
+    return y + values["time_constant"] * rate

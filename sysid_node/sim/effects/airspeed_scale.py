@@ -18,3 +18,8 @@ EFFECT = Effect(
 def apply(values: Values, airspeed: Scalar) -> Scalar:
     """Airspeed, m/s."""
     return airspeed * (1.0 + values["error"])
+
+
+def undo(values: Values, airspeed: Scalar) -> Scalar:
+    """The airspeed (m/s) behind the reading."""
+    return airspeed / (1.0 + values["error"])

@@ -27,3 +27,8 @@ def accelerometers(values: Values, reading: Vector) -> Vector:
 def gyroscopes(values: Values, reading: Vector) -> Vector:
     """Angular rates, rad/s."""
     return reading.plus(Vector(values["p"], values["q"], values["r"]))
+
+
+def true_rates(values: Values, reading: Vector) -> Vector:
+    """The rates (rad/s) behind the gyroscopes' readings."""
+    return reading.minus(Vector(values["p"], values["q"], values["r"]))

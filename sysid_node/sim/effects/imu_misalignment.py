@@ -25,3 +25,12 @@ def apply(values: Values, reading: Vector) -> Vector:
     """What the turned instrument reads of a body-axes vector."""
     rotation = Vector(values["roll"], values["pitch"], values["yaw"])
     return reading.minus(rotation.cross(reading))
+
+
+def undo(values: Values, reading: Vector) -> Vector:
+    """The body-axes vector behind the reading: (I - e x)^-1 in closed form."""
+    rotation = Vector(values["roll"], values["pitch"], values["yaw"])
+    x, y, z = rotation
+    along = x * reading.x + y * reading.y + z * reading.z
+    size = x * x + y * y + z * z
+    return reading.plus(rotation.cross(reading)).plus(rotation.times(along)).times(1.0 / (1.0 + size))

@@ -27,3 +27,8 @@ def accelerometers(values: Values, reading: Vector) -> Vector:
 def gyroscopes(values: Values, reading: Vector) -> Vector:
     """Angular rates, rad/s."""
     return Vector(*(reading[i] * (1.0 + values[n]) for i, n in enumerate(("p", "q", "r"))))
+
+
+def true_rates(values: Values, reading: Vector) -> Vector:
+    """The rates (rad/s) behind the gyroscopes' readings."""
+    return Vector(*(reading[i] / (1.0 + values[n]) for i, n in enumerate(("p", "q", "r"))))

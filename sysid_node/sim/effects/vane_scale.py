@@ -21,3 +21,8 @@ EFFECT = Effect(
 def apply(values: Values, alpha: Scalar, beta: Scalar) -> tuple[Scalar, Scalar]:
     """Flow angles, rad."""
     return alpha * (1.0 + values["alpha"]), beta * (1.0 + values["beta"])
+
+
+def undo(values: Values, alpha: Scalar, beta: Scalar) -> tuple[Scalar, Scalar]:
+    """The flow angles (rad) behind the readings."""
+    return alpha / (1.0 + values["alpha"]), beta / (1.0 + values["beta"])

@@ -56,7 +56,7 @@ def positions(layout: Layout, effects: dict[str, Values], state: ActuatorState, 
     """Where each surface stands, rad."""
     surfaces = []
     for i, control in enumerate(layout.controls):
-        x = actuator_bias.apply(effects["actuator_bias"], control, state.position[i])
+        x = actuator_bias.apply(effects["actuator_bias"], control, state.position[..., i])
         surfaces.append(stuck_surface.apply(effects["stuck_surface"], control, x, time))
     return surfaces
 

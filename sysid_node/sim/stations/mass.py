@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import jax.numpy as jnp
+
 from sysid_node.sim.body import MassProperties, Vector, angular_acceleration
 from sysid_node.sim.effects import cg_shift, inertia_error, mass_error
 from sysid_node.sim.layout import Model, Values
@@ -14,6 +16,12 @@ def properties(model: Model, effects: dict[str, Values]) -> MassProperties:
         cg_shift.shift(effects["cg_shift"]),
         *inertia_error.apply(effects["inertia_error"], model.inertia),
     )
+
+
+def nominal(model: Model) -> MassProperties:
+    """Mass, CG and inertia as the file has them."""
+    zero = jnp.zeros_like(model.mass)
+    return MassProperties(model.mass, Vector(zero, zero, zero), *model.inertia)
 
 
 def accelerations(body: MassProperties, rates: Vector, force: Vector, moment: Vector) -> tuple[Vector, Vector]:

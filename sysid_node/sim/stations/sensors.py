@@ -46,6 +46,18 @@ def gyroscopes(effects: dict[str, Values], rates: Vector) -> Vector:
     return imu_bias.gyroscopes(effects["imu_bias"], imu_scale.gyroscopes(effects["imu_scale"], turned))
 
 
+def turned_by(effects: dict[str, Values], acceleration: Vector) -> Vector:
+    """How fast the gyroscopes' readings change (rad/s^2) as the body's angular acceleration has it."""
+    turned = imu_misalignment.apply(effects["imu_misalignment"], acceleration)
+    return imu_scale.gyroscopes(effects["imu_scale"], turned)
+
+
+def rates_from(effects: dict[str, Values], reading: Vector) -> Vector:
+    """The body's rates (rad/s) behind the gyroscopes' readings."""
+    scaled = imu_scale.true_rates(effects["imu_scale"], imu_bias.true_rates(effects["imu_bias"], reading))
+    return imu_misalignment.undo(effects["imu_misalignment"], scaled)
+
+
 def at_probe(velocity: Vector, rates: Vector, arm: Vector) -> tuple[Scalar, Scalar, Scalar]:
     """Airspeed (m/s), alpha, beta (rad) where the probe sits."""
     return flow_angles(velocity.plus(rates.cross(arm)))
@@ -62,6 +74,19 @@ def air_data(
     """Readings of airspeed (m/s), alpha and beta (rad)."""
     vanes = vane_bias.apply(effects["vane_bias"], *vane_scale.apply(effects["vane_scale"], alpha, beta))
     return airspeed_scale.apply(effects["airspeed_scale"], airspeed), *vanes
+
+
+def flow_from(
+    effects: dict[str, Values], airspeed: Scalar, alpha: Scalar, beta: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """What the lagged probe holds behind its readings."""
+    angles = vane_scale.undo(effects["vane_scale"], *vane_bias.undo(effects["vane_bias"], alpha, beta))
+    return airspeed_scale.undo(effects["airspeed_scale"], airspeed), *angles
+
+
+def before_lag(effects: dict[str, Values], reading: Scalar, rate: Scalar) -> Scalar:
+    """What the lagged probe lags behind, from its reading and that one's rate."""
+    return air_data_lag.undo(effects["air_data_lag"], reading, rate)
 
 
 def noisy(model: Model, effects: dict[str, Values], reading: Scalar, realisation: Scalar) -> Scalar:

@@ -1,0 +1,288 @@
+"""The chain on measured signals: the accelerations that the aircraft should have shown, given what it measured.
+
+Where a rollout integrates the motion, this takes it from the instruments, so that turbulence and drift do no harm: the
+same stations turn recorded commands and measured flow and rates into forces and moments, and those into the readings
+of accelerometers and the rates of the gyroscopes' readings. Sensor effects are undone on what goes in and applied to
+what comes out. What has a memory of its own (actuators, motor, separation, structure) is carried along the record.
+
+``predict`` gives accelerations; ``coefficients`` reduces accelerations, predicted or measured, to the six coefficients
+by the aircraft file (Klein & Morelli (2006), "Aircraft System Identification", sec. 5.1).
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicSpline
+
+from sysid_node.errors import InputError
+from sysid_node.flight.record import FlightRecord
+from sysid_node.sim import body as rigid
+from sysid_node.sim.body import Vector
+from sysid_node.sim.chain import Chain, drive_of, steady_load, unsteady_load
+from sysid_node.sim.effects import stall_separation
+from sysid_node.sim.effects.actuator_lag import first_order
+from sysid_node.sim.layout import Layout, Model, Scalar
+from sysid_node.sim.simulator import Simulator
+from sysid_node.sim.stations import actuator, airflow, command, mass, propulsion, sensors, structure
+from sysid_node.sim.stations.actuator import ActuatorState
+from sysid_node.sim.stations.airflow import Air
+from sysid_node.sim.timing import shift_cubic
+
+Array = NDArray[np.float64]
+
+#: Columns of ``predict``: readings of the accelerometers (m/s^2), and the rates of the gyroscopes' (rad/s^2).
+ACCELERATIONS = ("ax", "ay", "az", "p_rate", "q_rate", "r_rate")
+
+#: Columns of ``coefficients``.
+COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
+
+
+class Signals(NamedTuple):
+    """A flight as it was measured, N samples at a constant rate, by the messages' stamps."""
+
+    rates: Scalar  # (N, 3) rad/s
+    air: Scalar  # (N, 3) V m/s, alpha, beta rad, at the probe
+    density: Scalar  # (N,) kg/m^3
+    commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
+    climb: Scalar  # (N,) m since the start
+
+
+class _Memory(NamedTuple):
+    """What has to be carried along the record."""
+
+    actuators: ActuatorState
+    motor: Scalar
+    motor_command: Scalar
+    separation: Scalar
+    attached: Scalar
+    mode: Scalar  # (2,) displacement, speed
+    load: Scalar  # specific force along z
+
+
+class _Sample(NamedTuple):
+    """One sample of what is known without a memory."""
+
+    command: Scalar
+    velocity: Vector  # at the CG, relative to the air
+    rates: Vector
+    density: Scalar
+    climb: Scalar
+    alpha_rate: Scalar
+    time: Scalar
+
+
+def predict(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Scalar:
+    """Accelerations (N, 6), columns ``ACCELERATIONS``, that parameters (P,) expect of these signals; pure."""
+    chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
+    samples = _true_motion(chain, signals)
+    first = jax.tree.map(lambda series: series[0], samples)
+    _, readings = jax.lax.scan(lambda m, s: _advance(chain, m, s), _start(chain, first), samples)
+    return shift_cubic(readings, chain.effects["imu_delay"]["delay"] / step)
+
+
+def coefficients(model: Model, signals: Signals, accelerations: Scalar) -> Scalar:
+    """CL CD CY Cl Cm Cn (N, 6) about the file's CG, of accelerations (N, 6), by the aircraft file alone."""
+    rates, turning = Vector(*signals.rates.T), Vector(*accelerations[:, 3:].T)
+    imu, probe = Vector(*model.imu), Vector(*model.air_data)
+    at_imu = Vector(*accelerations[:, :3].T)
+    specific_force = at_imu.minus(turning.cross(imu)).minus(rates.cross(rates.cross(imu)))
+    velocity = airflow.velocity_of(*signals.air.T).minus(rates.cross(probe))
+    speed, _, _ = airflow.flow_angles(velocity)
+    thrust = propulsion.commanded(model, signals.commands[:, -1])
+    along, up = jnp.cos(model.thrust_inclination), jnp.sin(model.thrust_inclination)
+    force = specific_force.times(model.mass).minus(Vector(thrust * along, jnp.zeros_like(thrust), -thrust * up))
+    moment = rigid.moment_for(mass.nominal(model), rates, turning)
+    moment = moment._replace(y=moment.y - model.thrust_arm * thrust)
+    return _non_dimensional(model, signals.density, speed, velocity, force, moment)
+
+
+def _non_dimensional(
+    model: Model, density: Scalar, speed: Scalar, velocity: Vector, force: Vector, moment: Vector
+) -> Scalar:
+    scale = 1.0 / (0.5 * density * speed * speed * model.area)
+    forward = jnp.sqrt(velocity.x * velocity.x + velocity.z * velocity.z)
+    cos, sin = velocity.x / forward, velocity.z / forward
+    columns = (
+        scale * (force.x * sin - force.z * cos),
+        -scale * (force.x * cos + force.z * sin),
+        scale * force.y,
+        scale / model.span * moment.x,
+        scale / model.chord * moment.y,
+        scale / model.span * moment.z,
+    )
+    return jnp.stack(columns, 1)
+
+
+def signals_of(simulator: Simulator, record: FlightRecord) -> Signals:
+    """A record's signals on the simulator's regular time base, by cubic (commands: linear) interpolation.
+
+    Raises InputError where rates, airspeed, flow angles, density, a control or the thrust of an aircraft with an
+    engine is missing.
+    """
+    thrust = () if simulator.aircraft.throttle is None else ("thrust",)
+    needed = ("p", "q", "r", "V", "alpha", "beta", "rho", *simulator.layout.symbols, *thrust)
+    missing = [name for name in needed if not np.isfinite(record[name]).all()]
+    if missing:
+        raise InputError(
+            f"flight {record.name!r}: no complete {', '.join(missing)}; forces cannot be predicted without"
+        )
+    time = record.time[0] + np.arange(int(record.duration * simulator.rate + 1e-9) + 1) * simulator.step
+    smooth = {name: CubicSpline(record.time, record[name])(time) for name in needed[:7]}
+    commands = [np.interp(time, record.time, record[name]) for name in (*simulator.layout.symbols, *thrust)]
+    if not thrust:
+        commands.append(np.zeros_like(time))
+    return Signals(
+        rates=jnp.asarray(np.column_stack([smooth["p"], smooth["q"], smooth["r"]])),
+        air=jnp.asarray(np.column_stack([smooth["V"], smooth["alpha"], smooth["beta"]])),
+        density=jnp.asarray(smooth["rho"]),
+        commands=jnp.asarray(np.column_stack(commands)),
+        climb=jnp.asarray(_climb(record, time)),
+    )
+
+
+def _climb(record: FlightRecord, time: Array) -> Array:
+    """Height gained through the air since the start (m) by attitude, airspeed and flow angles; 0 without attitude."""
+    if not (np.isfinite(record["theta"]).all() and np.isfinite(record["phi"]).all()):
+        return np.zeros_like(time)
+    attitude = rigid.quaternion(*(jnp.asarray(x) for x in (record["phi"], record["theta"], 0.0 * record.time)))
+    velocity = airflow.velocity_of(*(jnp.asarray(record[name]) for name in ("V", "alpha", "beta")))
+    speed = -np.asarray(rigid.to_earth(attitude, velocity).z)
+    gained: Array = cumulative_trapezoid(np.asarray(speed, dtype=float), np.asarray(record.time), initial=0)
+    return np.asarray(np.interp(time, record.time, gained))
+
+
+def _true_motion(chain: Chain, signals: Signals) -> _Sample:
+    """What the sensors' effects hide: the motion and flow at the times of the samples."""
+    effects, step = chain.effects, chain.step
+    late_imu, late_air = effects["imu_delay"]["delay"], effects["air_data_delay"]["delay"]
+    rates = sensors.rates_from(effects, Vector(*shift_cubic(signals.rates, -late_imu / step).T))
+    reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
+    flow = sensors.before_lag(effects, reading, _slope(reading, step))
+    arm = sensors.air_data_arm(chain.model, effects, chain.body)
+    velocity = airflow.velocity_of(*flow.T).minus(rates.cross(arm))
+    _, alpha, _ = airflow.flow_angles(velocity)
+    return _Sample(
+        command=command.arrive(effects, signals.commands, step),
+        velocity=velocity,
+        rates=rates,
+        density=signals.density,
+        climb=signals.climb,
+        alpha_rate=_slope(alpha, step),
+        time=jnp.arange(signals.density.shape[0]) * step,
+    )
+
+
+def _slope(series: Scalar, step: Scalar) -> Scalar:
+    """d/dt of a series (N, ...) by fourth-order central differences; the ends repeat the second inner values."""
+    inner = (8.0 * (series[3:-1] - series[1:-3]) - (series[4:] - series[:-4])) / (12.0 * step)
+    return jnp.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
+
+
+def _flow(sample: _Sample) -> Air:
+    speed, alpha, beta = airflow.flow_angles(sample.velocity)
+    return Air(sample.velocity, sample.rates, speed, alpha, beta, sample.density)
+
+
+def _start(chain: Chain, sample: _Sample) -> _Memory:
+    """Everything settled on the first sample."""
+    air = _flow(sample)
+    zero = jnp.zeros_like(air.alpha)
+    attached = stall_separation.attached(chain.effects["stall_separation"], air.alpha, zero, zero)
+    motor = propulsion.commanded(chain.model, sample.command[-1])
+    actuators = actuator.start(chain.model, sample.command[:-1])
+    memory = _Memory(actuators, motor, motor, attached, attached, jnp.zeros(2), zero)
+    specific_force, _ = _acceleration(chain, memory, sample, air)
+    mode = jnp.stack(structure.start(chain.effects, specific_force.z))
+    return memory._replace(mode=mode, load=specific_force.z)
+
+
+def _advance(chain: Chain, memory: _Memory, sample: _Sample) -> tuple[_Memory, Scalar]:
+    """The memory at this sample, and the readings (6,) expected of it."""
+    h, sample = chain.step, sample._replace(rates=_without_nod(chain, memory, sample.rates))
+    air = _flow(sample)
+    actuators = actuator.advance(chain.layout, chain.model, chain.effects, memory.actuators, sample.command[:-1], h)
+    motor_command = propulsion.commanded(chain.model, sample.command[-1])
+    motor = propulsion.advance(chain.effects, memory.motor, memory.motor_command, motor_command, h)
+    values, time_scale = chain.effects["stall_separation"], chain.model.chord / air.speed
+    attached = stall_separation.attached(values, air.alpha, sample.alpha_rate, time_scale)
+    separation = first_order(values["tau1"] * time_scale, memory.separation, memory.attached, attached, h)
+    now = memory._replace(
+        actuators=actuators, motor=motor, motor_command=motor_command, separation=separation, attached=attached
+    )
+    specific_force, acceleration = _acceleration(chain, now, sample, air)
+    mode = _ring(chain, memory.mode, memory.load, specific_force.z)
+    readings = _readings(chain, sample.rates, specific_force, acceleration, mode)
+    return now._replace(mode=mode, load=specific_force.z), readings
+
+
+def _without_nod(chain: Chain, memory: _Memory, rates: Vector) -> Vector:
+    """The body's rates without what the structural mode adds to the gyroscopes', its load held for one sample."""
+    mode = _ring(chain, memory.mode, memory.load, memory.load)
+    _, nod = structure.felt(chain.effects, mode[1], mode[1])
+    return rates._replace(y=rates.y - nod)
+
+
+def _acceleration(chain: Chain, memory: _Memory, sample: _Sample, air: Air) -> tuple[Vector, Vector]:
+    """Specific force at the CG (m/s^2) and angular acceleration (rad/s^2)."""
+    drive, _ = drive_of(chain, memory.actuators, memory.motor, jnp.zeros(6), sample.time)
+    load = steady_load(chain, air, drive, memory.separation, sample.climb)
+    load = unsteady_load(chain, air, load, sample.alpha_rate)
+    return mass.accelerations(chain.body, sample.rates, load.force, load.moment)
+
+
+def _readings(chain: Chain, rates: Vector, force: Vector, acceleration: Vector, mode: Scalar) -> Scalar:
+    """Readings of the accelerometers, and the rates of the gyroscopes'."""
+    effects, arm = chain.effects, sensors.imu_arm(chain.model, chain.effects, chain.body)
+    _, mode_acceleration = structure.rate(effects, mode[0], mode[1], force.z)
+    shake, nod = structure.felt(effects, mode_acceleration, mode_acceleration)
+    at_imu = sensors.at_imu(force, rates, acceleration, arm)
+    return jnp.stack(
+        [
+            *sensors.accelerometers(effects, at_imu._replace(z=at_imu.z + shake)),
+            *sensors.turned_by(effects, acceleration._replace(y=acceleration.y + nod)),
+        ]
+    )
+
+
+def _ring(chain: Chain, mode: Scalar, load0: Scalar, load1: Scalar) -> Scalar:
+    """The structural mode (2,) one sample on, its load linear meanwhile, by Runge-Kutta as in a rollout."""
+
+    def rate(y: Scalar, load: Scalar) -> Scalar:
+        return jnp.stack(structure.rate(chain.effects, y[0], y[1], load))
+
+    h, middle = chain.step, 0.5 * (load0 + load1)
+    k1 = rate(mode, load0)
+    k2 = rate(mode + 0.5 * h * k1, middle)
+    k3 = rate(mode + 0.5 * h * k2, middle)
+    k4 = rate(mode + h * k3, load1)
+    return mode + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+_predict = jax.jit(predict, static_argnums=0)
+_coefficients = jax.jit(coefficients)
+
+
+def predict_coefficients(simulator: Simulator, theta: Scalar | Array, signals: Signals) -> Scalar:
+    """CL CD CY Cl Cm Cn (N, 6) that parameters (P,) expect of these signals, as the aircraft file reduces them."""
+    accelerations = _predict(simulator.layout, simulator.model, theta, signals, simulator.step)
+    expected: Scalar = _coefficients(simulator.model, signals, accelerations)
+    return expected
+
+
+@partial(jax.jit, static_argnums=0)
+def _slopes(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Scalar:
+    slopes: Scalar = jax.jacfwd(lambda t: coefficients(model, signals, predict(layout, model, t, signals, step)))(theta)
+    return slopes
+
+
+def coefficient_slopes(simulator: Simulator, theta: Scalar | Array, signals: Signals) -> Scalar:
+    """d ``predict_coefficients`` / d theta (N, 6, P), exact."""
+    slopes: Scalar = _slopes(simulator.layout, simulator.model, theta, signals, simulator.step)
+    return slopes
