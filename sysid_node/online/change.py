@@ -25,12 +25,16 @@ Array = NDArray[np.float64]
 
 PIECE = 0.5  # s
 SPANS = (2, 3, 4, 6, 8)  # pieces looked back over
-FALSE_ALARM = 1e-12  # a test, of some 7200 pieces an hour, times six coefficients and five spans
+FALSE_ALARM = 1e-12  # a test: 7200 pieces an hour, times six coefficients and five spans
+MARGIN = 3.0  # and Q must exceed what chance allows by this factor: no model is exact
 EXPLAINED = 0.6  # share of the misfit that changed derivatives must explain
 MISFIT = 0.05  # share of the motion's energy that the misfit must reach to matter
-LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
+LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
+USUAL = 4  # pieces in the span by which the usual size of Q is judged
+LEARNING = 0.05  # weight of each new Q in that judgement
+OUTLIER = 20.0  # a Q per derivative beyond this is no usual one
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,11 @@ class Reference:
 
 @dataclass
 class Watch:
-    """The last pieces of the transform and the estimates that belong to their starts."""
+    """The last pieces of the transform, the estimates that belong to their starts, and the usual Q per derivative."""
 
     pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, W)
     references: deque[Reference] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))
+    usual: dict[int, float] = field(default_factory=dict)  # by coefficient: 1 where the model is exact
 
 
 @dataclass(frozen=True)
@@ -58,56 +63,58 @@ class Finding:
     lost: NDArray[np.bool_]
 
 
-def _reference(watch: Watch, start: float) -> Reference | None:
-    """The latest estimates from before ``start`` (s)."""
-    earlier = [r for r in watch.references if r.time <= start + 1e-6]
-    return earlier[-1] if earlier else None
+@dataclass(frozen=True)
+class _Misfit:
+    """One coefficient's equation over one span, by the earlier estimates."""
+
+    per_derivative: float  # Q over its number of derivatives
+    over_chance: float  # Q over what chance allows
+    material: bool  # whether it matters and changed derivatives explain it
+    unexplained: bool  # whether nothing does
 
 
 def examine(plan: Plan, watch: Watch, omega: Array, now: float) -> Finding:
     """Test every span of the last pieces; see the module's text."""
     lost = np.zeros(len(plan.coefficients), dtype=bool)
-    best, since = 0.0, None
-    for span in SPANS:
-        if len(watch.pieces) < span:
-            break
+    best, since = MARGIN, None
+    for span in (span for span in SPANS if span <= len(watch.pieces)):
         start = watch.pieces[-span][0]
-        reference = _reference(watch, start)
+        reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
         if reference is None:
             break
-        total = np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0)
-        window = measure(total, omega, start, now, np.inf)
-        for c in range(len(plan.coefficients)):
-            score, unexplained = _test(plan, reference, window, c)
-            if score > max(best, 1.0):
+        window = measure(np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0), omega, start, now, np.inf)
+        for c in np.flatnonzero(reference.uncertainty.freedom >= KNOWN).tolist():
+            misfit = _misfit(plan, reference, window, c)
+            usual = max(watch.usual.get(c, 1.0), 1.0)
+            if misfit.material and misfit.over_chance > best * usual:
                 # the change fell somewhere in the oldest piece: what came after it is all new
-                best, since = score, watch.pieces[1 - span][0]
-            if span == SPANS[2] and unexplained:
-                lost[c] = True
+                best, since = misfit.over_chance / usual, watch.pieces[1 - span][0]
+            if span == USUAL:
+                lost[c] = misfit.unexplained
+                watch.usual[c] = usual + LEARNING * (min(misfit.per_derivative, OUTLIER) - usual)
     return Finding(since, lost)
 
 
-def _test(plan: Plan, reference: Reference, window: Information, c: int) -> tuple[float, bool]:
-    """(Q over its threshold, or 0 where a change explains too little; whether the model is lost) for one coefficient."""
+def _misfit(plan: Plan, reference: Reference, window: Information, c: int) -> _Misfit:
+    """How badly the earlier estimates of a coefficient fit the window, and what would mend it."""
     mine, y = plan.unknowns(c), plan.outputs[c]
     J = plan.columns[mine]
     density = float(reference.uncertainty.density[c])
-    if reference.uncertainty.freedom[c] < KNOWN:
-        return 0.0, False
-    gram, scores = window.grams.sum(axis=0), window.scores.sum(axis=0)
+    gram, scores = window.grams.sum(axis=0), window.scores.sum(axis=0)[np.ix_(J, J)]
     v = np.zeros(gram.shape[0])
     v[y], v[J] = 1.0, -reference.solution.theta[mine, c]
     misfit, motion = float(v @ gram @ v), float(gram[y, y])
     G, score = gram[np.ix_(J, J)], (gram @ v)[J]
-    ridge = G + np.diag(G.diagonal() * 1e-9 + 1e-300)
-    step = np.linalg.solve(ridge, score)
-    explained = float(score @ step)
-    free = max(float(window.traces.sum()) - float(np.trace(np.linalg.solve(ridge, scores[np.ix_(J, J)]))), 0.1 * float(window.traces.sum()))
-    noise = max(density, (misfit - explained) / free)
-    unexplained = misfit - explained > LOST * motion and (misfit - explained) / free > NOISE_RATIO * density
-    if explained < EXPLAINED * misfit or misfit < MISFIT * motion:
-        return 0.0, unexplained
+    G_regular = G + np.diag(G.diagonal() * 1e-9 + 1e-300)
+    explained = float(score @ np.linalg.solve(G_regular, score))
+    energy = float(window.traces.sum())
+    left = (misfit - explained) / max(energy - float(np.trace(np.linalg.solve(G_regular, scores))), 0.1 * energy)
     C = reference.uncertainty.covariance[c][np.ix_(mine, mine)]
-    spread = noise * scores[np.ix_(J, J)] + G @ C @ G
-    Q = float(score @ np.linalg.solve(spread + np.diag(spread.diagonal() * 1e-9), score))
-    return Q / (2.0 * float(gdtrix(1.0, 0.5 * J.size, 1.0 - FALSE_ALARM))), unexplained
+    spread = max(density, left) * scores + G @ C @ G
+    Q = float(score @ np.linalg.solve(spread + np.diag(spread.diagonal() * 1e-9 + 1e-300), score))
+    return _Misfit(
+        per_derivative=Q / J.size,
+        over_chance=Q / (2.0 * float(gdtrix(1.0, 0.5 * J.size, 1.0 - FALSE_ALARM))),
+        material=explained > EXPLAINED * misfit and misfit > MISFIT * motion,
+        unexplained=misfit - explained > LOST * motion and left > NOISE_RATIO * density,
+    )
