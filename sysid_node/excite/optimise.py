@@ -18,8 +18,9 @@ from scipy.optimize import Bounds, NonlinearConstraint, minimize
 from sysid_node.errors import InputError
 from sysid_node.excite.information import Information
 from sysid_node.excite.manoeuvre import control_limits
-from sysid_node.excite.prediction import Prediction, Predictor
+from sysid_node.excite.prediction import Prediction, Predictor, tolerances_of
 from sysid_node.excite.spec import Segment, draw_manoeuvre
+from sysid_node.flight.record import FlightRecord
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ _SHOWN = 0.9
 #: logarithms.
 _WIDTHS = (0.1, 2.0)
 _SHARES = (0.01, 0.95)
+#: Trim is flown for so long first (s).
+_LEAD = 1.0
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,8 @@ class Envelope:
     rate: float = 2.0
     airspeed: float = 0.25
 
-    def excess(self, prediction: Prediction, outputs: Sequence[str]) -> Array:
-        """Largest departure over its limit, less one, for each limit: (6,), not above zero inside."""
-        y = {name: prediction.outputs[:, i] for i, name in enumerate(outputs)}
+    def excess(self, y: FlightRecord) -> dict[str, float]:
+        """Largest departure over its limit, less one, by limit; not above zero inside."""
         departures = {
             "alpha": y["alpha"] - y["alpha"][0],
             "beta": y["beta"] - y["beta"][0],
@@ -55,7 +57,7 @@ class Envelope:
             "rate": np.array([y["p"], y["q"], y["r"]]),
             "airspeed": y["V"] / y["V"][0] - 1.0,
         }
-        return np.array([np.abs(values).max() / getattr(self, name) - 1.0 for name, values in departures.items()])
+        return {name: float(np.abs(v).max()) / getattr(self, name) - 1.0 for name, v in departures.items()}
 
 
 @dataclass(frozen=True)
@@ -74,12 +76,6 @@ def shares_left(information: Information, tolerances: Array) -> Array:
     """Standard error over tolerance (P,) once the flight and the aircraft file are both known: 1, nothing learnt."""
     scaled = tolerances[:, None] * information.matrix * tolerances
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(scaled + np.eye(len(tolerances))))))
-
-
-def tolerances_of(predictor: Predictor) -> Array:
-    """How far each derivative may be off (P,): the file's tolerance, else a tenth of its value, else one."""
-    derivatives = predictor.aircraft.derivatives.values()
-    return np.array([d.tolerance or 0.1 * abs(d.value) or 1.0 for d in derivatives])
 
 
 def optimise(
@@ -125,7 +121,7 @@ class _Search:
     ) -> None:
         self.predictor, self.segments, self.duration, self.envelope = predictor, segments, duration, envelope
         self.progress = progress
-        self._tolerances = tolerances_of(predictor)
+        self._tolerances = tolerances_of(predictor.aircraft)
         shown = shares_left(start.information, self._tolerances) < _SHOWN
         self.counted = shown if shown.any() else np.ones(len(shown), dtype=bool)
         self.best: Prediction | None = None
@@ -160,7 +156,7 @@ class _Search:
                 point.append(_place(abs(amplitude) / self._travel[control], *_SHARES))
             if "width" in segment.values:
                 point.append(_place(segment.values["width"], *_WIDTHS))
-            point.append(segment.values["start"] / max(self._room(segment), 1e-9))
+            point.append((segment.values["start"] - _LEAD) / max(self._room(segment), 1e-9))
         return np.clip(point, 0.0, 1.0)
 
     def decode(self, point: Array) -> list[Segment]:
@@ -177,7 +173,7 @@ class _Search:
             if "width" in changed:
                 changed["width"] = _round(_value(next(values), *_WIDTHS))
             moved = replace(segment, amplitude=amplitude, values=changed)
-            changed["start"] = _round(next(values) * self._room(moved))
+            changed["start"] = _round(_LEAD + next(values) * self._room(moved))
             found.append(replace(moved, values=changed))
         return found
 
@@ -190,8 +186,8 @@ class _Search:
         return self._evaluate(point)[1]
 
     def _room(self, segment: Segment) -> float:
-        """Latest beginning (s) with which the segment still ends in time."""
-        return max(self.duration - (segment.end - segment.values["start"]), 0.0)
+        """How much later (s) than the lead the segment may begin to end in time."""
+        return max(self.duration - (segment.end - segment.values["start"]) - _LEAD, 0.0)
 
     def _evaluate(self, point: Array) -> tuple[float, Array]:
         """Cost and excess; both are asked for at each point, and at some points again, so answers are kept."""
@@ -210,7 +206,7 @@ class _Search:
         except InputError:  # beyond the travel, or diverged: worse than any that can be flown
             return 0.0, np.full(6, _HOPELESS)
         cost = self.left(prediction)
-        excess = self.envelope.excess(prediction, self.predictor.simulator.outputs)
+        excess = np.array(list(self.envelope.excess(prediction.flight).values()))
         if excess.max() <= 0 and cost < self.best_cost:
             self.best, self.best_cost = prediction, cost
         if self.progress is not None:

@@ -13,7 +13,9 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.information import Information, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
+from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Flight, Inputs, Simulator, parameters
+from sysid_node.sim.atmosphere import air_density
 from sysid_node.sim.autopilot import autopilot_for, fly_held
 from sysid_node.sim.layout import OUTPUTS, Layout, Model
 from sysid_node.sim.rollout import rollout
@@ -28,23 +30,29 @@ MEASURED = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta
 #: a heading that is not measured leaves open.
 _INITIAL = (3, 4, 5, 7, 8, 10, 11, 12)
 
+#: Flights are computed in multiples of so many samples.
+_BLOCK = 1000
+
+#: A derivative that moves no output by so many sigmas when it changes by one is not seen.
+_ROUNDING = 1e-6
+
 
 @dataclass(frozen=True)
 class Prediction:
-    """A manoeuvre, the flight that it gives, and the information in it.
-
-    ``outputs`` (N, 12), columns ``Simulator.outputs``; ``commands`` (N, controls + 1) as flown, rad and N,
-    trim and autopilot included.
-    """
+    """A manoeuvre, the flight that it gives (free of noise; controls as flown, autopilot included), what it tells."""
 
     manoeuvre: Manoeuvre
-    outputs: Array
-    commands: Array
+    flight: FlightRecord
     information: Information
 
 
+def tolerances_of(aircraft: Aircraft) -> Array:
+    """How far each derivative may be off (P,): the file's tolerance, else a tenth of its value, else one."""
+    return np.array([d.tolerance or 0.1 * abs(d.value) or 1.0 for d in aircraft.derivatives.values()])
+
+
 class Predictor:
-    """Predictions for one aircraft from one trim; programs are compiled once for each length of flight.
+    """Predictions for one aircraft from one trim.
 
     With ``autopilot`` the simulator's attitude hold flies along. What it does to the controls is part of the input
     then: the estimator is taken to know the controls that were flown, not the plan.
@@ -71,12 +79,16 @@ class Predictor:
     def predict(self, manoeuvre: Manoeuvre) -> Prediction:
         """Fly it from trim. Raises InputError where a control saturates or the flight diverges."""
         flight = self._fly(self.commands(manoeuvre))
-        outputs, commands = np.asarray(flight.outputs), np.asarray(flight.commands)
-        simulator, unknowns = self.simulator, np.zeros(len(self.names) + len(_INITIAL))
-        slopes = _slopes(simulator.layout, simulator.model, unknowns, self.trim.initial, commands, simulator.step)
-        matrix = fisher(np.asarray(slopes)[:, self._columns], self._sigma)
+        matrix = fisher(self._slopes(np.asarray(flight.commands)), self._sigma)
         information = Information(self.names, self.values, eliminate(matrix, len(self.names)))
-        return Prediction(manoeuvre, outputs, commands, information)
+        return Prediction(manoeuvre, self._record(manoeuvre, flight), information)
+
+    def _record(self, manoeuvre: Manoeuvre, flight: Flight) -> FlightRecord:
+        columns = dict(zip(self.simulator.outputs, np.asarray(flight.outputs).T, strict=True))
+        columns["rho"] = np.asarray(air_density(-flight.states[:, 2]))
+        controls = (*self.aircraft.control_symbols, "thrust")
+        columns |= dict(zip(controls, np.asarray(flight.commands).T, strict=True))
+        return FlightRecord(manoeuvre.time, columns, f"{self.aircraft.name} {manoeuvre.spec}")
 
     def commands(self, manoeuvre: Manoeuvre) -> Array:
         """The manoeuvre upon trim, (N, controls + 1): rad, and thrust in N."""
@@ -89,10 +101,25 @@ class Predictor:
         return commands
 
     def _fly(self, commands: Array) -> Flight:
-        simulator, inputs, theta = self.simulator, self.simulator.inputs(commands), self.simulator.neutral()
+        simulator, inputs, theta = self.simulator, self.simulator.inputs(_padded(commands)), self.simulator.neutral()
         if self.autopilot is None:
-            return simulator.check(simulator.rollout(theta, self.trim.initial, inputs))
-        return simulator.check(fly_held(simulator, theta, self.trim, inputs, self.autopilot))
+            flight = simulator.rollout(theta, self.trim.initial, inputs)
+        else:
+            flight = fly_held(simulator, theta, self.trim, inputs, self.autopilot)
+        return simulator.check(Flight(*(series[: len(commands)] for series in flight)))
+
+    def _slopes(self, commands: Array) -> Array:
+        """Slopes (N, m, derivatives + initial states) of what is measured; what only rounding moves is zero."""
+        simulator, unknowns = self.simulator, np.zeros(len(self.names) + len(_INITIAL))
+        arguments = (simulator.layout, simulator.model, unknowns, self.trim.initial, _padded(commands), simulator.step)
+        slopes = np.asarray(slopes_of(*arguments))[: len(commands), self._columns]
+        largest = np.abs(slopes / self._sigma[:, None]).max(axis=(0, 1))
+        return np.where(largest > _ROUNDING, slopes, 0.0)
+
+
+def _padded(commands: Array) -> Array:
+    """The commands with the last held up to a round number of samples: each length is another program to compile."""
+    return np.pad(commands, ((0, -len(commands) % _BLOCK), (0, 0)), mode="edge")
 
 
 def outputs_of(
@@ -108,7 +135,8 @@ def outputs_of(
     return rollout(layout, model, theta, start, inputs, jnp.asarray(step)).outputs
 
 
-_slopes = jax.jit(jax.jacfwd(outputs_of, argnums=2), static_argnums=0)
+#: d ``outputs_of`` / d unknowns, (N, 12, unknowns).
+slopes_of = jax.jit(jax.jacfwd(outputs_of, argnums=2), static_argnums=0)
 
 
 def _check_travel(aircraft: Aircraft, manoeuvre: Manoeuvre, commands: Array) -> None:
