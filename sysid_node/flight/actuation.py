@@ -85,10 +85,10 @@ class Actuation:
         return faults
 
     def require(self, names: Sequence[str], said: str) -> None:
-        """Raises InputError where ``names`` lack a joint of the controls; ``said`` is what the error calls the flight."""
+        """Raises InputError where ``names`` lack a joint of the controls; ``said`` is the flight's name in it."""
         missing = [joint for joint in self.joints if joint not in names]
         if missing:
             raise InputError(
                 f"{said}: actuators have no joint {', '.join(map(repr, missing))}; they have "
-                f"{', '.join(map(repr, names)) or 'none'}; name the joints under controls in the aircraft file as they are"
+                f"{', '.join(map(repr, names)) or 'none'}; name them so under controls in the aircraft file"
             )

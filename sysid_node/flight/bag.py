@@ -117,6 +117,9 @@ def _choose(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, l
             raise InputError(f"{said}: no topic {name} ({wanted}); it has {present}; if it is one of these: {example}")
         if there[name] != {wanted}:
             raise InputError(f"{said}: topic {name} is {'/'.join(sorted(there[name]))}, expected {wanted}")
+        known = type_store().hash_rihs01(wanted)
+        if any(c.topic == name and c.digest not in {"", known} for c in reader.connections):
+            raise InputError(f"{said}: topic {name} was recorded with another definition of {wanted}; use that version")
     return {topic: [c for c in reader.connections if c.topic == name] for topic, name in topics.items()}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_flights import JOINTS, made_streams
 from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from sysid_node.errors import InputError
 from sysid_node.flight import bag_writer
@@ -183,6 +184,18 @@ def test_remapped_topic_is_read(bag, streams):
 def test_topic_of_another_type(bag):
     text = error_of(bag, topic_names(["imu/data:=/air_data"]))
     assert "topic /air_data is sysid_msgs/msg/AirData, expected sensor_msgs/msg/Imu" in text
+
+
+def test_another_version_of_our_message(tmp_path, streams):
+    other = get_typestore(Stores.ROS2_JAZZY)
+    other.register(get_types_from_msg("std_msgs/Header header\nfloat64 airspeed", INPUT_TOPICS[AIR_DATA]))
+    with new_bag(tmp_path / "flight") as writer:
+        for topic in (IMU, ACTUATORS):
+            add_topic(writer, f"/{topic}", INPUT_TOPICS[topic])
+        connection = writer.add_connection("/air_data", INPUT_TOPICS[AIR_DATA], typestore=other)
+        message = other.types[INPUT_TOPICS[AIR_DATA]](header(other, ""), 18.0)
+        writer.write(connection, 1, other.serialize_cdr(message, INPUT_TOPICS[AIR_DATA]))
+    assert "another definition of sysid_msgs/msg/AirData" in error_of(tmp_path / "flight")
 
 
 def test_topic_without_messages(tmp_path, streams):
