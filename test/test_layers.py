@@ -27,7 +27,7 @@ BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["cli"] = {*BELOW["report"], "report"}
 
 ROS_PACKAGES = {"rclpy", "ament_index_python", "rosidl_runtime_py", "launch", "launch_ros", "sysid_msgs"}
-ONLINE_PACKAGES = {"numpy", "scipy"}
+ONLINE_PACKAGES = {"numpy", "scipy", "cython_runtime"}  # the last is SciPy's own
 
 
 def modules() -> list[Path]:

@@ -41,7 +41,7 @@ def run(
         done = 0
         for stop in (stops + 1).tolist():
             _advance(state, chunk, done, stop)
-            results.append(estimate(state))
+            results.append(estimate(state, float(time[begin + stop - 1])))
             done = stop
         _advance(state, chunk, done, end - begin)
         if progress is not None:

@@ -8,6 +8,9 @@ from harness import START_NS, made_up_streams
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.streams import Streams
+from sysid_node.online.alignment import align_streams
+from sysid_node.online.run import run
+from sysid_node.online.schedule import due_times
 from sysid_node.online.settings import Settings
 from sysid_node.ros.save import save_estimates
 from sysid_node.ros.session import Due, Session
@@ -45,6 +48,18 @@ def test_the_order_of_arrival_does_not_matter() -> None:
         fly(Session(load_aircraft("cdrw"), Settings(), 10.0), made_up_streams(5.0), order) for order in ("iaj", "jai")
     )
     assert repr(one) == repr(other)
+
+
+def test_flow_angles_that_fail_in_flight_make_estimates_stale_live_and_at_the_desk() -> None:
+    """For a second no angle of attack is measured; samples go on, and what is known grows old meanwhile."""
+    aircraft, flight = load_aircraft("cdrw"), made_up_streams(8.0)
+    flight.air_data.values[500:600, 1] = math.nan
+    live = fly(Session(aircraft, Settings(), 10.0), flight, "iaj")
+    aligned = align_streams(aircraft, flight, Settings().max_gap)
+    desk = run(aircraft, Settings(), aligned.time, aligned.samples, due_times(aligned.time, 10.0))
+    assert repr([estimates for _, estimates in live]) == repr(desk)
+    stale = [i for i, (_, e) in enumerate(live) if {d.status for d in e.derivatives.values()} == {"stale input"}]
+    assert stale == [54, 55, 56, 57, 58]
 
 
 def test_reset_forgets(session: Session) -> None:
