@@ -34,9 +34,7 @@ class _Raw:
     order: list[int] = field(default_factory=list)
 
 
-def read_streams(
-    path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu", name: str | None = None
-) -> Streams:
+def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu") -> Streams:
     """The three input topics of a bag: a folder with metadata.yaml, or an .mcap or .db3 file alone.
 
     ``topics`` as of ``topic_names``; ``frame`` is that of the bag's IMU messages. Raises InputError (one line: what
@@ -44,7 +42,7 @@ def read_streams(
     a topic.
     """
     path, topics = Path(path), topics or topic_names()
-    said = name or f"bag {path.name}"
+    said = f"bag {path.name}"
     with _reading(path, said):
         raw = _read_raw(path, topics, said)
     with _reading(path, said):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,6 @@ from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Sta
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
 STORAGES: Mapping[str, StoragePlugin] = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
-
-Message = tuple[int, bytes]  # log time ns, CDR
 
 
 @contextmanager
@@ -65,13 +63,6 @@ def write_streams(path: str | Path, streams: Streams, storage: str = "mcap", fra
 def add_topic(writer: Writer, topic: str, msgtype: str) -> Connection:
     """A topic of a bag that is being written."""
     return writer.add_connection(topic, msgtype, typestore=type_store())
-
-
-def write_messages(writer: Writer, topic: str, msgtype: str, messages: Iterable[Message]) -> None:
-    """Messages on one topic."""
-    connection = add_topic(writer, topic, msgtype)
-    for log_ns, data in messages:
-        writer.write(connection, log_ns, data)
 
 
 def header(store: Typestore, frame_id: str) -> Any:

@@ -11,19 +11,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
 BodyFrame = Literal["flu", "frd"]
 BODY_FRAMES: tuple[BodyFrame, ...] = get_args(BodyFrame)
-
-
-def body_frame(text: str) -> BodyFrame:
-    """A body frame from the value of a parameter or option. Raises InputError naming the two that there are."""
-    for frame in BODY_FRAMES:
-        if text.lower() == frame:
-            return frame
-    raise InputError(f"body_frame {text!r}: expected flu (forward-left-up, REP-103) or frd (forward-right-down)")
 
 
 def turn_vectors(vectors: Array, frame: BodyFrame) -> Array:

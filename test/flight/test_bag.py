@@ -39,6 +39,13 @@ def error_of(path, *args, **kwargs) -> str:
     return str(caught.value)
 
 
+def put(writer, topic, messages):
+    """Messages on an input topic, all logged at once."""
+    connection = add_topic(writer, f"/{topic}", INPUT_TOPICS[topic])
+    for message in messages:
+        writer.write(connection, 1, message)
+
+
 def same(ours: Streams, theirs: Streams) -> None:
     for topic, stream in ours.by_topic.items():
         other = theirs.by_topic[topic]
@@ -109,7 +116,7 @@ def test_joints_that_come_and_go(tmp_path, streams):
             (IMU, bag_writer._imu_messages(STORE, streams.imu, "flu")),
             (AIR_DATA, bag_writer._air_data_messages(STORE, streams.air_data)),
         ):
-            bag_writer.write_messages(writer, f"/{topic}", INPUT_TOPICS[topic], ((1, m) for m in messages))
+            put(writer, topic, messages)
         connection = add_topic(writer, "/actuators", INPUT_TOPICS[ACTUATORS])
         for names, positions in ((["a", "b"], vector), (["b", "c"], vector), (["b", "a", "a"], vector)):
             none = np.zeros(0)
@@ -203,7 +210,7 @@ def test_topic_without_messages(tmp_path, streams):
         for topic in (IMU, ACTUATORS):
             add_topic(writer, f"/{topic}", INPUT_TOPICS[topic])
         messages = bag_writer._air_data_messages(STORE, streams.air_data)
-        bag_writer.write_messages(writer, "/air_data", INPUT_TOPICS[AIR_DATA], ((1, m) for m in messages))
+        put(writer, AIR_DATA, messages)
     assert "no messages on /imu/data" in error_of(tmp_path / "flight")
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sysid_node.errors import InputError
-from sysid_node.flight.frames import body_frame, euler_from_quaternion, quaternion_from_euler, turn_vectors
+from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler, turn_vectors
 
 #: Axes of FRD in FLU, and of NED in ENU, one a column (REP-103).
 FRD_IN_FLU = np.diag([1.0, -1.0, -1.0])
@@ -44,9 +43,3 @@ def test_heading_north_is_facing_along_enu_y():
 
 def test_no_rotation_no_attitude():
     assert np.isnan(euler_from_quaternion(np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.1]]), "flu")).all()
-
-
-def test_unknown_frame_is_named():
-    assert body_frame("FLU") == "flu"
-    with pytest.raises(InputError, match=r"'ned'.*flu.*frd"):
-        body_frame("ned")

@@ -1,5 +1,7 @@
 """The type store holds sysid_msgs as its .msg files define it, wherever they are."""
 
+import json
+import os
 import re
 import shutil
 import sys
@@ -37,3 +39,17 @@ def test_not_found_says_what_to_build(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     with pytest.raises(InputError, match=r"sysid_msgs.*build"):
         messages.message_folder()
+
+
+def test_types_are_those_that_ros_itself_generated():
+    """Type hashes (REP-2016) of the built package, where there is one."""
+    built = [
+        Path(p) / "share/sysid_msgs/msg" for p in (*os.environ.get("AMENT_PREFIX_PATH", "").split(":"), sys.prefix)
+    ]
+    files = [path for folder in built for path in folder.glob("*.json")]
+    if not files:
+        pytest.skip("sysid_msgs is not built (make build)")
+    for path in files:
+        name = f"sysid_msgs/msg/{path.stem}"
+        hashes = {entry["type_name"]: entry["hash_string"] for entry in json.loads(path.read_text())["type_hashes"]}
+        assert messages.type_store().hash_rihs01(name) == hashes[name]
