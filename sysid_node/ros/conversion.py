@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
-from sysid_msgs.msg import DerivativeEstimate, DerivativeEstimates, FitQuality
+from sysid_msgs.msg import DerivativeEstimate, DerivativeEstimates, FitQuality, ModelGap
 
 from sysid_node.online import types
+from sysid_node.online.model_gap import CoefficientGap
 from sysid_node.online.types import Estimates
 
 NANOSECONDS = 1_000_000_000
@@ -72,6 +74,20 @@ def estimates_message(estimates: Estimates, header: Header, aircraft: str, metho
         for f in estimates.fits.values()
     ]
     return message
+
+
+def gap_message(gaps: Sequence[CoefficientGap], header: Header, aircraft: str) -> ModelGap:
+    """The gaps as a message."""
+    return ModelGap(
+        header=header,
+        aircraft=aircraft,
+        coefficients=[gap.coefficient for gap in gaps],
+        gap_std=[gap.gap_std for gap in gaps],
+        noise_std=[gap.noise_std for gap in gaps],
+        relative=[gap.relative for gap in gaps],
+        derivatives=[gap.derivative for gap in gaps],
+        deviation=[gap.deviation for gap in gaps],
+    )
 
 
 def estimates_from_message(message: Any, start_ns: int) -> Estimates:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +26,8 @@ def save_estimates(folder: Path, session: Session) -> Path:
         "samples": session.samples,
         "rejected": session.rejected,
         "settings": session.settings.as_dict(),
-        "derivatives": {name: _plain(asdict(d), without="name") for name, d in estimates.derivatives.items()},
-        "fits": {name: _plain(asdict(f), without="coefficient") for name, f in estimates.fits.items()},
+        "derivatives": {name: _plain(d._asdict(), without="name") for name, d in estimates.derivatives.items()},
+        "fits": {name: _plain(f._asdict(), without="coefficient") for name, f in estimates.fits.items()},
         "holdout": {},
     }
     path = folder / f"{session.aircraft.name}-{stamp_ns}.json"

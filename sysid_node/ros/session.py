@@ -10,6 +10,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flat
 from sysid_node.online import estimator, intake, schedule
 from sysid_node.online.estimates import estimate
+from sysid_node.online.model_gap import CoefficientGap, model_gap
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 from sysid_node.ros.monitor import Durations
@@ -55,6 +56,10 @@ class Session:
         last = self.schedule.previous
         assert last is not None
         return Due(intake.stamp_of(self.intake, last), estimate(self.state, last + silence))
+
+    def gap(self, estimates: Estimates) -> tuple[CoefficientGap, ...]:
+        """How far the flight is from the aircraft file, with the estimates that were made last."""
+        return model_gap(self.state, estimates)
 
     def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due."""

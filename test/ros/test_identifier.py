@@ -74,6 +74,10 @@ def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Prob
         assert bits(live) == bits(estimates), f"at {(stamp - START_NS) / 1e9} s"
     assert any(d.valid for d in heard[max(expected)].derivatives), "the comparison must have something to compare"
     assert {heard[stamp].header.frame_id for stamp in expected} == {"base_link"}
+    last = probe.gaps[-1]
+    assert (last.aircraft, last.header.frame_id) == ("cdrw", "base_link")
+    assert set(last.coefficients) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
+    assert all(value > 0.0 for value in (*last.gap_std, *last.noise_std, *last.relative))
 
 
 def test_forward_right_down_messages_give_the_same(probe: Probe, bag: Path, tmp_path: Path) -> None:

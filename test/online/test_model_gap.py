@@ -1,0 +1,67 @@
+"""The live gap: none where the file is what was estimated, and the right derivative where the file is wrong."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.bag import read_streams
+from sysid_node.online import estimator
+from sysid_node.online.alignment import align_streams
+from sysid_node.online.estimates import estimate
+from sysid_node.online.model_gap import CoefficientGap, model_gap
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
+
+BAG = Path(__file__).resolve().parents[2] / "bags" / "cdrw_multistep"
+
+
+def flown(aircraft: Aircraft) -> tuple[Estimates, dict[str, CoefficientGap]]:
+    """Estimates and gap after 25 s of the bundled flight."""
+    aligned = align_streams(aircraft, read_streams(BAG), Settings().max_gap)
+    state = estimator.init(aircraft, Settings())
+    assert model_gap(state, estimate(state)) == ()
+    for time, sample in zip(aligned.time[:5000].tolist(), aligned.samples.tolist(), strict=False):
+        estimator.update(state, time, sample)
+    estimates = estimate(state)
+    return estimates, {gap.coefficient: gap for gap in model_gap(state, estimates)}
+
+
+def with_values(aircraft: Aircraft, values: dict[str, float]) -> Aircraft:
+    changed = {n: replace(d, value=values[n]) if n in values else d for n, d in aircraft.derivatives.items()}
+    return replace(aircraft, derivatives=changed)
+
+
+@pytest.fixture(scope="module")
+def cdrw() -> Aircraft:
+    return load_aircraft("cdrw")
+
+
+def test_a_file_that_says_what_was_estimated_leaves_the_noise(cdrw: Aircraft) -> None:
+    """The estimates do not depend on the file's values, so they can be put there: gap and noise are then one number."""
+    estimates, gaps = flown(cdrw)
+    _, closed = flown(with_values(cdrw, {name: d.value for name, d in estimates.derivatives.items()}))
+    for coefficient, gap in closed.items():
+        assert gap.gap_std == pytest.approx(gap.noise_std, rel=1e-5), coefficient
+        assert gap.noise_std == pytest.approx(gaps[coefficient].noise_std, rel=1e-9)
+        assert gap.relative < 0.5
+        assert gap.derivative == "" or abs(gap.deviation) < 1e-6
+
+
+def test_a_wrong_derivative_is_named_with_its_sign(cdrw: Aircraft) -> None:
+    """Half the elevator's moment in the file: Cm no longer fits, by Cm_de (negative, so the flight lies below)."""
+    _, right = flown(cdrw)
+    _, wrong = flown(with_values(cdrw, {"Cm_de": 0.5 * cdrw.derivatives["Cm_de"].value}))
+    assert wrong["Cm"].derivative == "Cm_de"
+    assert wrong["Cm"].deviation < -2.0
+    assert wrong["Cm"].gap_std > 2.0 * right["Cm"].gap_std
+    for coefficient in ("CL", "CD", "CY", "Cl", "Cn"):
+        assert wrong[coefficient] == right[coefficient]
+
+
+def test_a_file_without_motion_explains_nothing(cdrw: Aircraft) -> None:
+    _, gaps = flown(with_values(cdrw, dict.fromkeys(cdrw.derivatives, 0.0)))
+    assert all(math.isclose(gap.relative, 1.0, rel_tol=1e-9) for gap in gaps.values())
