@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax
@@ -13,6 +14,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.information import Information, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
+from sysid_node.excite.spec import Segment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Flight, Inputs, Simulator, parameters
 from sysid_node.sim.atmosphere import air_density
@@ -76,6 +78,16 @@ class Predictor:
                 f"aircraft {aircraft.name!r}: noise of {zero} is zero; a prediction needs noise on every sensor"
             )
 
+    @property
+    def full_thrust(self) -> float:
+        """N for one unit of the throttle: at full throttle, or one where it is in N."""
+        throttle = self.aircraft.throttle
+        return 1.0 if throttle is None or throttle.max_thrust is None else throttle.max_thrust
+
+    def draw(self, segments: Sequence[Segment], duration: float | None = None) -> Manoeuvre:
+        """Segments as a manoeuvre at the predictor's rate, ``duration`` s long."""
+        return draw_manoeuvre(segments, self.aircraft, self.simulator.rate, duration)
+
     def predict(self, manoeuvre: Manoeuvre) -> Prediction:
         """Fly it from trim. Raises InputError where a control saturates or the flight diverges."""
         flight = self._fly(self.commands(manoeuvre))
@@ -92,10 +104,8 @@ class Predictor:
 
     def commands(self, manoeuvre: Manoeuvre) -> Array:
         """The manoeuvre upon trim, (N, controls + 1): rad, and thrust in N."""
-        throttle = self.aircraft.throttle
-        thrust = np.zeros(manoeuvre.time.size)
-        if throttle is not None:
-            thrust = manoeuvre.deflections[THROTTLE] * (1.0 if throttle.max_thrust is None else throttle.max_thrust)
+        still = np.zeros(manoeuvre.time.size)
+        thrust = self.full_thrust * manoeuvre.deflections.get(THROTTLE, still)
         commands = np.asarray(self.trim.command + np.column_stack([manoeuvre.surfaces(), thrust]))
         _check_travel(self.aircraft, manoeuvre, commands)
         return commands
@@ -141,11 +151,16 @@ slopes_of = jax.jit(jax.jacfwd(outputs_of, argnums=2), static_argnums=0)
 
 def _check_travel(aircraft: Aircraft, manoeuvre: Manoeuvre, commands: Array) -> None:
     """Raise InputError where trim and manoeuvre together pass a control's limit, naming it and the time."""
-    limits = [control.limit or np.inf for control in aircraft.controls.values()]
-    for i, (name, limit) in enumerate(zip(aircraft.controls, limits, strict=True)):
-        worst = int(np.abs(commands[:, i]).argmax())
-        if abs(commands[worst, i]) > limit * (1 + 1e-9):
+    limits = {
+        name: (-(control.limit or np.inf), control.limit or np.inf) for name, control in aircraft.controls.items()
+    }
+    if aircraft.throttle is not None:
+        limits["thrust"] = (0.0, aircraft.throttle.max_thrust or np.inf)
+    for i, (name, (low, high)) in enumerate(limits.items()):
+        beyond = np.maximum(low - commands[:, i], commands[:, i] - high)
+        worst = int(beyond.argmax())
+        if beyond[worst] > 1e-9:
             raise InputError(
-                f"manoeuvre {manoeuvre.spec!r}: trim included, {name} reaches {commands[worst, i]:.4g} rad at "
-                f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name}'s limit is {limit:g}; lower the amplitude"
+                f"manoeuvre {manoeuvre.spec!r}: trim included, {name} reaches {commands[worst, i]:.4g} at "
+                f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name} allows {low:g} to {high:g}; lower the amplitude"
             )

@@ -115,6 +115,8 @@ def test_a_throttle_manoeuvre_moves_thrust(predictor):
     manoeuvre = parse_manoeuvre("doublet:throttle:amplitude=0.1", CDRW, RATE, DURATION)
     commands = predictor.commands(manoeuvre)
     assert np.ptp(commands[:, -1]) == pytest.approx(2 * 0.1 * 30.0)
+    with pytest.raises(InputError, match=r"thrust reaches -\d.* but cdrw allows 0 to 30"):
+        predictor.commands(parse_manoeuvre("doublet:throttle:amplitude=0.2", CDRW, RATE, DURATION))
     assert np.ptp(commands[:, :-1]) == pytest.approx(np.ptp(predictor.trim.command[:-1]))
 
 
@@ -122,7 +124,9 @@ def test_trim_counts_against_the_limit():
     aircraft = load_aircraft("cdfp")  # trims at -0.057 rad of 0.40
     predictor = Predictor(aircraft, RATE)
     manoeuvre = parse_manoeuvre("pulse:elevator:amplitude=-0.39:width=0.1", aircraft, RATE, DURATION)
-    with pytest.raises(InputError, match=r"trim included, elevator reaches -0.44\d* rad at 1.00 s.*limit is 0.4"):
+    with pytest.raises(
+        InputError, match=r"trim included, elevator reaches -0.44\d* at 1.00 s, but cdfp allows -0.4 to 0.4"
+    ):
         predictor.predict(manoeuvre)
 
 

@@ -1,0 +1,112 @@
+"""The numbers of a manoeuvre that may be shaped, as a point in the unit cube."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.excite.manoeuvre import THROTTLE, control_limits
+from sysid_node.excite.prediction import Predictor
+from sysid_node.excite.spec import Segment
+
+Array = NDArray[np.float64]
+
+#: Steps last between these (s); amplitudes lie between these shares of the control's travel. Both are searched in
+#: logarithms.
+_WIDTHS = (0.1, 2.0)
+_SHARES = (0.01, 0.95)
+#: Trim is flown for so long first (s).
+_LEAD = 1.0
+
+
+@dataclass(frozen=True)
+class Space:
+    """Amplitudes, beginnings and, of steps, widths of ``segments``, flown by ``predictor`` within ``duration`` (s)."""
+
+    predictor: Predictor
+    segments: Sequence[Segment]
+    duration: float
+
+    @property
+    def size(self) -> int:
+        """How many numbers are free."""
+        return sum(len(segment.controls) + 1 + ("width" in segment.values) for segment in self.segments)
+
+    @property
+    def travel(self) -> dict[str, float]:
+        """How far each control may move from trim either way; half a radian where nothing limits it."""
+        trim = dict(zip(self.predictor.simulator.commands, self.predictor.trim.command.tolist(), strict=True))
+        room: dict[str, float] = {}
+        for name, limit in control_limits(self.predictor.aircraft).items():
+            if name == THROTTLE:
+                share = trim["thrust"] / self.predictor.full_thrust
+                room[name] = min(share, limit - share)
+            else:
+                room[name] = limit - abs(trim[name]) if np.isfinite(limit) else 0.5
+        return room
+
+    def encode(self, segments: Sequence[Segment]) -> Array:
+        """The point (size,) of these segments."""
+        travel = self.travel
+        point: list[float] = []
+        for segment in segments:
+            for control, amplitude in zip(segment.controls, segment.amplitude, strict=True):
+                point.append(_place(abs(amplitude) / travel[control], *_SHARES))
+            if "width" in segment.values:
+                point.append(_place(segment.values["width"], *self._widths(segment)))
+            point.append((segment.values["start"] - _LEAD) / max(self._room(segment), 1e-9))
+        return np.clip(point, 0.0, 1.0)
+
+    def decode(self, point: Array) -> list[Segment]:
+        """The segments of a point, in numbers of four decimals: what is flown is what the spec says."""
+        values, travel = iter(np.clip(point, 0.0, 1.0).tolist()), self.travel
+        found: list[Segment] = []
+        for segment in self.segments:
+            shares = [_value(next(values), *_SHARES) for _ in segment.controls]
+            amplitude = tuple(
+                _round(float(np.sign(a) or 1.0) * share * travel[c])
+                for a, share, c in zip(segment.amplitude, shares, segment.controls, strict=True)
+            )
+            changed = dict(segment.values)
+            if "width" in changed:
+                changed["width"] = _round(_value(next(values), *self._widths(segment)))
+            moved = replace(segment, amplitude=amplitude, values=changed)
+            changed["start"] = _round(_LEAD + next(values) * self._room(moved))
+            found.append(replace(moved, values=changed))
+        return found
+
+    def _room(self, segment: Segment) -> float:
+        """How much later (s) than the lead the segment may begin to end in time."""
+        return max(self.duration - _span(segment) - _LEAD, 0.0)
+
+    def _widths(self, segment: Segment) -> tuple[float, float]:
+        """Shortest and longest width (s) of a segment of steps that ends in time; its span is linear in the width."""
+        shortest, longest = _WIDTHS
+        first, second = (_span(replace(segment, values={**segment.values, "width": w})) for w in _WIDTHS)
+        slope = (second - first) / (longest - shortest)
+        fitting = shortest + (self.duration - _LEAD - first) / slope
+        return shortest, min(max(fitting, 1.01 * shortest), longest)
+
+
+def _span(segment: Segment) -> float:
+    """Seconds from its first beginning to its last end."""
+    return segment.end - segment.values["start"]
+
+
+def _place(value: float, low: float, high: float) -> float:
+    """Where a value lies between low and high, in logarithms: 0 to 1."""
+    return float(np.log(max(value, low) / low) / np.log(high / low))
+
+
+def _value(place: float, low: float, high: float) -> float:
+    """The inverse of ``_place``."""
+    return float(low * (high / low) ** place)
+
+
+def _round(value: float) -> float:
+    """Towards zero to four decimals, so that what just fits still does; the slack is for rounding errors."""
+    return math.trunc(value * 1e4 + math.copysign(1e-6, value)) / 1e4
