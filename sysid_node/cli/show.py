@@ -14,9 +14,10 @@ from sysid_node.online.types import Estimates
 
 @contextmanager
 def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr that shows the share (0..1) it is told; nothing where ``quiet``, and no bar in a file."""
+    """A bar on stderr that shows the share (0..1) it is told; nothing where ``quiet`` or where stderr is a file."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
         task = progress.add_task(title, total=1.0)
         yield lambda share: progress.update(task, completed=share)
 

@@ -157,10 +157,9 @@ def line_of(capsys, arguments) -> str:
     assert main(arguments) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    lines = captured.err.strip().splitlines()
-    assert len(lines) == 1
-    assert lines[0].startswith("sysid replay: ")
-    return lines[0]
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("sysid replay: ")
+    return captured.err
 
 
 @pytest.mark.parametrize(
