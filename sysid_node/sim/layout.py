@@ -86,7 +86,7 @@ def model_of(aircraft: Aircraft) -> Model:
         raise InputError(
             f"aircraft {aircraft.name!r}: inertia {inertia}: simulation needs Ixx, Iyy, Izz and Ixz; complete the file"
         )
-    lift, alpha = _level_flight(aircraft)
+    lift, alpha = level_flight(aircraft)
     geometry, throttle = aircraft.geometry, aircraft.throttle
     numbers: dict[str, Any] = {
         "mass": aircraft.mass,
@@ -110,7 +110,7 @@ def model_of(aircraft: Aircraft) -> Model:
     return Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})
 
 
-def _level_flight(aircraft: Aircraft) -> tuple[float, float]:
+def level_flight(aircraft: Aircraft) -> tuple[float, float]:
     """CL and alpha (rad) of unaccelerated level flight at the reference condition, thrust along the path.
 
     Solves CL = weight and Cm = 0 for alpha and the elevator; without an elevator, CL alone.

@@ -102,6 +102,12 @@ class Simulator:
         known = effects if isinstance(effects, Mapping) else parameters.parse(effects)
         return parameters.vector(self.layout, known)
 
+    def effects(self, effects: Mapping[str, Mapping[str, float]] | Sequence[str]) -> dict[str, dict[str, float]]:
+        """The same effects by every parameter of theirs, as the vector holds them. Raises InputError."""
+        known = effects if isinstance(effects, Mapping) else parameters.parse(effects)
+        values = parameters.unpack(self.layout, jnp.asarray(parameters.vector(self.layout, known)))
+        return {name: {key: float(value) for key, value in values[name].items()} for name in known}
+
     def initial(
         self,
         airspeed: Scalar | float,

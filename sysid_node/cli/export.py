@@ -1,0 +1,87 @@
+"""``sysid export``: an estimate as another simulator's model."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft, Derivative
+from sysid_node.errors import InputError
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+FORMATS = ("jsbsim", "gazebo", "rosflight")
+
+
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser("export", help="write an estimate as another simulator's model", description=__doc__)
+    estimate = "summary.json of a run, its folder, or an aircraft (file or name)"
+    parser.add_argument("estimate", metavar="ESTIMATE", help=estimate)
+    parser.add_argument("--aircraft", help="file or name (default: the one that the estimate names)")
+    parser.add_argument("--format", choices=FORMATS, required=True, help="whose model")
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME:KEY=VALUE", help="where it can be told")
+    parser.add_argument("--quiet", action="store_true", help="say nothing")
+    return parser
+
+
+def run(args: argparse.Namespace) -> None:
+    """Reads the estimate, writes the model."""
+    summary = _summary(args.estimate)
+    aircraft = load_aircraft(args.aircraft or (summary["aircraft"] if summary else args.estimate))
+    left: list[str] = []
+    if summary:
+        aircraft, left = with_estimates(aircraft, summary["derivatives"])
+    text = _write(args.format, aircraft, args.effect)
+    try:
+        args.out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{args.out}: cannot be written: {error.strerror}; choose another file") from error
+    if not args.quiet:
+        kept = f"; not valid, kept as in the aircraft file: {', '.join(left)}" if left else ""
+        print(f"{args.out}: {aircraft.name} for {args.format}{kept}")
+
+
+def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]]) -> tuple[Aircraft, list[str]]:
+    """The aircraft with the valid estimates for its derivatives, and the names of those that are not valid."""
+    derivatives, left = dict(aircraft.derivatives), []
+    for name, estimate in estimates.items():
+        if estimate.get("valid") and estimate.get("value") is not None:
+            derivatives[name] = Derivative(float(estimate["value"]), estimate.get("standard_error"))
+        else:
+            left.append(name)
+    return replace(aircraft, derivatives=derivatives), left
+
+
+def _summary(estimate: str) -> dict[str, Any] | None:
+    """The run's summary; None where the estimate is an aircraft. Raises InputError where it is neither."""
+    path = Path(estimate)
+    path = path / "summary.json" if path.is_dir() else path
+    if path.suffix != ".json":
+        return None
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(found["aircraft"], str) and isinstance(found["derivatives"], dict):
+            return dict(found)
+    except FileNotFoundError:
+        raise InputError(f"{path}: not found; give the folder of a run, its summary.json, or an aircraft") from None
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise InputError(f"{path}: not the summary.json of a run (it needs aircraft and derivatives)")
+
+
+def _write(form: str, aircraft: Aircraft, specs: list[str]) -> str:
+    from sysid_node.sim.export.gazebo import gazebo_plugin  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.export.jsbsim import jsbsim_model  # noqa: PLC0415
+    from sysid_node.sim.export.rosflight import rosflight_parameters  # noqa: PLC0415
+    from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
+
+    effects = Simulator(aircraft).effects(specs) if specs else {}
+    return {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form](aircraft, effects)
