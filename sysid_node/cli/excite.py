@@ -7,7 +7,7 @@ import csv
 import json
 import math
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
     from sysid_node.excite.optimise import Envelope
     from sysid_node.excite.prediction import Predictor
+    from sysid_node.excite.spec import Segment
     from sysid_node.report.excite import ExciteResult
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -79,10 +80,10 @@ def design(args: argparse.Namespace) -> ExciteResult:
 def _optimised(
     args: argparse.Namespace,
     predictor: Predictor,
-    segments: Sequence[Any],
+    segments: Sequence[Segment],
     plan: Manoeuvre,
     envelope: Envelope,
-    progress: Any,
+    progress: Callable[[float], None],
 ) -> ExciteResult:
     from sysid_node.excite.optimise import optimise  # noqa: PLC0415
     from sysid_node.report.excite import ExciteResult  # noqa: PLC0415

@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid_node.excite.manoeuvre import THROTTLE, control_limits
 from sysid_node.excite.multisine import relative_peak_factor
-from sysid_node.excite.optimise import shares_left
+from sysid_node.excite.optimise import Optimum, shares_left
 from sysid_node.excite.prediction import tolerances_of
 from sysid_node.report import figures
 from sysid_node.report.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
@@ -99,7 +99,7 @@ def _beyond(result: ExciteResult) -> list[str]:
     return [f"{names[n]} ({number(100 * (1 + e), 3)}\u202f% of its limit)" for n, e in excess.items() if e > 0]
 
 
-def _optimum(optimum: Any) -> Mapping[str, str]:
+def _optimum(optimum: Optimum) -> Mapping[str, str]:
     return {
         "start": f"{number(100 * optimum.cost_start, 3)}\u202f%",
         "best": f"{number(100 * optimum.cost_best, 3)}\u202f%",
