@@ -22,6 +22,11 @@ from sysid_node.ros import conversion
 ROOT = Path(__file__).resolve().parents[2]
 JOINTS = ("elevator", "aileron", "rudder", "throttle")
 START_NS = 1_700_000_000_000_000_000
+LOSSLESS = [
+    f"qos_overrides./{topic}.subscription.{policy}"
+    for topic in ("imu/data", "air_data", "actuators")
+    for policy in ("reliability:=reliable", "depth:=5000")
+]
 IMU_SIGNS = np.array([1.0, -1.0, -1.0] * 2)  # FRD to FLU
 
 
@@ -151,15 +156,18 @@ def ended(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
             process.communicate()
 
 
-def start_identifier(*parameters: str) -> subprocess.Popen[str]:
-    """The identifier with ``name:=value`` parameters; of the cdrw where none of them says otherwise."""
-    pairs = ("aircraft:=cdrw", *parameters)
+def start_identifier(*parameters: str, lossless: bool = True) -> subprocess.Popen[str]:
+    """The identifier with ``name:=value`` parameters; of the cdrw where none of them says otherwise.
+
+    ``lossless``: no message is lost, however busy the machine is; else the quality of service is the default's.
+    """
+    pairs = ("aircraft:=cdrw", *(LOSSLESS if lossless else ()), *parameters)
     return start("identifier", "--ros-args", *(word for pair in pairs for word in ("-p", pair)))
 
 
-def identifier(*parameters: str) -> AbstractContextManager[subprocess.Popen[str]]:
+def identifier(*parameters: str, lossless: bool = True) -> AbstractContextManager[subprocess.Popen[str]]:
     """The same, ended when the block is."""
-    return ended(start_identifier(*parameters))
+    return ended(start_identifier(*parameters, lossless=lossless))
 
 
 def made_up_streams(seconds: float, seed: int = 0) -> Streams:

@@ -23,10 +23,6 @@ from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 from sysid_node.ros.conversion import estimates_from_message, stamp_ns
 
-RELIABLE = [
-    f"qos_overrides./{topic}.subscription.reliability:=reliable" for topic in ("imu/data", "air_data", "actuators")
-]
-
 
 def expected_of(streams: Streams) -> dict[int, Estimates]:
     """What the desk makes of a flight at the default publish rate: header stamp -> estimates."""
@@ -63,7 +59,7 @@ def bits(estimates: Estimates) -> list[object]:
 def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Probe, bag: Path) -> None:
     expected = expected_of(read_streams(bag))
     assert len(expected) == 239
-    with identifier(*RELIABLE):
+    with identifier():
         probe.await_identifier()
         probe.play(bag)
         probe.spin(0.3)
@@ -84,7 +80,7 @@ def test_forward_right_down_messages_give_the_same(probe: Probe, bag: Path, tmp_
     turned = tmp_path / "frd"
     write_streams(turned, made_up_streams(4.0), frame="frd")
     expected = expected_of(made_up_streams(4.0))
-    with identifier(*RELIABLE, "body_frame:=frd"):
+    with identifier("body_frame:=frd"):
         probe.await_identifier()
         probe.play(turned)
         probe.spin(0.3)
@@ -95,7 +91,7 @@ def test_forward_right_down_messages_give_the_same(probe: Probe, bag: Path, tmp_
 
 def test_simulated_time(probe: Probe, bag: Path) -> None:
     """With use_sim_time and /clock the lag is counted in the flight's time."""
-    with identifier(*RELIABLE, "use_sim_time:=true"):
+    with identifier("use_sim_time:=true"):
         probe.await_identifier()
         probe.play(bag, "--clock")
         probe.until(lambda: probe.said("computation", "lag (s)"))
@@ -104,7 +100,7 @@ def test_simulated_time(probe: Probe, bag: Path) -> None:
 
 def test_silence_makes_estimates_stale(probe: Probe) -> None:
     flight = made_up_streams(4.0)
-    with identifier():
+    with identifier(lossless=False):
         probe.await_identifier()
         probe.speak(flight)
         probe.until(lambda: probe.estimates and {d.status for d in probe.estimates[-1].derivatives} == {"stale input"})
