@@ -1,0 +1,50 @@
+"""The demo, whole: player and identifier in processes of their own, the table, the report."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def demo(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """`sysid demo` in a domain of its own."""
+    environment = {**os.environ, "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fast_discovery.xml")}
+    environment.pop("ROS_DOMAIN_ID", None)
+    command = [sys.executable, "-m", "sysid_node.cli", "demo", *arguments]
+    return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_it_identifies_the_bundled_flight_and_writes_the_report(tmp_path: Path) -> None:
+    done = demo("bags/cdrw_multistep", "--rate", "8", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert "report:" in done.stdout
+    assert "lost on the way" not in done.stdout
+    assert (tmp_path / "report.html").stat().st_size > 100_000
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["aircraft"] == "cdrw"
+    assert summary["rejected"] == {} or sum(summary["rejected"].values()) < 10
+    valid = [name for name, found in summary["derivatives"].items() if found["valid"]]
+    assert len(valid) >= 20, summary["derivatives"]
+    assert f"{len(valid)} of 27 derivatives valid after 60 s" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere"], "nowhere"),
+        (["bags/cdrw_multistep", "--aircraft", "nonesuch"], "aircraft 'nonesuch' is not known"),
+        (["bags/cdrw_multistep", "--rate", "0"], "--rate 0: expected a number over zero"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(arguments: list[str], words: str, tmp_path: Path) -> None:
+    done = demo(*arguments, "--out", str(tmp_path))
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
