@@ -85,7 +85,10 @@ def run(args: argparse.Namespace) -> None:
     if not args.rate > 0.0:
         raise InputError(f"--rate {args.rate:g}: expected a number over zero")
     flight = _read(args.bag, load_aircraft(args.aircraft))
-    args.out.mkdir(parents=True, exist_ok=True)
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {args.out}: cannot be made ({error.strerror}); give another folder") from None
     # A domain of its own: neither hears nor disturbs other ROS programs, here or on the network.
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
