@@ -103,7 +103,8 @@ def _decode_block(
             return
         layout = layout_of(store, msgtype, block[0].tobytes())
         same = layout.matches(block)
-        yield at[same], _Batch(layout, np.ascontiguousarray(block[same]).view(layout.dtype)[:, 0])
+        alike = block if same.all() else block[same]
+        yield at[same], _Batch(layout, alike.view(layout.dtype)[:, 0])
         at, block = at[~same], block[~same]
     for i, message in zip(at, block, strict=True):
         yield np.array([i]), _Single(store.deserialize_cdr(message.tobytes(), msgtype))

@@ -69,10 +69,7 @@ def one_by_one(path, settings, rate):
 
 def bits(known):
     """Everything that estimates say, as text that shows every bit."""
-    return [
-        known.time.hex(),
-        *(repr(dataclasses.astuple(x)) for x in (*known.derivatives.values(), *known.fits.values())),
-    ]
+    return [known.time.hex(), *map(repr, (*known.derivatives.values(), *known.fits.values()))]
 
 
 @pytest.mark.parametrize("rate", [20.0, 3.0])
