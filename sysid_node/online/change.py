@@ -1,12 +1,13 @@
 """Abrupt changes of the aircraft, and flight that the model no longer explains.
 
 The transforms of the last few seconds are kept in pieces. Each time a piece is complete, the equations over the last
-one to four seconds are tested against the estimates from before them: the score A'r of the residual r is
-zero-mean with covariance s^2 A'KA + G C G while nothing has changed (C: covariance of the earlier estimates, G = A'A),
-so Q = (A'r)' Cov^-1 (A'r) is chi-square (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2,
-the generalised likelihood ratio over the time of change). A change is announced when Q cannot be chance and the
-changed derivatives explain most of what the old ones leave. Residuals that nothing explains are another matter:
-the model itself does not hold there (near the stall, say).
+one to four seconds are tested against the estimates from before them: the score A'r of the residual r is zero-mean with
+covariance s^2 A'KA + G C G while nothing has changed (C: covariance of the earlier estimates, G = A'A), so Q = (A'r)'
+Cov^-1 (A'r) is chi-square (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2, the generalised
+likelihood ratio over the time of change). Over spans much shorter than the period of the line spacing, A'KA is A'A over
+twice that spacing, whatever the span. A change is announced when Q cannot be chance and the changed derivatives explain
+most of what the old ones leave. Residuals that nothing explains are another matter: the model itself does not hold
+there (near the stall, say).
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gdtrix
 
-from sysid_node.online.information import Information, measure
+from sysid_node.online.information import about_mean, project
 from sysid_node.online.regression import Plan, Solution, Uncertainty
 
 Array = NDArray[np.float64]
 
 PIECE = 0.5  # s
-SPANS = (2, 3, 4, 6, 8)  # pieces looked back over
-FALSE_ALARM = 1e-12  # a test: 7200 pieces an hour, times six coefficients and five spans
+SPANS = (2, 4, 8)  # pieces looked back over
+FALSE_ALARM = 1e-12  # a test: 7200 pieces an hour, times six coefficients and three spans
 MARGIN = 3.0  # and Q must exceed what chance allows by this factor: no model is exact
 EXPLAINED = 0.6  # share of the misfit that changed derivatives must explain
 MISFIT = 0.05  # share of the motion's energy that the misfit must reach to matter
@@ -69,12 +70,15 @@ class _Misfit:
 
     per_derivative: float  # Q over its number of derivatives
     over_chance: float  # Q over what chance allows
-    material: bool  # whether it matters and changed derivatives explain it
+    explained: bool  # whether changed derivatives explain it
     unexplained: bool  # whether nothing does
 
 
-def examine(plan: Plan, watch: Watch, omega: Array, now: float) -> Finding:
-    """Test every span of the last pieces; see the module's text."""
+def examine(plan: Plan, watch: Watch, density_per_gram: float, now: float) -> Finding:
+    """Test every span of the last pieces; see the module's text.
+
+    ``density_per_gram`` (s): A'KA over A'A where the span is much shorter than the period of the line spacing.
+    """
     lost = np.zeros(len(plan.coefficients), dtype=bool)
     best, since = MARGIN, None
     for span in (span for span in SPANS if span <= len(watch.pieces)):
@@ -82,11 +86,13 @@ def examine(plan: Plan, watch: Watch, omega: Array, now: float) -> Finding:
         reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
         if reference is None:
             break
-        window = measure(np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0), omega, start, now, np.inf)
-        for c in np.flatnonzero(reference.uncertainty.freedom >= KNOWN).tolist():
-            misfit = _misfit(plan, reference, window, c)
+        lines = project(about_mean(np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0)))
+        gram = lines.T @ lines
+        energy = 0.5 * lines.shape[0] * (now - start)
+        for c in _suspects(plan, reference, gram):
+            misfit = _misfit(plan, reference, gram, c, density_per_gram, energy)
             usual = max(watch.usual.get(c, 1.0), 1.0)
-            if misfit.material and misfit.over_chance > best * usual:
+            if misfit.explained and misfit.over_chance > best * usual:
                 # the change fell somewhere in the oldest piece: what came after it is all new
                 best, since = misfit.over_chance / usual, watch.pieces[1 - span][0]
             if span == USUAL:
@@ -95,26 +101,34 @@ def examine(plan: Plan, watch: Watch, omega: Array, now: float) -> Finding:
     return Finding(since, lost)
 
 
-def _misfit(plan: Plan, reference: Reference, window: Information, c: int) -> _Misfit:
-    """How badly the earlier estimates of a coefficient fit the window, and what would mend it."""
+def _suspects(plan: Plan, reference: Reference, gram: Array) -> list[int]:
+    """Coefficients whose earlier estimates are trusted and miss a share of the motion that matters."""
+    C = len(plan.coefficients)
+    v = np.zeros((plan.width, C))
+    v[plan.outputs, np.arange(C)] = 1.0
+    np.add.at(v, (plan.columns[:, None], np.arange(C)), -reference.solution.theta)
+    missed = ((gram @ v) * v).sum(axis=0) > MISFIT * gram.take(plan.square)
+    return np.flatnonzero(missed & (reference.uncertainty.freedom >= KNOWN)).tolist()
+
+
+def _misfit(plan: Plan, reference: Reference, gram: Array, c: int, density_per_gram: float, energy: float) -> _Misfit:
+    """How badly the earlier estimates of a coefficient fit the span, and what would mend it."""
     mine, y = plan.unknowns(c), plan.outputs[c]
     J = plan.columns[mine]
     density = float(reference.uncertainty.density[c])
-    gram, scores = window.grams.sum(axis=0), window.scores.sum(axis=0)[np.ix_(J, J)]
-    v = np.zeros(gram.shape[0])
+    v = np.zeros(plan.width)
     v[y], v[J] = 1.0, -reference.solution.theta[mine, c]
     misfit, motion = float(v @ gram @ v), float(gram[y, y])
     G, score = gram[np.ix_(J, J)], (gram @ v)[J]
-    G_regular = G + np.diag(G.diagonal() * 1e-9 + 1e-300)
-    explained = float(score @ np.linalg.solve(G_regular, score))
-    energy = float(window.traces.sum())
-    left = (misfit - explained) / max(energy - float(np.trace(np.linalg.solve(G_regular, scores))), 0.1 * energy)
+    explained = float(score @ np.linalg.solve(G + np.diag(G.diagonal() * 1e-9 + 1e-300), score))
+    # nuisances and unknowns take up as much of the noise's energy as of independent lines
+    left = (misfit - explained) / max(energy - (J.size + 3) * density_per_gram, 0.1 * energy)
     C = reference.uncertainty.covariance[c][np.ix_(mine, mine)]
-    spread = max(density, left) * scores + G @ C @ G
+    spread = max(density, left) * density_per_gram * G + G @ C @ G
     Q = float(score @ np.linalg.solve(spread + np.diag(spread.diagonal() * 1e-9 + 1e-300), score))
     return _Misfit(
         per_derivative=Q / J.size,
         over_chance=Q / (2.0 * float(gdtrix(1.0, 0.5 * J.size, 1.0 - FALSE_ALARM))),
-        material=explained > EXPLAINED * misfit and misfit > MISFIT * motion,
+        explained=explained > EXPLAINED * misfit,
         unexplained=misfit - explained > LOST * motion and left > NOISE_RATIO * density,
     )

@@ -1,6 +1,6 @@
 """From the estimator's state to what is published: values, 95 % intervals, and whether to believe them.
 
-Runs at every sample: only what moves from sample to sample is computed here.
+``present`` is the least-squares solution at the last sample; ``estimate`` names it, judges it and wraps it up.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import regression, signals, transform
-from sysid_node.online.estimator import Renewed, State
 from sysid_node.online.information import about_mean, inverse2
+from sysid_node.online.prior import beliefs, weighed
 from sysid_node.online.regression import Solution, student_95
 from sysid_node.online.signals import OFFSET
+from sysid_node.online.state import Renewed, State
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 
 Array = NDArray[np.float64]
@@ -25,157 +26,161 @@ HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apar
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
+BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 _NUISANCES = slice(OFFSET + 1, OFFSET + 3)
 
 
 @dataclass
 class Present:
-    """The solution at the last sample: P unknowns, C coefficients."""
+    """The solution at the last sample: P unknowns, C coefficients, W signals."""
 
     solution: Solution
-    standard_errors: Array  # (P, C)
+    variance: Array  # (P, C) squared standard errors
     gram: Array  # (W, W)
     integrals: Array  # (W,) of the present segment
 
 
 def present(state: State) -> Present | None:
     """Solve for the derivatives with every sample so far; None before the first half second of data."""
-    renewed = state.renewed
+    renewed, last = state.renewed, state.transform.last
     if renewed is None or state.segment is None:
         return None
-    fading = math.exp((state.segment_start - state.transform.last) / (2.0 * state.model.memory))
-    part = transform.current(state.transform) - state.segment * fading
+    part = transform.current(state.transform)
+    rate = state.model.spectrum.rate
+    part -= state.segment * math.exp(0.5 * rate * (state.segment_start - last)) if rate else state.segment
     lines = about_mean(part)
     gram = lines.T @ lines
     border = gram[:, _NUISANCES]
     gram -= border @ inverse2(border[_NUISANCES]) @ border.T
     gram += renewed.base
+    # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
     energy = renewed.total.energy
-    growth = (energy + max(state.transform.last - state.piece_start, 0.0)) / energy if energy > 0.0 else 1.0
-    solution = regression.solve(state.model.plan, gram, renewed.compensation * growth)
-    variance = solution.inverse.diagonal()[:, None] * solution.residual * (renewed.factors / growth)
-    return Present(solution, np.sqrt(np.maximum(variance, 0.0)), gram, part[-1])
+    growth = (energy + max(last - state.piece_start, 0.0)) / max(energy, 1e-9)
+    noise = renewed.compensation
+    bias = None if noise is None else (noise[0] * growth, noise[1] * growth)
+    solution = regression.solve(state.model.plan, gram, bias)
+    variance = renewed.factors * solution.residual
+    variance *= np.abs(solution.inverse.diagonal())[:, None] / growth
+    return Present(solution, variance, gram, part[-1])
 
 
 def estimate(state: State, now: float | None = None) -> Estimates:
     """All derivatives of the aircraft's model with their intervals; ``now`` (s) tells how old the last sample is."""
     current = present(state)
-    derivatives: dict[str, DerivativeEstimate] = {}
-    fits: dict[str, FitQuality] = {}
-    for coefficient, regressors in state.model.aircraft.structure.items():
-        if current is None or coefficient not in state.model.plan.coefficients:
-            reason = signals.unformed(state.model.aircraft).get(coefficient) or _waiting(state)
-            for regressor in regressors:
-                name = f"{coefficient}_{regressor}"
-                derivatives[name] = _unknown(name, reason)
-            continue
-        c = state.model.plan.coefficients.index(coefficient)
-        fits[coefficient] = _fit(state, current, c)
-        for regressor in regressors:
-            value, error = (_offset if regressor == "0" else _slope)(state, current, c, regressor)
-            name = f"{coefficient}_{regressor}"
-            status = _status(state, current, c, regressor, error, now)
-            half = float(student_95(state.renewed.uncertainty.freedom[c])) * error
-            derivatives[name] = DerivativeEstimate(name, value, error, value - half, value + half, status == "ok", status)
-    return Estimates(state.transform.last, derivatives, fits)
+    if current is None or state.renewed is None:
+        names = (f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors)
+        return Estimates(state.transform.last, {name: _unknown(state, name) for name in names}, {})
+    table = state.model.table
+    if state.model.settings.use_prior:
+        _count_beliefs(state, state.renewed, current)
+    slopes, errors = current.solution.theta, np.sqrt(np.maximum(current.variance, 0.0))
+    offsets, offset_errors = _offsets(state, state.renewed, current)
+    quantiles = student_95(state.renewed.uncertainty.freedom)
+    values = np.where(table.offset, offsets[table.coefficient], slopes[table.unknown, table.coefficient]).tolist()
+    spreads = np.where(table.offset, offset_errors[table.coefficient], errors[table.unknown, table.coefficient])
+    halves = (quantiles[table.coefficient] * spreads).tolist()
+    judged = _judge(state, state.renewed, current, np.asarray(values), spreads, now)
+    derivatives = {
+        name: DerivativeEstimate(name, value, error, value - half, value + half, status == "ok", status)
+        for name, value, error, half, status in zip(table.names, values, spreads.tolist(), halves, judged, strict=True)
+    }
+    for name in table.unformed:
+        derivatives[name] = _unknown(state, name)
+    return Estimates(state.transform.last, derivatives, _fits(state, state.renewed, current))
 
 
-def _unknown(name: str, reason: str) -> DerivativeEstimate:
-    return DerivativeEstimate(name, math.nan, math.inf, -math.inf, math.inf, False, reason)
-
-
-def _waiting(state: State) -> str:
-    """Why there is nothing yet."""
-    if state.incomplete and state.samples == 0:
-        column = max(state.incomplete, key=lambda name: state.incomplete[name])
-        return f"{column} not measured"
-    return "converging"
-
-
-def _unknown_index(state: State, c: int, regressor: str) -> int:
+def _count_beliefs(state: State, renewed: Renewed, current: Present) -> None:
+    """Weigh the solution with the aircraft file's derivatives."""
     plan = state.model.plan
-    return next(int(i) for i in plan.unknowns(c) if plan.regressors[i] == regressor)
+    theta, covariance = weighed(
+        plan, current.solution.theta, renewed.uncertainty.covariance, *beliefs(state.model.aircraft, plan)
+    )
+    current.solution.theta = theta
+    current.variance = covariance.diagonal(axis1=1, axis2=2).T.copy()
 
 
-def _slope(state: State, current: Present, c: int, regressor: str) -> tuple[float, float]:
-    i = _unknown_index(state, c, regressor)
-    return float(current.solution.theta[i, c]), float(current.standard_errors[i, c])
+def _unknown(state: State, name: str) -> DerivativeEstimate:
+    """A derivative of which nothing is known, and why."""
+    reason = signals.unformed(state.model.aircraft).get(name.partition("_")[0])
+    if reason is None and state.incomplete and state.samples == 0:
+        column = max(state.incomplete, key=lambda column: state.incomplete[column])
+        reason = f"{column} not measured"
+    return DerivativeEstimate(name, math.nan, math.inf, -math.inf, math.inf, False, reason or "converging")
 
 
-def _offset(state: State, current: Present, c: int, regressor: str) -> tuple[float, float]:
-    """Offset from the signals' integrals: k C_0 = y - sum k C_j x_j, at zero frequency."""
-    plan, renewed = state.model.plan, state.renewed
-    assert renewed is not None
-    mine = plan.unknowns(c)
+def _offsets(state: State, renewed: Renewed, current: Present) -> tuple[Array, Array]:
+    """(C,) offsets and standard errors, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency."""
+    plan = state.model.plan
     past = renewed.total.integrals - (state.present.integrals if state.present is not None else 0.0)
     integrals = past + current.integrals
     weight = float(integrals[OFFSET])
     if not weight > 0.0:
-        return math.nan, math.inf
-    x = integrals[plan.columns[mine]] / weight
-    value = float(integrals[plan.outputs[c]]) / weight - float(x @ current.solution.theta[mine, c])
-    covariance = renewed.uncertainty.covariance[c][np.ix_(mine, mine)]
-    variance = float(renewed.uncertainty.bands[c, 0]) * renewed.total.energy / weight**2 + float(x @ covariance @ x)
-    return value, math.sqrt(max(variance, 0.0))
+        return np.full(plan.outputs.size, np.nan), np.full(plan.outputs.size, np.inf)
+    x = integrals[plan.columns] / weight
+    values = integrals[plan.outputs] / weight - x @ current.solution.theta
+    variance = renewed.uncertainty.bands[:, 0] * (renewed.total.energy / weight**2)
+    variance += renewed.uncertainty.covariance @ x @ x
+    return values, np.sqrt(np.maximum(variance, 0.0))
 
 
-def _fit(state: State, current: Present, c: int) -> FitQuality:
-    plan, renewed = state.model.plan, state.renewed
-    assert renewed is not None
-    y = int(plan.outputs[c])
-    motion, residual = float(current.gram[y, y]), float(current.solution.residual[c])
+def _fits(state: State, renewed: Renewed, current: Present) -> dict[str, FitQuality]:
+    """Quality of the fit of each coefficient."""
+    plan = state.model.plan
     start, _, stop = state.model.settings.frequencies
-    return FitQuality(
-        coefficient=plan.coefficients[c],
-        r_squared=min(max(1.0 - residual / motion, 0.0), 1.0) if motion > 0.0 else 0.0,
-        residual_std=math.sqrt(2.0 * max(float(renewed.uncertainty.density[c]), 0.0) * (stop - start)),
-        degrees_of_freedom=max(float(renewed.uncertainty.freedom[c]), 0.0),
-        samples=round(renewed.total.samples),
+    motion = current.gram.take(plan.square)
+    explained = 1.0 - current.solution.residual / np.maximum(motion, 1e-300)
+    deviations = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density)
+    rows = zip(
+        plan.coefficients,
+        np.clip(explained, 0.0, 1.0).tolist(),
+        deviations.tolist(),
+        renewed.uncertainty.freedom.tolist(),
+        strict=True,
     )
+    return {row[0]: FitQuality(*row, round(renewed.total.samples)) for row in rows}
 
 
-def _status(state: State, current: Present, c: int, regressor: str, error: float, now: float | None) -> str:
-    """Why an estimate is not to be believed, or "ok"."""
-    renewed, name = state.renewed, f"{state.model.plan.coefficients[c]}_{regressor}"
-    assert renewed is not None
-    if now is not None and now - state.transform.last > STALE:
+def _judge(
+    state: State, renewed: Renewed, current: Present, values: Array, errors: Array, now: float | None
+) -> list[str]:
+    """(D,) why each estimate is not to be believed, or "ok"."""
+    table, plan = state.model.table, state.model.plan
+    everywhere = _whole(state, current, now)
+    if everywhere:
+        return [everywhere] * len(table.names)
+    columns = plan.columns[table.unknown]
+    motion = current.gram[columns, columns]
+    inflation = np.where(table.offset, 1.0, current.solution.inverse[table.unknown, table.unknown] * motion)
+    sizes = np.where(table.size > 0.0, table.size, np.abs(values))
+    small = errors <= state.model.settings.valid_fraction * sizes
+    trusted = renewed.uncertainty.freedom >= ENOUGH_FREEDOM
+    good = small & (inflation <= HOPELESS)
+    good &= (trusted & ~renewed.lost)[table.coefficient]
+    if not state.thrust_known:
+        good &= ~table.needs_thrust
+    statuses = ["ok"] * len(table.names)
+    for i in np.flatnonzero(~good).tolist():
+        c, unknown = int(table.coefficient[i]), int(table.unknown[i])
+        if renewed.lost[c]:
+            statuses[i] = "outside model"
+        elif not state.thrust_known and table.needs_thrust[i]:
+            statuses[i] = "thrust not measured"
+        elif not trusted[c]:
+            statuses[i] = "converging"
+        elif inflation[i] > COLLINEAR:
+            statuses[i] = f"collinear with {regression.collinear_with(plan, current.solution, unknown)}"
+        elif not table.offset[i] and motion[i] < BURIED * renewed.total.bias[columns[i], columns[i]]:
+            statuses[i] = "not excited"
+        else:
+            statuses[i] = "converging"
+    return statuses
+
+
+def _whole(state: State, current: Present, now: float | None) -> str:
+    """What holds of all estimates alike, if anything does."""
+    last = state.transform.last
+    if now is not None and now - last > STALE:
         return "stale input"
-    if state.transform.last - state.changed_at < SETTLING:
+    if last - state.changed_at < SETTLING:
         return "changed"
-    if renewed.lost[c]:
-        return "outside model"
-    if not current.solution.usable:
-        return "not excited"
-    if name in ("CD_0", "CL_0") and not state.thrust_known:
-        return "thrust not measured"
-    if renewed.uncertainty.freedom[c] < ENOUGH_FREEDOM:
-        return "converging"
-    inflation = 1.0
-    if regressor != "0":
-        i = _unknown_index(state, c, regressor)
-        column = int(state.model.plan.columns[i])
-        inflation = float(current.solution.inverse[i, i] * current.gram[column, column])
-        if inflation > HOPELESS:
-            return f"collinear with {regression.collinear_with(state.model.plan, current.solution, i)}"
-    if error <= state.model.settings.valid_fraction * _size(state, name, c, regressor, current):
-        return "ok"
-    if regressor != "0" and inflation > COLLINEAR:
-        return f"collinear with {regression.collinear_with(state.model.plan, current.solution, i)}"
-    if regressor != "0" and _buried(current, renewed, column):
-        return "not excited"
-    return "converging"
-
-
-def _size(state: State, name: str, c: int, regressor: str, current: Present) -> float:
-    """What a standard error is measured against: the derivative's believed size, not its estimate, where there is a belief."""
-    belief = state.model.aircraft.derivatives[name]
-    size = max(abs(belief.value), 2.0 * (belief.tolerance or 0.0))
-    if size > 0.0 or regressor == "0":
-        return size
-    return abs(float(current.solution.theta[_unknown_index(state, c, regressor), c]))
-
-
-def _buried(current: Present, renewed: Renewed, column: int) -> bool:
-    """Whether the regressor's motion is no larger than its sensor's noise."""
-    motion = float(current.gram[column, column])
-    return motion < 3.0 * max(float(renewed.total.bias[column, column]), 1e-12)
+    return "" if current.solution.usable else "not excited"

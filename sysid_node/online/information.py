@@ -1,30 +1,31 @@
 """What a stretch of flight says: Gram matrices of the transformed signals, and how its noise is correlated.
 
-A record is taken in segments no longer than one period of the line spacing. Within a segment every
-signal is taken about its mean, z - k mean(z) / mean(k), which removes the offset k C_0 exactly, and a constant and a straight
-drift are projected out (trim, slow drift and transients leak into all lines otherwise);
-then the Gram matrices of the segments add up: least squares on their sum is sequential over segments and uses all
-that the record holds in the band. On one long transform a coarse grid would skip what lies between its lines, and a
-fine one would count the same information twice.
+A record is taken in segments no longer than one period of the line spacing. Within a segment every signal is taken
+about its mean, z - k mean(z) / mean(k), which removes the offset k C_0 exactly, and a constant and a straight drift are
+projected out (trim, slow drift and transients leak into all lines otherwise); then the Gram matrices of the segments
+add up: least squares on their sum is sequential over segments and uses all that the record holds in the band. On one
+long transform a coarse grid would skip what lies between its lines, and a fine one would count the same information
+twice.
 
 Noise of spectral density S appears in the lines of a transform over a window w with the covariance
 
     E[X_i X_j^*] = S integral w^2 exp(-j (omega_i - omega_j) t) dt      (and with + for E[X_i X_j])
 
-so neighbouring lines of a short record are far from independent. ``scores`` keeps A' Sigma A with this covariance,
-per band of lines: with the residual's density in each band it gives the covariance of the estimates whatever the
-grid is (sandwich form: Klein & Morelli 2006, eq. 5.38, with the exact covariance of the finite transform's lines).
+so neighbouring lines of a short record are far from independent. ``scores`` keeps A' Sigma A with this covariance, per
+band of lines: with the residual's density in each band it gives the covariance of the estimates whatever the grid is
+(sandwich form: Klein & Morelli 2006, eq. 5.38, with the exact covariance of the finite transform's lines).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.signals import OFFSET, OUTPUTS
+from sysid_node.online.signals import OFFSET
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
@@ -58,27 +59,43 @@ def nothing(width: int) -> Information:
     return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, np.zeros((width, width)), np.zeros(width), 0.0)
 
 
-def band_edges(lines: int) -> list[slice]:
-    """The lines in ``BANDS`` runs of about equal length."""
-    edges = np.linspace(0, lines, BANDS + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
+@dataclass(frozen=True)
+class Spectrum:
+    """What the covariance of the lines needs of their frequencies, computed once."""
+
+    omega: Array  # (F,) rad/s
+    bands: tuple[slice, ...]  # lines of each band
+    rate: float  # 1/s: decay of the window's energy
+    minus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i - omega_j)); 0 where that has no inverse
+    plus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i + omega_j))
+
+
+def spectrum(omega: Array, memory: float) -> Spectrum:
+    """Lines omega (F,) rad/s in ``BANDS`` runs of about equal length; the window fades with ``memory`` (s)."""
+    edges = np.linspace(0, omega.size, BANDS + 1).round().astype(int).tolist()
+    bands = tuple(slice(a, b) for a, b in pairwise(edges))
+    rate = 1.0 / memory if math.isfinite(memory) else 0.0
+    minus, plus = (rate - 1j * (omega[:, None] + sign * omega) for sign in (-1.0, 1.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = np.where(np.abs(minus) > 1e-9, 1.0 / minus, 0.0)
+    return Spectrum(omega, bands, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
 
 
 def about_mean(transform: Array) -> Array:
     """(2F, W) lines of a transform (2F + 1, W) whose signals are taken about their means; nuisances are kept.
 
-    The noise of the airspeed is in k: fitting the offset to the lines of k would be a regression on noise. The means know better.
+    The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
     """
     share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
     share[OFFSET : OFFSET + 3] = 0.0
-    return transform[:-1] - transform[:-1, OFFSET, None] * share
+    lines: Array = transform[:-1] - transform[:-1, OFFSET, None] * share
+    return lines
 
 
 def project(lines: Array) -> Array:
     """(2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
-    n = lines[:, _N]
-    gram = n.T @ n
-    clean = lines - n @ (inverse2(gram) @ (n.T @ lines))
+    n = lines[:, _N].copy()
+    clean = lines - n @ (inverse2(n.T @ n) @ (n.T @ lines))
     clean[:, _N] = n
     return clean
 
@@ -92,52 +109,47 @@ def inverse2(gram: Array) -> Array:
     return np.array([[1.0 / a if a > 0.0 else 0.0, 0.0], [0.0, 0.0]])
 
 
-def noise_covariance(omega: Array, begin: float, end: float, memory: float) -> Array:
-    """(2F, 2F) covariance of the stacked real and imaginary parts for noise of unit spectral density.
-
-    Window exp(-(end - t) / 2 memory) on begin..end (s).
-    """
-    rate = 1.0 / memory if math.isfinite(memory) else 0.0
-    late, early = np.exp(-1j * omega * end), np.exp(-1j * omega * begin) * math.exp(-0.5 * rate * (end - begin))
-
-    def window(other_late: Array, other_early: Array, difference: Array) -> Array:
-        # integral of exp(-rate (end - t)) exp(-j d t) dt
-        exponent = rate - 1j * difference
-        small = np.abs(exponent) * (end - begin) < 1e-6
-        value = late[:, None] * other_late - early[:, None] * other_early
-        return np.where(small, end - begin, value / np.where(small, 1.0, exponent))
-
-    minus = window(late.conj(), early.conj(), omega[:, None] - omega)
-    plus = window(late, early, omega[:, None] + omega)
-    real, imaginary = 0.5 * (minus + plus), 0.5 * (minus - plus)
-    cross = 0.5 * (plus.imag - minus.imag)
-    return np.block([[real.real, cross], [cross.T, imaginary.real]])
+def noise_covariance(lines: Spectrum, begin: float, end: float) -> Array:
+    """(2F, 2F) covariance of the stacked real and imaginary parts for unit spectral density on begin..end (s)."""
+    late = np.exp(-1j * lines.omega * end)
+    early = np.exp(-1j * lines.omega * begin - 0.5 * lines.rate * (end - begin))
+    # integrals of exp(-rate (end - t)) exp(-j (omega_i -+ omega_j) t) dt
+    minus = (late[:, None] * late.conj() - early[:, None] * early.conj()) * lines.minus
+    plus = (late[:, None] * late - early[:, None] * early) * lines.plus
+    if lines.rate == 0.0:
+        np.fill_diagonal(minus, end - begin)
+    F = lines.omega.size
+    covariance = np.empty((2 * F, 2 * F))
+    covariance[:F, :F] = minus.real + plus.real
+    covariance[F:, F:] = minus.real - plus.real
+    covariance[:F, F:] = plus.imag - minus.imag
+    covariance[F:, :F] = covariance[:F, F:].T
+    covariance *= 0.5
+    return covariance
 
 
-def window_energy(duration: float, memory: float) -> float:
-    """Integral of the window squared over a stretch of ``duration`` (s)."""
-    return memory * -math.expm1(-duration / memory) if math.isfinite(memory) else duration
+def window_energy(duration: float, rate: float) -> float:
+    """Integral of exp(-rate t) over ``duration`` (s)."""
+    return -math.expm1(-rate * duration) / rate if rate else duration
 
 
-def measure(transform: Array, omega: Array, begin: float, end: float, memory: float) -> Information:
+def measure(transform: Array, lines: Spectrum, begin: float, end: float) -> Information:
     """What the transform (2F + 1, W) of begin..end (s) says; ``bias`` and ``samples`` are left at zero."""
-    F = omega.size
+    F = lines.omega.size
     clean = project(about_mean(transform))
-    covariance = noise_covariance(omega, begin, end, memory)
+    covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
     n = clean[:, _N]
-    hat = n @ inverse2(n.T @ n)
-    # what projecting the nuisances out takes from the noise's sum of squares: diagonal of H K
-    taken = np.einsum("ij,ij->i", hat, spread[:, _N])
+    # what projecting the nuisances out leaves of the noise's square in each line: diagonal of (I - H) K
+    left = covariance.diagonal() - ((n @ inverse2(n.T @ n)) * spread[:, _N]).sum(axis=1)
     info = nothing(clean.shape[1])
-    for band, edge in enumerate(band_edges(F)):
-        for part in (edge, slice(F + edge.start, F + edge.stop)):
-            info.grams[band] += clean[part].T @ clean[part]
-            info.scores[band] += clean[part].T @ spread[part]
-            info.traces[band] += np.trace(covariance[part, part]) - taken[part].sum()
-    info.scores += info.scores.transpose(0, 2, 1).copy()
-    info.scores *= 0.5
+    for band, part in enumerate(lines.bands):
+        rows = np.r_[part, F + part.start : F + part.stop]
+        info.grams[band] = clean[rows].T @ clean[rows]
+        score = clean[rows].T @ spread[rows]
+        info.scores[band] = 0.5 * (score + score.T)
+        info.traces[band] = left[rows].sum()
     info.trace_square = float(np.vdot(covariance, covariance))
-    info.energy = window_energy(end - begin, memory)
+    info.energy = window_energy(end - begin, lines.rate)
     info.integrals = transform[-1].copy()
     return info

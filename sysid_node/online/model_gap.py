@@ -1,71 +1,54 @@
-"""How far the flight is from the aircraft file's model, coefficient by coefficient, as the flight goes on."""
+"""How far the flight is from the aircraft file's model, live."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.estimates import Present, present
-from sysid_node.online.estimator import State
-from sysid_node.online.types import DerivativeEstimate, Estimates
+from sysid_node.online.estimates import present
+from sysid_node.online.prior import beliefs
+from sysid_node.online.state import State
 
 
-@dataclass(frozen=True)
-class CoefficientGap:
-    """Misfit of one coefficient in the frequency band; offsets do not count, they are not in the band."""
+class CoefficientGap(NamedTuple):
+    """One coefficient's gap, in the band of the lines; offsets are not compared."""
 
     coefficient: str
-    gap_std: float  # of flight minus the file's model, dimensionless
-    noise_std: float  # of flight minus the fitted model: what no change of derivatives removes
-    relative: float  # gap_std over the coefficient's own standard deviation; 0 = the file explains the flight
-    derivative: str  # that lies furthest from the file, "" = none is valid
-    deviation: float  # of that one, in standard deviations of the difference (the file's tolerance included)
+    gap_std: float  # flight minus the file's model
+    noise_std: float  # the same with the derivatives refitted: what no change of derivatives removes
+    relative: float  # gap over the coefficient's own standard deviation
+    derivative: str  # the one that lies furthest from its value in the file
+    deviation: float  # ... in standard errors of the difference, tolerance included; NaN = not known
 
 
-def model_gap(state: State, estimates: Estimates) -> tuple[CoefficientGap, ...]:
-    """The gap of each coefficient that is estimated; empty before there is anything to compare.
-
-    ``estimates`` are those of the same state. With the Gram matrix G of the transforms of a coefficient y and its
-    regressors X, the file's derivatives theta leave the energy (1, -theta) G (1, -theta)^T (Parseval).
-    """
-    current = present(state)
-    if current is None or not current.solution.usable:
-        return ()
-    return tuple(_gap(state, current, estimates, c) for c in range(len(state.model.plan.coefficients)))
-
-
-def _gap(state: State, current: Present, estimates: Estimates, c: int) -> CoefficientGap:
-    plan, believed = state.model.plan, state.model.aircraft.derivatives
-    coefficient, output, mine = plan.coefficients[c], plan.outputs[c], plan.unknowns(c)
-    misfit = np.zeros(current.gram.shape[0])
-    misfit[output] = 1.0
-    misfit[plan.columns[mine]] = [-believed[f"{coefficient}_{plan.regressors[i]}"].value for i in mine]
-    gap, noise = max(float(misfit @ current.gram @ misfit), 0.0), float(current.solution.residual[c])
-    motion = float(current.gram[output, output])
-    noise_std = estimates.fits[coefficient].residual_std
-    furthest, deviation = _furthest(state.model.aircraft, estimates, coefficient)
-    return CoefficientGap(
-        coefficient=coefficient,
-        gap_std=noise_std * math.sqrt(gap / noise) if noise > 0.0 else math.nan,
-        noise_std=noise_std,
-        relative=math.sqrt(gap / motion) if motion > 0.0 else math.nan,
-        derivative=furthest,
-        deviation=deviation,
-    )
+def model_gap(state: State) -> list[CoefficientGap]:
+    """Gap of every coefficient whose equation can be formed; empty before there are estimates."""
+    current, renewed = present(state), state.renewed
+    if current is None or renewed is None or not current.solution.usable:
+        return []
+    plan = state.model.plan
+    values, precisions = beliefs(state.model.aircraft, plan)
+    start, _, stop = state.model.settings.frequencies
+    per_energy = 2.0 * (stop - start) / max(float(renewed.total.traces.sum()), 1e-12)
+    gaps = []
+    for c, coefficient in enumerate(plan.coefficients):
+        mine, y = plan.unknowns(c), int(plan.outputs[c])
+        v = np.zeros(plan.width)
+        v[y], v[plan.columns[mine]] = 1.0, -values[mine, c]
+        energy, motion = max(float(v @ current.gram @ v), 0.0), float(current.gram[y, y])
+        spread = np.sqrt(np.maximum(current.variance[mine, c], 0.0) + _tolerances(precisions[mine, c]))
+        deviations = np.abs(current.solution.theta[mine, c] - values[mine, c]) / np.maximum(spread, 1e-300)
+        worst = int(np.argmax(deviations))
+        noise = math.sqrt(2.0 * (stop - start) * float(renewed.uncertainty.density[c]))
+        relative = math.sqrt(energy / motion) if motion > 0.0 else math.nan
+        name = f"{coefficient}_{plan.regressors[mine[worst]]}"
+        gap_std = math.sqrt(per_energy * energy)
+        gaps.append(CoefficientGap(coefficient, gap_std, noise, relative, name, float(deviations[worst])))
+    return gaps
 
 
-def _furthest(aircraft: Aircraft, estimates: Estimates, coefficient: str) -> tuple[str, float]:
-    """The valid derivative of a coefficient that lies furthest from the file, and how far, with its sign."""
-
-    def deviation(estimate: DerivativeEstimate) -> float:
-        file = aircraft.derivatives[estimate.name]
-        return (estimate.value - file.value) / math.hypot(estimate.standard_error, file.tolerance or 0.0)
-
-    names = (f"{coefficient}_{regressor}" for regressor in aircraft.structure[coefficient])
-    valid = [estimates.derivatives[name] for name in names if estimates.derivatives[name].valid]
-    deviations = {estimate.name: deviation(estimate) for estimate in valid if estimate.standard_error > 0.0}
-    furthest = max(deviations, key=lambda name: abs(deviations[name]), default="")
-    return furthest, deviations.get(furthest, math.nan)
+def _tolerances(precisions: np.typing.NDArray[np.float64]) -> np.typing.NDArray[np.float64]:
+    """Squared tolerances; zero where none is stated."""
+    return np.divide(1.0, precisions, out=np.zeros_like(precisions), where=precisions > 0.0)

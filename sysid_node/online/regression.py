@@ -7,11 +7,11 @@ matrix, so that one call solves for all six coefficients.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dposv
+from scipy.linalg.lapack import dgesv, dposv
 from scipy.special import stdtrit
 
 from sysid_node.online.information import BANDS, Information
@@ -36,11 +36,29 @@ class Plan:
     block: Index  # (C,) block of each coefficient
     columns: Index  # (P,) column of each unknown's regressor
     outputs: Index  # (C,) column of each coefficient
-    normal: Index  # (P, P) flat indices
+    instruments: Index  # (P,) column of each unknown's instrument: its regressor, in least squares
     same: Array  # (P, P) 1 where two unknowns belong to one block
-    right: Index  # (P, C) flat indices
     mine: Array  # (P, C) 1 where the unknown belongs to the coefficient
-    square: Index  # (C,) flat indices of the outputs' own squares
+    width: int  # W
+    normal: Index = field(init=False)  # (P, P) flat indices of A'A
+    right: Index = field(init=False)  # (P, C) of A'y
+    cross: Index = field(init=False)  # (P, P) of Z'A
+    sides: Index = field(init=False)  # (P, C) of Z'y
+    square: Index = field(init=False)  # (C,) of y'y
+    unit: Array = field(init=False)  # (P, P)
+    least_squares: bool = field(init=False)  # whether every regressor is its own instrument
+
+    def __post_init__(self) -> None:
+        def entries(rows: Index, columns: Index) -> Index:
+            return rows[:, None] * self.width + columns
+
+        object.__setattr__(self, "normal", entries(self.columns, self.columns))
+        object.__setattr__(self, "right", entries(self.columns, self.outputs))
+        object.__setattr__(self, "cross", entries(self.instruments, self.columns))
+        object.__setattr__(self, "sides", entries(self.instruments, self.outputs))
+        object.__setattr__(self, "square", self.outputs * (self.width + 1))
+        object.__setattr__(self, "unit", np.eye(self.columns.size))
+        object.__setattr__(self, "least_squares", bool((self.columns == self.instruments).all()))
 
     def unknowns(self, coefficient: int) -> Index:
         """Indices of a coefficient's unknowns."""
@@ -54,57 +72,64 @@ def plan(structure: dict[str, tuple[str, ...]], layout: Layout) -> Plan:
     regressors = tuple(r for block in blocks for r in block)
     group = np.array([i for i, block in enumerate(blocks) for _ in block], dtype=np.intp)
     block = np.array([blocks.index(rs) for rs in slopes.values()], dtype=np.intp)
-    columns = np.array([layout.column(r) for r in regressors], dtype=np.intp)
-    outputs = np.array([layout.column(c) for c in slopes], dtype=np.intp)
-    W = layout.width
     return Plan(
         coefficients=tuple(slopes),
         regressors=regressors,
         group=group,
         block=block,
-        columns=columns,
-        outputs=outputs,
-        normal=columns[:, None] * W + columns,
+        columns=np.array([layout.column(r) for r in regressors], dtype=np.intp),
+        outputs=np.array([layout.column(c) for c in slopes], dtype=np.intp),
+        instruments=np.array([layout.instrument(r) for r in regressors], dtype=np.intp),
         same=(group[:, None] == group).astype(float),
-        right=columns[:, None] * W + outputs,
         mine=(group[:, None] == block).astype(float),
-        square=outputs * W + outputs,
+        width=layout.width,
     )
 
 
 @dataclass
 class Solution:
-    """Least-squares solution of all coefficients. ``usable`` is False where the normal matrix is singular."""
+    """Solution of all coefficients' normal equations. ``usable`` is False where they are singular."""
 
     theta: Array  # (P, C), zero where an unknown does not belong
-    inverse: Array  # (P, P) of the normal matrix
+    inverse: Array  # (P, P) of Z'A (of A'A in least squares)
     residual: Array  # (C,) sum of squares
     usable: bool
 
 
-def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
-    """Solve the normal equations of a summed Gram matrix (W, W), less what noise adds to it on the average, ``bias``."""
+def solve(plan: Plan, gram: Array, bias: tuple[Array, Array] | None = None) -> Solution:
+    """Solve (Z'A - bias) theta = Z'y - bias from a summed Gram matrix (W, W); ``bias`` is from ``bias_of``.
+
+    Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
+    """
+    normal, right = gram.take(plan.normal), gram.take(plan.right)
+    normal *= plan.same
+    right *= plan.mine
+    matrix, sides = normal, right
+    if not plan.least_squares:
+        matrix, sides = gram.take(plan.cross) * plan.same, gram.take(plan.sides) * plan.mine
+    if bias is not None:
+        matrix, sides = matrix - bias[0], sides - bias[1]
     P = plan.columns.size
-    normal = gram.take(plan.normal) * plan.same
-    right = gram.take(plan.right) * plan.mine
+    known = np.empty((P, P + sides.shape[1]), order="F")
+    known[:, :P] = plan.unit
+    known[:, P:] = sides
+    solver = dposv if plan.least_squares else dgesv
+    *_, solved, fault = solver(matrix, known, overwrite_b=True)
     squares = gram.take(plan.square)
-    if bias is None:
-        matrix, sides = normal, right
-    else:
-        matrix = normal - bias.take(plan.normal) * plan.same
-        sides = right - bias.take(plan.right) * plan.mine
-    scale = matrix.diagonal()
-    if not (scale > TINY).all():
+    if fault or not math.isfinite(solved[0, 0]):
         return Solution(np.zeros_like(right), np.zeros((P, P)), squares, False)
-    scale = scale**-0.5
-    _, solved, fault = dposv(matrix * scale[:, None] * scale, np.hstack([np.diag(scale), sides * scale[:, None]]))
-    if fault:
-        return Solution(np.zeros_like(right), np.zeros((P, P)), squares, False)
-    solved *= scale[:, None]
     theta = solved[:, P:]
     # |y - A theta|^2, with the noise in it
-    residual = squares + ((normal @ theta - 2.0 * right) * theta).sum(axis=0)
-    return Solution(theta, solved[:, :P], np.maximum(residual, 0.0), True)
+    right *= -2.0
+    right += normal @ theta
+    right *= theta
+    squares += right.sum(axis=0)
+    return Solution(theta, solved[:, :P], np.maximum(squares, 0.0), True)
+
+
+def bias_of(plan: Plan, bias: Array) -> tuple[Array, Array]:
+    """The entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts, (P, P) and (P, C)."""
+    return bias.take(plan.cross) * plan.same, bias.take(plan.sides) * plan.mine
 
 
 @dataclass
@@ -120,27 +145,24 @@ class Uncertainty:
 def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertainty:
     """Sandwich covariance with the residual's spectral density estimated in each band."""
     C, P = len(plan.coefficients), plan.columns.size
-    result = Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
-    if not solution.usable:
-        return result
-    for c in range(C):
-        mine = plan.unknowns(c)
-        columns = plan.columns[mine]
-        v = np.zeros(info.grams.shape[1])
-        v[plan.outputs[c]] = 1.0
-        v[columns] = -solution.theta[mine, c]
-        squares = np.maximum(info.grams @ v @ v, 0.0)
-        scores = info.scores[:, columns[:, None], columns]
-        inverse = solution.inverse[np.ix_(mine, mine)]
-        expected = np.maximum(info.traces - np.einsum("ij,bji->b", inverse, scores), 0.05 * info.traces + 1e-300)
-        mean = squares.sum() / expected.sum()
-        freedom = float(expected.sum()) ** 2 / info.trace_square if info.trace_square > 0.0 else 0.0
-        share = freedom * expected / expected.sum()
-        bands = (share * squares / expected + BAND_PRIOR * mean) / (share + BAND_PRIOR)
-        middle = np.einsum("b,bij->ij", bands, scores)
-        result.covariance[np.ix_([c], mine, mine)] = inverse @ middle @ inverse
-        result.density[c], result.bands[c], result.freedom[c] = mean, bands, freedom
-    return result
+    if not solution.usable or info.trace_square <= 0.0:
+        return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
+    v = np.zeros((plan.width, C))
+    np.add.at(v, (plan.columns[:, None], np.arange(C)), -solution.theta)
+    v[plan.outputs, np.arange(C)] = 1.0
+    squares = np.maximum(((info.grams @ v) * v).sum(axis=1), 0.0).T  # (C, B)
+    scores = info.scores[:, plan.instruments[:, None], plan.instruments] * plan.same
+    used = ((scores * solution.inverse.T).sum(axis=2) @ plan.mine).T  # (C, B): taken up by the unknowns
+    expected = np.maximum(info.traces - used, 0.05 * info.traces + TINY)
+    whole = expected.sum(axis=1)
+    density = squares.sum(axis=1) / whole
+    freedom = whole**2 / info.trace_square
+    share = expected * (freedom / whole)[:, None]
+    bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
+    middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
+    covariance = solution.inverse @ middle @ solution.inverse.T
+    covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
+    return Uncertainty(covariance, density, bands, freedom)
 
 
 def student_95(freedom: Array) -> Array:
@@ -150,7 +172,7 @@ def student_95(freedom: Array) -> Array:
 
 def collinear_with(plan: Plan, solution: Solution, unknown: int) -> str:
     """The regressor whose estimate is most correlated with this one's."""
-    spread = np.sqrt(solution.inverse.diagonal())
+    spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     correlation = np.abs(solution.inverse[unknown]) / (spread * spread[unknown]) * plan.same[unknown]
-    correlation[unknown] = -math.inf
+    correlation[unknown] = -1.0
     return plan.regressors[int(np.argmax(correlation))]

@@ -1,4 +1,4 @@
-"""A whole record at once: the same estimates as ``update`` with every sample, to the last bit, in a fraction of the time."""
+"""A whole record at once: the estimates that ``update`` with every sample gives, to the last bit, much faster."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator, signals, transform
+from sysid_node.online.auxiliary import Auxiliary, instruments
 from sysid_node.online.estimates import estimate
-from sysid_node.online.estimator import State
+from sysid_node.online.renewal import renew
 from sysid_node.online.settings import Settings
+from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
@@ -27,9 +29,9 @@ def run(
     publish_times: Array,
     progress: Callable[[float], None] | None = None,
 ) -> list[Estimates]:
-    """Estimates as they stand after the first sample at or past each of ``publish_times`` (K,) s, one a sample at most.
+    """Estimates as they stand after the first sample at or past each of ``publish_times`` (K,) s, at most one a sample.
 
-    ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them. ``progress`` hears the time reached.
+    ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them; ``progress`` hears the time (s).
     """
     state = estimator.init(aircraft, settings)
     results: list[Estimates] = []
@@ -77,6 +79,8 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
         return _Chunk(kept, missing, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
+    if state.model.auxiliary is not None:
+        rows.extend(_instruments(state, state.model.auxiliary, time, columns))
     values = np.stack(rows, axis=1)
     motion = [*columns[3:6], *angles]
     begins = np.concatenate([[np.nan], time[:-1]])
@@ -95,6 +99,14 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     kernels[:, 0, -1] = steps
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
     return _Chunk(kept, missing, time, begins, means, halves, kernels, columns[estimator.INTERVAL], last)
+
+
+def _instruments(state: State, model: Auxiliary, time: Array, columns: list[Array]) -> list[Array]:
+    """The instruments' columns (n,); a recursion, so sample by sample."""
+    controls = np.stack(columns[estimator.CONTROLS :], axis=1).tolist()
+    gap = state.model.settings.max_gap
+    made = [instruments(model, state.track, t, u, gap) for t, u in zip(time.tolist(), controls, strict=True)]
+    return list(np.array(made).T)
 
 
 def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
@@ -129,11 +141,13 @@ def _integrate(state: State, chunk: _Chunk, begin: int, end: int) -> None:
         gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
         stop = begin + int(gaps[0]) if gaps.size else stop
         part = slice(begin, stop)
-        transform.add_many(state.transform, chunk.kernels[part], chunk.time[part], chunk.means[part], chunk.halves[part])
+        transform.add_many(
+            state.transform, chunk.kernels[part], chunk.time[part], chunk.means[part], chunk.halves[part]
+        )
         for interval in chunk.intervals[part].tolist():
             estimator.count(state, interval)
         if state.transform.last >= state.renew_at:
-            estimator.renew(state)
+            renew(state)
         begin = stop
     if end == chunk.time.size:
         state.previous = chunk.last

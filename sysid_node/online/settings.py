@@ -14,7 +14,7 @@ METHODS = ("sls_rft", "iv_rft")
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the online estimator. The defaults suit UAVs of 1 to 20 kg; raises InputError on impossible values."""
+    """Settings of the online estimator. Defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
     frequencies: tuple[float, float, float] = (0.1, 0.04, 2.0)  # Hz: first line, step, last line
     method: str = "sls_rft"  # "sls_rft" least squares, "iv_rft" instrumental variables
@@ -38,7 +38,7 @@ class Settings:
                 raise InputError(f"{name} {value}: expected seconds, zero or more")
         if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):
             raise InputError(f"max_gap {self.max_gap}: expected seconds, more than zero")
-        if not 0.0 < self.valid_fraction:
+        if not self.valid_fraction > 0.0:
             raise InputError(f"valid_fraction {self.valid_fraction}: expected a positive fraction")
 
     @classmethod

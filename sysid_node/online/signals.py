@@ -5,11 +5,11 @@ Each coefficient's equation is multiplied by k = qbar / qbar0, the dynamic press
     force or moment / (qbar0 S l) = k (C_0 + C_alpha alpha + C_q qhat + ...),
 
 so that a moment's rate-of-momentum part is a plain derivative of a measured rate and needs neither a numerical
-differentiation nor the derivative of the dynamic pressure: it enters as the increment of the angular momentum
-over a sampling interval, which the transform integrates exactly (see ``transform``).
+differentiation nor the derivative of the dynamic pressure: it enters as the increment of the angular momentum over a
+sampling interval, which the transform integrates exactly (see ``transform``).
 
-Equations of motion with all products of rates and Ixz: Klein & Morelli, "Aircraft System Identification"
-(2006), eqs. 3.35 to 3.37; coefficients from them eqs. 5.96 to 5.101. Body axes FRD, SI, radians.
+Equations of motion with all products of rates and Ixz: Klein & Morelli, "Aircraft System Identification" (2006), eqs.
+3.35 to 3.37; coefficients from them eqs. 5.96 to 5.101. Body axes FRD, SI, radians.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
+ScalarSignals = Callable[[Sequence[float]], tuple[list[float], list[float]]]
+ArraySignals = Callable[[Sequence[Array]], tuple[list[Array], list[Array]]]
 
 #: What is taken out of every segment: the offset's regressor k, a constant and a slow drift.
 NUISANCES = ("0", "1", "t")
@@ -38,46 +41,52 @@ class Layout:
     """Which column of the signal vector is what: six coefficients, three nuisances, then the regressors."""
 
     regressors: tuple[str, ...]
+    instrumented: tuple[str, ...] = ()  # regressors that have an instrument of their own, see ``auxiliary``
 
     @property
     def names(self) -> tuple[str, ...]:
         """All columns in order."""
-        return (*COEFFICIENTS, *NUISANCES, *self.regressors)
+        return (*COEFFICIENTS, *NUISANCES, *self.regressors, *(f"{name} instrument" for name in self.instrumented))
 
     @property
     def width(self) -> int:
         """Number of columns."""
-        return OUTPUTS + len(NUISANCES) + len(self.regressors)
+        return OUTPUTS + len(NUISANCES) + len(self.regressors) + len(self.instrumented)
 
     def column(self, name: str) -> int:
         """Index of a coefficient, nuisance or regressor."""
         return self.names.index(name)
 
+    def instrument(self, regressor: str) -> int:
+        """Index of the regressor's instrument: its own column where it has none."""
+        return self.column(f"{regressor} instrument" if regressor in self.instrumented else regressor)
 
-def layout(aircraft: Aircraft) -> Layout:
+
+def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> Layout:
     """The union of the regressors in the aircraft's model, each once, in the order of the file."""
     wanted = (r for regressors in aircraft.structure.values() for r in regressors)
-    return Layout(tuple(dict.fromkeys(r for r in wanted if r != "0")))
+    regressors = tuple(dict.fromkeys(r for r in wanted if r != "0"))
+    return Layout(regressors, tuple(r for r in regressors if r in instrumented))
 
 
-def scalar_signals(aircraft: Aircraft) -> Callable[[Sequence[float]], tuple[list[float], list[float]]]:
+def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
     """Function from one sample to (signals without the drift, [cos alpha, sin alpha]).
 
     The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
     """
-    return _signals(aircraft, math.cos, math.sin, lambda _: 1.0)
+    return cast(ScalarSignals, _signals(aircraft, math.cos, math.sin, lambda _: 1.0))
 
 
-def array_signals(aircraft: Aircraft) -> Callable[[Sequence[Array]], tuple[list[Array], list[Array]]]:
+def array_signals(aircraft: Aircraft) -> ArraySignals:
     """As ``scalar_signals`` for columns (N,). Cosines come from the scalar library, for equal bits."""
 
     def mapped(function: Callable[[float], float]) -> Callable[[Array], Array]:
         return lambda x: np.fromiter(map(function, x.tolist()), np.float64, x.size)
 
-    return _signals(aircraft, mapped(math.cos), mapped(math.sin), np.ones_like)
+    return cast(ArraySignals, _signals(aircraft, mapped(math.cos), mapped(math.sin), np.ones_like))
 
 
-def _signals(aircraft: Aircraft, cos, sin, one):  # type: ignore[no-untyped-def]
+def _signals(aircraft: Aircraft, cos: Any, sin: Any, one: Any) -> Any:
     """Build the signal function over scalars or arrays; see ``scalar_signals``."""
     m, S, b, c = aircraft.mass, aircraft.geometry.S, aircraft.geometry.b, aircraft.geometry.cbar
     rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
@@ -93,7 +102,7 @@ def _signals(aircraft: Aircraft, cos, sin, one):  # type: ignore[no-untyped-def]
     names = layout(aircraft).regressors
     controls = {s: len(SAMPLE_COLUMNS) + i for i, s in enumerate(aircraft.control_symbols)}
 
-    def signals(sample):  # type: ignore[no-untyped-def]
+    def signals(sample: Any) -> Any:
         ax, ay, az, p, q, r, V, alpha, beta, rho, thrust = sample[:11]
         # flow angles at the CG: the vanes see the rotation (small-angle form)
         alpha = alpha + (q * xa - p * ya) / V

@@ -2,15 +2,16 @@
 
     X(omega) = integral of x(t) exp(-j omega t) exp(-(T - t) / 2 tau) dt
 
-Morelli, "Real-time parameter estimation in the frequency domain", J. Guidance 23(5), 2000, eqs. 10 to 13, with
-three changes. The samples' own times are used: between two samples the signal is the straight line, whose transform
-over an interval of length h about its middle t_m is
+Morelli, "Real-time parameter estimation in the frequency domain", J. Guidance 23(5), 2000, eqs. 10 to 13, with three
+changes. The samples' own times are used: between two samples the signal is the straight line, whose transform over an
+interval of length h about its middle t_m is
 
-    h exp(-j omega t_m) (mean sinc(phi) - j half-difference s(phi)),  phi = omega h / 2,  s = (sin phi - phi cos phi) / phi^2
+    h exp(-j omega t_m) (mean sinc(phi) - j half-difference s(phi)),
+    phi = omega h / 2,  s = (sin phi - phi cos phi) / phi^2
 
 so that jitter, lost and late samples do not bias it. A rate's derivative enters as its increment over the interval,
-constant between the samples of the same straight line: summed by parts this is j omega X plus the boundary terms
-of the finite transform, without differentiating anything. Phases come from absolute time, so nothing drifts.
+constant between the samples of the same straight line: summed by parts this is j omega X plus the boundary terms of the
+finite transform, without differentiating anything. Phases come from absolute time, so nothing drifts.
 
 Samples are collected in blocks of ``BLOCK``; a block is one matrix product. The transform at any sample is the sum of
 the finished blocks and the unfinished one, so the per-sample and the vectorised path give the same bits.
@@ -65,8 +66,8 @@ class Lines:
 
 def lines(start_hz: float, step_hz: float, stop_hz: float) -> Lines:
     """Lines from start to stop (Hz), both included where the step meets them."""
-    count = int(math.floor((stop_hz - start_hz) / step_hz + 1e-9)) + 1
-    omega = 2.0 * math.pi * (start_hz + step_hz * np.arange(count))
+    count = math.floor((stop_hz - start_hz) / step_hz + 1e-9) + 1
+    omega = 2.0 * math.pi * (start_hz + step_hz * np.arange(count, dtype=np.float64))
     return Lines(omega, -(-count // _LANES) * _LANES)
 
 
@@ -78,7 +79,9 @@ def weights(grid: Lines, middle: Array | float, step: Array | float, out: Array)
     wide = 2 * grid.padded
     wave = np.cos(grid.phase * middle + grid.shift)
     square = step * step
-    np.multiply(wave[..., :wide], step + (step * square) * (grid.sinc[0] + square * grid.sinc[1]), out=out[..., 0, :wide])
+    np.multiply(
+        wave[..., :wide], step + (step * square) * (grid.sinc[0] + square * grid.sinc[1]), out=out[..., 0, :wide]
+    )
     np.multiply(wave[..., grid.padded :], square * (grid.slope[0] + square * grid.slope[1]), out=out[..., 1, :wide])
 
 

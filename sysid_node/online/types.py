@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 #: Columns of an aligned sample before the aerodynamic controls (which follow in the aircraft file's order).
 #: Specific force at the IMU m/s^2, rates rad/s, airspeed m/s, flow angles at the air-data probe rad,
@@ -12,8 +13,7 @@ from dataclasses import dataclass
 SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", "air_interval")
 
 
-@dataclass(frozen=True)
-class DerivativeEstimate:
+class DerivativeEstimate(NamedTuple):
     """One derivative with its standard error and 95 % interval; ``status`` says why it is not valid."""
 
     name: str
@@ -25,8 +25,7 @@ class DerivativeEstimate:
     status: str  # "ok", "converging", "not excited", "collinear with ...", "stale input", "outside model", "changed"
 
 
-@dataclass(frozen=True)
-class FitQuality:
+class FitQuality(NamedTuple):
     """How well one coefficient's equation is satisfied over the lines in use."""
 
     coefficient: str

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -79,8 +79,8 @@ def summary(run: RunResult) -> dict[str, Any]:
         "samples": run.samples,
         "rejected": run.rejected,
         "settings": run.settings,
-        "derivatives": {name: _without(asdict(d), "name") for name, d in final.derivatives.items()},
-        "fits": {name: _without(asdict(f), "coefficient") for name, f in final.fits.items()},
+        "derivatives": {name: _without(d._asdict(), "name") for name, d in final.derivatives.items()},
+        "fits": {name: _without(f._asdict(), "coefficient") for name, f in final.fits.items()},
         "holdout": run.holdout,
         "remarks": list(run.remarks),
         "response_note": run.response_note,

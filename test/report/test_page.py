@@ -216,7 +216,7 @@ def test_picture_shows_weaker_left_and_stronger_right(value, believed, span, pla
 
 def test_an_abrupt_change_is_marked_when_it_was_noticed():
     ok = DerivativeEstimate("Cm_de", -0.5, 0.01, -0.52, -0.48, True, "ok")
-    changed = replace(ok, valid=False, status="changed")
+    changed = ok._replace(valid=False, status="changed")
     history = [Estimates(float(t), {"Cm_de": changed if 3 <= t < 5 else ok}, {}) for t in range(9)]
     page = outline(RunResult("kestrel", "sls_rft", history))
     (panel,) = page.figures

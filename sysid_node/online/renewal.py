@@ -1,0 +1,144 @@
+"""What the estimator does every half second of data: measure the segment, solve, and look for changes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online import change, information, noise, regression, transform
+from sysid_node.online.change import PIECE, Reference, Watch
+from sysid_node.online.information import Information
+from sysid_node.online.state import Renewed, State
+
+Array = NDArray[np.float64]
+RENEWAL = PIECE  # s of data between renewals
+
+
+def renew(state: State) -> None:
+    """Renew all that changes slowly; see ``Renewed``."""
+    time = state.transform.last
+    lines = transform.current(state.transform)
+    _watch_piece(state, lines)
+    renewed = _solve_all(state, _measure_segment(state, lines))
+    if state.model.settings.detect_changes:
+        _look_for_changes(state, renewed, lines)
+    if time - state.segment_start >= state.model.segment_time:
+        finish_segment(state)
+        begin_segment(state, lines, time)
+    else:
+        _begin_piece(state, lines, time)
+
+
+def begin_segment(state: State, lines: Array, time: float) -> None:
+    """Begin a segment and a piece of the watch at ``time`` (s), where the transform is ``lines``."""
+    state.segment, state.segment_start, state.samples, state.intervals = lines, time, 0, 0.0
+    _begin_piece(state, lines, time)
+
+
+def _begin_piece(state: State, lines: Array, time: float) -> None:
+    state.piece, state.piece_start, state.renew_at = lines, time, time + RENEWAL
+
+
+def _fading(state: State, since: float) -> float:
+    """Share of a transform's amplitude that is left of what was there at ``since`` (s)."""
+    return math.exp(0.5 * state.model.spectrum.rate * (since - state.transform.last))
+
+
+def _watch_piece(state: State, lines: Array) -> None:
+    """Hand the finished piece to the watch."""
+    if state.transform.last > state.piece_start:
+        piece = lines - state.piece * _fading(state, state.piece_start)
+        state.watch.pieces.append((state.piece_start, piece))
+
+
+def _measure_segment(state: State, lines: Array) -> Information:
+    """What the present segment says up to now."""
+    model = state.model
+    begin, end = state.segment_start, state.transform.last
+    info = information.measure(lines - state.segment * _fading(state, begin), model.spectrum, begin, end)
+    samples = max(state.samples, 1)
+    mean = info.integrals / information.window_energy(end - begin, 0.5 * model.spectrum.rate)
+    per_line_second = noise.gram_bias(
+        model.aircraft, model.layout, mean, (end - begin) / samples, state.intervals / samples
+    )
+    info.bias = _line_seconds(state, info) * per_line_second
+    info.samples = float(state.samples)
+    state.present = info
+    return info
+
+
+def _line_seconds(state: State, info: Information) -> float:
+    """Lines times seconds over which noise counts; the nuisances take one line."""
+    return max((state.model.spectrum.omega.size - 1) * info.energy, 1e-9)
+
+
+def _past(state: State) -> Information:
+    """Sum of the finished segments, faded to now, without those that the window has left behind."""
+    now, window = state.transform.last, state.model.settings.window
+    if state.model.spectrum.rate and state.past.samples:
+        state.past = state.past.scaled(math.exp(-state.model.spectrum.rate * (now - state.past_time)))
+    state.past_time = now
+    if window and state.inside and state.inside[0][0] <= now - window:
+        state.inside.popleft()
+        state.past = sum((info for _, info in state.inside), information.nothing(state.model.layout.width))
+    return state.past
+
+
+def _solve_all(state: State, segment: Information) -> Renewed:
+    """Estimates, their covariance and the noise's part, from the finished segments and the present one."""
+    plan, last = state.model.plan, state.renewed
+    past = _past(state)
+    total = past + segment
+    compensation = None
+    if plan.least_squares and last is not None and last.solution.usable:
+        share = noise.allowed(plan, last.solution, last.uncertainty.density, total.bias / _line_seconds(state, total))
+        compensation = regression.bias_of(plan, total.bias * share[:, None] * share)
+    gram = total.grams.sum(axis=0)
+    solution = regression.solve(plan, gram, compensation)
+    if compensation is not None and not solution.usable:
+        solution, compensation = regression.solve(plan, gram), None
+    spread = regression.uncertainty(plan, solution, total)
+    scale = solution.inverse.diagonal()[:, None] * solution.residual
+    variance = spread.covariance.diagonal(axis1=1, axis2=2).T
+    factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
+    lost = np.zeros(len(plan.coefficients), dtype=bool)
+    renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lost)
+    state.renewed = renewed
+    state.watch.references.append(Reference(state.transform.last, solution, spread))
+    return renewed
+
+
+def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
+    """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
+    density_per_gram = 0.5 / state.model.settings.frequencies[1]
+    finding = change.examine(state.model.plan, state.watch, density_per_gram, state.transform.last)
+    renewed.lost = finding.lost
+    if finding.changed_since is not None:
+        _begin_anew(state, lines, finding.changed_since)
+
+
+def _begin_anew(state: State, lines: Array, since: float) -> None:
+    """Forget all that was before ``since`` (s), the start of a piece."""
+    now = state.transform.last
+    kept = [piece for start, piece in state.watch.pieces if start >= since - 1e-6]
+    # what is counted of the present segment is taken as even over its time
+    share = (now - since) / (now - state.segment_start)
+    state.samples, state.intervals = round(state.samples * share), state.intervals * share
+    state.past = information.nothing(state.model.layout.width)
+    state.inside.clear()
+    state.segment, state.segment_start = lines - np.sum(kept, axis=0), since
+    state.changed_at = now
+    state.watch = Watch()
+    _solve_all(state, _measure_segment(state, lines))
+
+
+def finish_segment(state: State) -> None:
+    """Put the present segment to the finished ones."""
+    if state.present is not None and state.renewed is not None:
+        state.past = state.past + state.present
+        if state.model.settings.window:
+            state.inside.append((state.transform.last, state.present))
+        state.renewed.base = state.past.grams.sum(axis=0)
+    state.present = None

@@ -1,0 +1,81 @@
+"""What the online estimator remembers."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.auxiliary import Auxiliary, Track
+from sysid_node.online.change import Watch
+from sysid_node.online.information import Information, Spectrum
+from sysid_node.online.regression import Plan, Solution, Uncertainty
+from sysid_node.online.settings import Settings
+from sysid_node.online.signals import Layout, ScalarSignals
+from sysid_node.online.table import Table
+from sysid_node.online.transform import Transform
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What does not change in flight."""
+
+    aircraft: Aircraft
+    settings: Settings
+    layout: Layout
+    plan: Plan
+    table: Table
+    spectrum: Spectrum
+    momentum: tuple[tuple[float, ...], ...]  # see ``signals.momentum_matrix``
+    signals: ScalarSignals
+    auxiliary: Auxiliary | None  # what makes instruments, where the method wants them
+    segment_time: float  # s
+    memory: float  # s, inf = nothing is forgotten
+
+
+@dataclass
+class Renewed:
+    """What ``renew`` last found; per-sample estimates lean on it until the next time."""
+
+    total: Information
+    solution: Solution
+    uncertainty: Uncertainty
+    compensation: tuple[Array, Array] | None  # noise's part of the normal equations, see ``regression.bias_of``
+    base: Array  # (W, W) Gram matrix of the finished segments
+    factors: Array  # (P, C) squared standard error over (P_jj residual)
+    lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
+
+
+@dataclass
+class State:
+    """All that the estimator remembers. Times in s."""
+
+    model: Model
+    transform: Transform
+    track: Track  # motion of the model that makes instruments
+    past: Information  # finished segments, faded to ``past_time``
+    past_time: float = math.nan
+    inside: deque[tuple[float, Information]] = field(
+        default_factory=deque
+    )  # end and content of those inside the window
+    segment: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the segment's start
+    segment_start: float = math.nan  # NaN = none is under way
+    piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
+    piece_start: float = math.nan
+    renew_at: float = math.inf
+    previous: tuple[float, Array, tuple[float, ...]] | None = None  # time, signals, (p, q, r, ca, sa)
+    begin: float = math.nan  # time from which samples count
+    samples: int = 0  # in the present segment
+    intervals: float = 0.0  # s: sum of the air data's intervals in the present segment
+    incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
+    thrust_known: bool = True
+    present: Information | None = None  # the present segment's, at the last renewal
+    renewed: Renewed | None = None
+    watch: Watch = field(default_factory=Watch)
+    changed_at: float = -math.inf

@@ -1,0 +1,53 @@
+"""Which entry of the solution each derivative of the aircraft file is, and what its error is measured against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.regression import Plan
+
+
+@dataclass(frozen=True)
+class Table:
+    """Over the D derivatives whose equations can be formed, in the aircraft file's order."""
+
+    names: tuple[str, ...]
+    coefficient: NDArray[np.intp]  # (D,) index into the plan's coefficients
+    unknown: NDArray[np.intp]  # (D,) index into the plan's unknowns; 0 for an offset
+    offset: NDArray[np.bool_]  # (D,) whether it is a C_0
+    size: NDArray[np.float64]  # (D,) what a standard error is measured against; 0 = the estimate itself
+    needs_thrust: NDArray[np.bool_]  # (D,) meaningless without a measured thrust
+    unformed: tuple[str, ...]  # derivatives whose equation cannot be formed
+
+
+def table(aircraft: Aircraft, plan: Plan) -> Table:
+    """The aircraft's derivatives in the solution of its ``plan``.
+
+    A standard error is measured against the believed size of a derivative, or twice its tolerance where that is more:
+    not against the estimate, which would call the large ones of many chance values valid.
+    """
+    names, coefficients, unknowns, offsets, sizes, unformed = [], [], [], [], [], []
+    for name, belief in aircraft.derivatives.items():
+        coefficient, _, regressor = name.partition("_")
+        if coefficient not in plan.coefficients:
+            unformed.append(name)
+            continue
+        c = plan.coefficients.index(coefficient)
+        names.append(name)
+        coefficients.append(c)
+        offsets.append(regressor == "0")
+        unknowns.append(next((int(i) for i in plan.unknowns(c) if plan.regressors[i] == regressor), 0))
+        sizes.append(max(abs(belief.value), 2.0 * (belief.tolerance or 0.0)))
+    return Table(
+        names=tuple(names),
+        coefficient=np.array(coefficients, dtype=np.intp),
+        unknown=np.array(unknowns, dtype=np.intp),
+        offset=np.array(offsets),
+        size=np.array(sizes),
+        needs_thrust=np.array([name in ("CL_0", "CD_0") for name in names]),
+        unformed=tuple(unformed),
+    )
