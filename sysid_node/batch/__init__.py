@@ -1,5 +1,8 @@
-"""Layer ``batch``: estimators that see the whole flight at once."""
+"""Layer ``batch``: estimators that see the whole flight at once.
 
-import jax
+Imported for its side effect as well: JAX in float64, with the compiler options and the cache of the simulator.
+"""
 
-jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+from sysid_node.sim import xla
+
+xla.configure()

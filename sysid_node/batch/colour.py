@@ -41,26 +41,34 @@ def degrees_of_freedom(lengths: Sequence[int]) -> float:
 
 
 def coloured_covariance(
-    inverse_information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
+    inverse_information: Array,
+    sensitivities: Sequence[Array],
+    residuals: Sequence[Array],
+    instruments: Sequence[Array] | None = None,
 ) -> Array:
     """Covariance (P, P) of estimates with residuals of any colour.
 
     ``inverse_information`` (P, P) is the covariance that would hold for white residuals of unit variance;
     ``sensitivities`` (N, ny, P) and ``residuals`` (N, ny) of each manoeuvre are divided by the noise level of each
-    output and are zero where nothing was measured. Residuals are uncorrelated between manoeuvres.
+    output and are zero where nothing was measured. Residuals are uncorrelated between manoeuvres. ``instruments``
+    (N, ny, P) are what the residuals were made orthogonal to, where not the sensitivities themselves (least squares in
+    a band of frequencies: the sensitivities within that band).
     """
     size = next_fast_len(2 * max(len(r) for r in residuals), real=True)
     width = _lag_width(max(len(r) for r in residuals))
-    transforms = [rfft(s, size, axis=0) for s in sensitivities]
+    slopes = [rfft(s, size, axis=0) for s in sensitivities]
+    transforms = slopes if instruments is None else [rfft(s, size, axis=0) for s in instruments]
     pairs = _pair_counts(residuals)
     periodogram = np.sum([_periodogram(r, size) for r in residuals], axis=0) / pairs
     spectrum = _smooth(periodogram, size, width)
-    leverage = np.sum([_projected(s, inverse_information) for s in transforms], axis=0) / pairs
+    leverage = (
+        np.sum([_projected(s, inverse_information, t) for s, t in zip(slopes, transforms, strict=True)], axis=0) / pairs
+    )
     for _ in range(_ROUNDS):
         covariance = inverse_information @ _inner(transforms, spectrum, size) @ inverse_information
         absorbed = leverage @ spectrum
         absorbed = absorbed + np.conj(np.swapaxes(absorbed, 1, 2))
-        fitted = np.sum([_projected(s, covariance) for s in transforms], axis=0) / pairs
+        fitted = np.sum([_projected(s, covariance, s) for s in slopes], axis=0) / pairs
         spectrum = _smooth(periodogram + absorbed - fitted, size, width)
     covariance = inverse_information @ _inner(transforms, spectrum, size) @ inverse_information
     return 0.5 * (covariance + covariance.T)
@@ -84,9 +92,9 @@ def _periodogram(residual: Array, size: int) -> Complex:
     return product
 
 
-def _projected(transform: Complex, matrix: Array) -> Complex:
-    """S(f) M S(f)^H (F, ny, ny)."""
-    product: Complex = (transform @ matrix) @ np.conj(np.swapaxes(transform, 1, 2))
+def _projected(left: Complex, matrix: Array, right: Complex) -> Complex:
+    """S(f) M Z(f)^H (F, ny, ny)."""
+    product: Complex = (left @ matrix) @ np.conj(np.swapaxes(right, 1, 2))
     return product
 
 

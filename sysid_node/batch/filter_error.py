@@ -106,7 +106,7 @@ class _FilterError(Problem):
         q, r = np.split(np.exp(2.0 * logs), [len(model.states)])
         theta, x0 = self.unknowns.theta(z), self.unknowns.initial_state(z, 0)
         expected = kalman.innovation_variance(model, manoeuvre.step, manoeuvre.inputs[0], x0, theta, q, r)
-        scale = np.sqrt(np.mean(np.diag(self.noise(z)) ** 2 / np.asarray(expected)))
+        scale = np.exp(np.mean(np.log(np.diag(self.noise(z)) / np.sqrt(np.asarray(expected)))))
         return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
 
     def _columns(self, index: int, z: Array) -> list[int]:

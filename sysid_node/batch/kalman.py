@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.batch.model import Model
-from sysid_node.batch.rollout import rk4_step
+from sysid_node.batch.rollout import output, rk4_step
 
 #: Doubling steps of the Riccati equation: time constants up to 2^16 samples have settled.
 _DOUBLINGS = 16
@@ -65,11 +65,11 @@ def predictions(
 
     def advance(x: jax.Array, interval: tuple[jax.Array, ...]) -> tuple[jax.Array, jax.Array]:
         u0, u1, y, width = interval
-        predicted = model.output(x, u0, theta)
+        predicted = output(model, x, u0, theta)
         return rk4_step(model, x + k @ (y - predicted), u0, u1, width, theta), predicted
 
     x, predicted = jax.lax.scan(advance, x0, (inputs[:-1], inputs[1:], outputs[:-1], dt))
-    return jnp.concatenate([predicted, model.output(x, inputs[-1], theta)[None, :]])
+    return jnp.concatenate([predicted, output(model, x, inputs[-1], theta)[None, :]])
 
 
 @partial(jax.jit, static_argnums=0)
@@ -86,5 +86,5 @@ def _linearised(
 ) -> tuple[jax.Array, jax.Array]:
     """Steady covariance of the predicted state, and the observation matrix, about one flight condition."""
     transition = jax.jacfwd(partial(rk4_step, model))(x, u, u, dt, theta)
-    observation = jax.jacfwd(model.output)(x, u, theta)
+    observation = jax.jacfwd(partial(output, model))(x, u, theta)
     return steady_covariance(transition, observation, q * dt, r), observation

@@ -12,8 +12,11 @@ import numpy as np
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
-#: ``(x (nx,), u (nu,), theta (P,)) -> (n,)``, in JAX operations only, without side effects.
-VectorFunction = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
+#: Numbers in the order of some names; each may be a JAX scalar or a time history of one.
+Scalars = Sequence[jax.Array]
+
+#: ``(states, inputs, parameters) -> values``, in JAX operations only, without side effects.
+Equations = Callable[[Scalars, Scalars, Scalars], Scalars]
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,8 @@ class Parameter:
 class Model:
     """A dynamic system with unknown constants; compared by identity, so that compiled code is kept per model.
 
-    ``derivative`` (nx,) and ``output`` (ny,) are functions of state (nx,), input (nu,) and parameters (P,), each in
-    the order of the names given here; their units are those of the names (SI, radians, body axes FRD).
+    ``derivative`` gives the states' derivatives and ``output`` the outputs, from states, inputs and parameters one by
+    one, each in the order of the names given here; units are those of the names (SI, radians, body axes FRD).
     """
 
     name: str
@@ -59,8 +62,8 @@ class Model:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     parameters: tuple[Parameter, ...]
-    derivative: VectorFunction
-    output: VectorFunction
+    derivative: Equations
+    output: Equations
     units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
 
     def __post_init__(self) -> None:

@@ -15,24 +15,45 @@ import numpy as np
 from sysid_node.batch.model import Manoeuvre, Model
 from sysid_node.flight.record import Array
 
+#: Where in the step each stage looks, and its share in the result.
+_PLACES, _SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
+
 
 def rk4_step(model: Model, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array) -> jax.Array:
-    """State (nx,) after ``dt`` s, the input going linearly from ``u0`` to ``u1``."""
-    f = model.derivative
-    middle = 0.5 * (u0 + u1)
-    k1 = f(x, u0, theta)
-    k2 = f(x + 0.5 * dt * k1, middle, theta)
-    k3 = f(x + 0.5 * dt * k2, middle, theta)
-    k4 = f(x + dt * k3, u1, theta)
-    return x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    """State (nx,) after ``dt`` s, the input (nu,) going linearly from ``u0`` to ``u1``.
+
+    The stages are a loop: written out one after the other, XLA fuses them into code whose size grows exponentially.
+    """
+
+    def stage(
+        carry: tuple[jax.Array, jax.Array], at: tuple[jax.Array, jax.Array]
+    ) -> tuple[tuple[jax.Array, jax.Array], None]:
+        slope, total = carry
+        place, share = at
+        slope = derivative(model, x + place * dt * slope, u0 + place * (u1 - u0), theta)
+        return (slope, total + share * slope), None
+
+    nothing = jnp.zeros_like(x)
+    (_, total), _ = jax.lax.scan(stage, (nothing, nothing), (jnp.array(_PLACES), jnp.array(_SHARES)))
+    return x + dt * total
+
+
+def derivative(model: Model, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+    """State derivative (nx,)."""
+    return jnp.stack(model.derivative(tuple(x), tuple(u), tuple(theta)))
+
+
+def output(model: Model, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+    """Outputs (..., ny) at states (..., nx) and inputs (..., nu)."""
+    values = model.output(tuple(jnp.moveaxis(x, -1, 0)), tuple(jnp.moveaxis(u, -1, 0)), tuple(theta))
+    return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
 
 def simulate(model: Model, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
     """States (N, nx) at each time from ``x0`` (nx,); pure, differentiable."""
 
     def advance(x: jax.Array, interval: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        u0, u1, dt = interval
-        following = rk4_step(model, x, u0, u1, dt, theta)
+        following = rk4_step(model, x, *interval, theta)
         return following, following
 
     _, states = jax.lax.scan(advance, x0, (inputs[:-1], inputs[1:], jnp.diff(time)))
@@ -40,8 +61,7 @@ def simulate(model: Model, time: jax.Array, inputs: jax.Array, x0: jax.Array, th
 
 
 def _outputs(model: Model, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
-    states = simulate(model, time, inputs, x0, theta)
-    return jax.vmap(model.output, in_axes=(0, 0, None))(states, inputs, theta)
+    return output(model, simulate(model, time, inputs, x0, theta), inputs, theta)
 
 
 _outputs_jit = jax.jit(_outputs, static_argnums=0)

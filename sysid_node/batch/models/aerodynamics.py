@@ -9,11 +9,11 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
-from sysid_node.batch.model import Parameter
+from sysid_node.batch.model import Parameter, Scalars
 
 Signals = Mapping[str, jax.Array]
 #: ``signals, theta -> coefficient -> value``.
-Coefficients = Callable[[Signals, jax.Array], dict[str, jax.Array]]
+Coefficients = Callable[[Signals, Scalars], dict[str, jax.Array]]
 
 
 def derivative_parameters(aircraft: Aircraft, coefficients: Sequence[str], use_prior: bool) -> tuple[Parameter, ...]:
@@ -44,7 +44,7 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
             return signals[name] * halves[name] / (speed if reference_rates else signals["V"])
         return signals[name]
 
-    def evaluate(signals: Signals, theta: jax.Array) -> dict[str, jax.Array]:
+    def evaluate(signals: Signals, theta: Scalars) -> dict[str, jax.Array]:
         total: dict[str, jax.Array] = {}
         for (coefficient, name), value in zip(terms, theta, strict=True):
             if name != "k":

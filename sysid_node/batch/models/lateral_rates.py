@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.model import Model, Parameter
+from sysid_node.batch.model import Model, Parameter, Scalars
 
 _REGRESSORS = ("p", "r", "da", "dr", "beta")
 _UNITS = {"L": "1/s", "N": "1/s", "Y": "m/s"}
@@ -28,14 +28,16 @@ def lateral_rates(start: Mapping[str, float]) -> Model:
     names += ["L_0", "N_0", *(f"bias_{output}" for output in ("pdot", "rdot", "ay", "p", "r"))]
     parameters = tuple(Parameter(name, start.get(name, 0.0), unit=_UNITS.get(name[0], "")) for name in names)
 
-    def accelerations(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-        return theta[:15].reshape(3, 5) @ jnp.concatenate([x, u])
+    def acceleration(axis: int, x: Scalars, u: Scalars, theta: Scalars) -> jax.Array:
+        slopes = theta[5 * axis : 5 * axis + 5]
+        return jnp.asarray(sum(slope * value for slope, value in zip(slopes, (*x, *u), strict=True)))
 
-    def derivative(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-        return accelerations(x, u, theta)[:2] + theta[15:17]
+    def derivative(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
+        return tuple(acceleration(axis, x, u, theta) + theta[15 + axis] for axis in (0, 1))
 
-    def output(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-        return jnp.concatenate([accelerations(x, u, theta), x]) + theta[17:22]
+    def output(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
+        true = (*(acceleration(axis, x, u, theta) for axis in (0, 1, 2)), *x)
+        return tuple(value + bias for value, bias in zip(true, theta[17:22], strict=True))
 
     return Model(
         name="lateral_rates",

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.model import Model
+from sysid_node.batch.model import Model, Scalars
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 from sysid_node.errors import InputError
 
@@ -138,25 +138,25 @@ class _Motion:
         self.inputs = inputs
         self.coefficients = coefficient_function(aircraft, names, reference_rates)
 
-    def derivative(self, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-        """State derivative (nx,)."""
+    def derivative(self, x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
+        """Derivatives of the states."""
         s = self._signals(x, u)
         coefficients = self.coefficients(s, theta)
         rates = {**self._flow(s, self._specific_force(s, coefficients)), **self._attitude(s)}
         rates |= self._angular(s, coefficients)
-        return jnp.array([rates[name] for name in self.states])
+        return tuple(rates[name] for name in self.states)
 
-    def output(self, outputs: Sequence[str], x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-        """Measured quantities (ny,)."""
+    def output(self, outputs: Sequence[str], x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
+        """Measured quantities."""
         s = self._signals(x, u)
         coefficients = self.coefficients(s, theta)
         angular = self._angular(s, coefficients)
         values = {**s, **{f"{name}dot": value for name, value in angular.items()}}
         values |= self._at_imu(s, self._specific_force(s, coefficients), angular)
         values |= self._at_probe(s)
-        return jnp.array([values[name] for name in outputs])
+        return tuple(values[name] for name in outputs)
 
-    def _signals(self, x: jax.Array, u: jax.Array) -> dict[str, jax.Array]:
+    def _signals(self, x: Scalars, u: Scalars) -> dict[str, jax.Array]:
         values = dict(zip(self.states, x, strict=True)) | dict(zip(self.inputs, u, strict=True))
         return {"thrust": jnp.zeros_like(u[0])} | values
 

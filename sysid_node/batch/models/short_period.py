@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.model import Model, Parameter
+from sysid_node.batch.model import Model, Parameter, Scalars
 from sysid_node.batch.models.rigid_body import GRAVITY
 
 INPUTS = ("de", "V", "beta", "p", "r", "phi", "theta", "ax", "rho", "q_measured")
@@ -29,7 +29,7 @@ def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, 
     """
     geometry, inertia = aircraft.geometry, aircraft.inertia
 
-    def coefficients(x: jax.Array, s: Mapping[str, jax.Array], theta: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def coefficients(x: Scalars, s: Mapping[str, jax.Array], theta: Scalars) -> tuple[jax.Array, jax.Array]:
         CZ_alpha, CZ_de, CZ_0, Cm_alpha, Cm_q, Cm_de, Cm_0, _ = theta
         alpha, de = x[0] - alpha0, s["de"] - de0
         rate = s["q_measured"] * geometry.cbar / (2.0 * s["V"])
@@ -38,7 +38,7 @@ def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, 
     def normal_acceleration(s: Mapping[str, jax.Array], CZ: jax.Array) -> jax.Array:
         return 0.5 * s["rho"] * s["V"] ** 2 * geometry.S / aircraft.mass * CZ
 
-    def derivative(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+    def derivative(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
         s = dict(zip(INPUTS, u, strict=True))
         alpha, q = x
         CZ, Cm = coefficients(x, s, theta)
@@ -48,11 +48,11 @@ def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, 
         wdot = q * ub - s["p"] * vb + GRAVITY * jnp.cos(s["theta"]) * jnp.cos(s["phi"]) + normal_acceleration(s, CZ)
         moment = 0.5 * s["rho"] * s["V"] ** 2 * geometry.S * geometry.cbar * Cm
         coupling = (inertia.Izz - inertia.Ixx) * s["p"] * s["r"] + inertia.Ixz * (s["r"] ** 2 - s["p"] ** 2)
-        return jnp.array([(wdot * ub - wb * udot) / (ub**2 + wb**2), (moment + coupling) / inertia.Iyy])
+        return (wdot * ub - wb * udot) / (ub**2 + wb**2), (moment + coupling) / inertia.Iyy
 
-    def output(x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+    def output(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
         s = dict(zip(INPUTS, u, strict=True))
-        return jnp.array([x[0], x[1], normal_acceleration(s, coefficients(x, s, theta)[0]) + theta[7]])
+        return x[0], x[1], normal_acceleration(s, coefficients(x, s, theta)[0]) + theta[7]
 
     return Model(
         name="short_period",

@@ -1,0 +1,93 @@
+"""Equation error in the time domain: each coefficient regressed on what should explain it, at every sample.
+
+Klein & Morelli (2006), ch. 5. No model is integrated, no start values are needed, and turbulence does not bias it;
+noise on the regressors (the flow angles') does, towards zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.coefficients import Equations, equations, usable
+from sysid_node.batch.identifiability import inseparable_pairs, sentences
+from sysid_node.batch.regression import Regression, regress
+from sysid_node.batch.result import Answer, Fit
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array, FlightRecord
+
+
+def equation_error(aircraft: Aircraft, records: Sequence[FlightRecord]) -> Fit:
+    """The aircraft file's derivatives from all flights together. Raises InputError where signals are missing."""
+    flights = [equations(aircraft, record) for record in records]
+    fits = {
+        coefficient: regress(
+            [f"{coefficient}_{name}" for name in regressors],
+            [flight.coefficients[coefficient] for flight in flights],
+            [columns(flight, regressors) for flight in flights],
+        )
+        for coefficient, regressors in structure_of(aircraft, flights).items()
+    }
+    return collected("equation_error", fits, flights)
+
+
+def structure_of(aircraft: Aircraft, flights: list[Equations]) -> dict[str, tuple[str, ...]]:
+    """Regressors by coefficient. Raises InputError where no coefficient can be formed."""
+    structure = usable(aircraft, flights)
+    if not structure:
+        reasons = "; ".join(dict.fromkeys(remark for flight in flights for remark in flight.remarks))
+        raise InputError(f"aircraft {aircraft.name}: no coefficient can be formed from these flights: {reasons}")
+    return structure
+
+
+def columns(flight: Equations, regressors: Sequence[str]) -> Array:
+    """Regressors side by side (N, p)."""
+    return np.column_stack([flight.regressors[name] for name in regressors])
+
+
+def collected(method: str, fits: Mapping[str, Regression], flights: Sequence[Equations]) -> Fit:
+    """The regressions of all coefficients as one Fit."""
+    estimates = {name: estimate for fit in fits.values() for name, estimate in fit.estimates.items()}
+    covariance = np.zeros((len(estimates), len(estimates)))
+    first = 0
+    for fit in fits.values():
+        last = first + len(fit.estimates)
+        covariance[first:last, first:last] = fit.covariance
+        first = last
+    noise = {coefficient: fit.noise for coefficient, fit in fits.items()}
+    return Fit(
+        method=method,
+        estimates=estimates,
+        covariance=covariance,
+        noise=noise,
+        log_det=float(2.0 * np.sum(np.log(np.maximum(list(noise.values()), 1e-300)))),
+        answers=[
+            Answer(
+                flight.name,
+                flight.time,
+                tuple(fits),
+                np.column_stack([flight.coefficients[c] for c in fits]),
+                np.column_stack([fit.modelled[k] for fit in fits.values()]),
+            )
+            for k, flight in enumerate(flights)
+        ],
+        converged=True,
+        iterations=1,
+        message="linear least squares",
+        remarks=_remarks(fits, flights),
+    )
+
+
+def _remarks(fits: Mapping[str, Regression], flights: Sequence[Equations]) -> tuple[str, ...]:
+    remarks = list(dict.fromkeys(remark for flight in flights for remark in flight.remarks))
+    for fit in fits.values():
+        if len(fit.lost) > 1:
+            remarks.append(f"these flights do not determine {', '.join(fit.lost)} apart from one another")
+        elif fit.lost:
+            remarks.append(f"these flights say nothing about {fit.lost[0]}")
+        kept = [i for i, name in enumerate(fit.estimates) if name not in fit.lost]
+        names = [list(fit.estimates)[i] for i in kept]
+        remarks += sentences(inseparable_pairs(fit.covariance[np.ix_(kept, kept)], names))
+    return tuple(remarks)
