@@ -128,7 +128,7 @@ class Identifier(CarefulNode):
         aircraft, method = session.aircraft.name, session.settings.method
         self._derivatives.publish(conversion.estimates_message(due.estimates, header, aircraft, method))
         self._lag = (self.get_clock().now().nanoseconds - due.stamp_ns) / conversion.NANOSECONDS
-        self._model_gap.publish(conversion.gap_message(session.gap(due.estimates), header, aircraft))
+        self._model_gap.publish(conversion.gap_message(session.gap, header, aircraft))
         self._publish_times.add(time.perf_counter() - start)
 
     # Requests

@@ -57,9 +57,10 @@ class Session:
         assert last is not None
         return Due(intake.stamp_of(self.intake, last), estimate(self.state, last + silence))
 
-    def gap(self, estimates: Estimates) -> tuple[CoefficientGap, ...]:
-        """How far the flight is from the aircraft file, with the estimates that were made last."""
-        return model_gap(self.state, estimates)
+    @property
+    def gap(self) -> Sequence[CoefficientGap]:
+        """How far the flight is from the aircraft file."""
+        return model_gap(self.state)
 
     def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due."""
