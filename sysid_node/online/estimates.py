@@ -156,6 +156,8 @@ def _judge(
     trusted = renewed.uncertainty.freedom >= ENOUGH_FREEDOM
     good = small & (inflation <= HOPELESS)
     good &= (trusted & ~renewed.lost)[table.coefficient]
+    spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
+    good &= ~spoilt
     if not state.thrust_known:
         good &= ~table.needs_thrust
     statuses = ["ok"] * len(table.names)
@@ -167,6 +169,8 @@ def _judge(
             statuses[i] = "thrust not measured"
         elif not trusted[c]:
             statuses[i] = "converging"
+        elif spoilt[i]:
+            statuses[i] = f"{renewed.timing.blamed[c]} not on time"
         elif inflation[i] > COLLINEAR:
             statuses[i] = f"collinear with {regression.collinear_with(plan, current.solution, unknown)}"
         elif not table.offset[i] and motion[i] < BURIED * renewed.total.bias[columns[i], columns[i]]:

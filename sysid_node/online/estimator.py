@@ -51,6 +51,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         plan=plan,
         table=table(aircraft, plan),
         spectrum=information.spectrum(grid.omega, memory),
+        rates=tuple((layout.column(f"{name} rate"), layout.column(name)) for name in layout.timed),
         momentum=tuple(tuple(row) for row in signals.momentum_matrix(aircraft).tolist()),
         signals=signals.scalar_signals(aircraft),
         auxiliary=auxiliary,
@@ -91,6 +92,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     half = (now[1] - previous[1]) * 0.5
     mean = previous[1] + half
     add_momentum(state.model.momentum, step, previous[2], now[2], mean)
+    add_rates(state.model.rates, step, half, mean)
     transform.add(state.transform, previous[0], time, mean, half)
     count(state, sample[INTERVAL])
     if time >= state.renew_at:
@@ -123,6 +125,12 @@ def add_momentum(matrix: tuple[tuple[float, ...], ...], step: Any, before: Any, 
     X, Y, Z, L, M, N = (matrix[0][i] * dp + matrix[1][i] * dq + matrix[2][i] * dr for i in range(6))
     for i, part in enumerate((X * sa - Z * ca, -X * ca - Z * sa, Y, L, M, N)):
         mean[..., i] += part
+
+
+def add_rates(columns: tuple[tuple[int, int], ...], step: Any, half: Array, mean: Array) -> None:
+    """Put the controls' rates over the interval into their columns; one interval or many."""
+    for rate, control in columns:
+        mean[..., rate] = half[..., control] * (2.0 / step)
 
 
 def count(state: State, interval: float) -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import change, information, noise, regression, transform
+from sysid_node.online import change, information, noise, regression, timing, transform
 from sysid_node.online.change import PIECE, Reference, Watch
 from sysid_node.online.information import Information
 from sysid_node.online.state import Renewed, State
@@ -104,7 +104,8 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     variance = spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     lost = np.zeros(len(plan.coefficients), dtype=bool)
-    renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lost)
+    lags = timing.examine(plan, state.model.layout, solution, spread, gram)
+    renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lags, lost)
     state.renewed = renewed
     state.watch.references.append(Reference(state.transform.last, solution, spread))
     return renewed

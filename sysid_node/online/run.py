@@ -94,6 +94,7 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     halves = (values - before) * 0.5
     means = before + halves
     estimator.add_momentum(state.model.momentum, steps, motion_before, motion, means)
+    estimator.add_rates(state.model.rates, steps, halves, means)
     kernels = np.zeros((time.size, 2, grid.rows))
     transform.weights(grid, (begins + 0.5 * steps)[:, None], steps[:, None], kernels)
     kernels[:, 0, -1] = steps

@@ -41,17 +41,20 @@ class Layout:
     """Which column of the signal vector is what: six coefficients, three nuisances, then the regressors."""
 
     regressors: tuple[str, ...]
+    timed: tuple[str, ...] = ()  # controls whose rates are transformed too, see ``timing``
     instrumented: tuple[str, ...] = ()  # regressors that have an instrument of their own, see ``auxiliary``
 
     @property
     def names(self) -> tuple[str, ...]:
         """All columns in order."""
-        return (*COEFFICIENTS, *NUISANCES, *self.regressors, *(f"{name} instrument" for name in self.instrumented))
+        rates = (f"{name} rate" for name in self.timed)
+        instruments = (f"{name} instrument" for name in self.instrumented)
+        return (*COEFFICIENTS, *NUISANCES, *self.regressors, *rates, *instruments)
 
     @property
     def width(self) -> int:
         """Number of columns."""
-        return OUTPUTS + len(NUISANCES) + len(self.regressors) + len(self.instrumented)
+        return len(self.names)
 
     def column(self, name: str) -> int:
         """Index of a coefficient, nuisance or regressor."""
@@ -66,7 +69,8 @@ def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> Layout:
     """The union of the regressors in the aircraft's model, each once, in the order of the file."""
     wanted = (r for regressors in aircraft.structure.values() for r in regressors)
     regressors = tuple(dict.fromkeys(r for r in wanted if r != "0"))
-    return Layout(regressors, tuple(r for r in regressors if r in instrumented))
+    timed = tuple(r for r in regressors if r in aircraft.control_symbols)
+    return Layout(regressors, timed, tuple(r for r in regressors if r in instrumented))
 
 
 def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
@@ -74,7 +78,7 @@ def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
 
     The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
     """
-    return cast(ScalarSignals, _signals(aircraft, math.cos, math.sin, lambda _: 1.0))
+    return cast(ScalarSignals, _signals(aircraft, math.cos, math.sin, lambda _: 1.0, lambda _: 0.0))
 
 
 def array_signals(aircraft: Aircraft) -> ArraySignals:
@@ -83,10 +87,10 @@ def array_signals(aircraft: Aircraft) -> ArraySignals:
     def mapped(function: Callable[[float], float]) -> Callable[[Array], Array]:
         return lambda x: np.fromiter(map(function, x.tolist()), np.float64, x.size)
 
-    return cast(ArraySignals, _signals(aircraft, mapped(math.cos), mapped(math.sin), np.ones_like))
+    return cast(ArraySignals, _signals(aircraft, mapped(math.cos), mapped(math.sin), np.ones_like, np.zeros_like))
 
 
-def _signals(aircraft: Aircraft, cos: Any, sin: Any, one: Any) -> Any:
+def _signals(aircraft: Aircraft, cos: Any, sin: Any, one: Any, none: Any) -> Any:
     """Build the signal function over scalars or arrays; see ``scalar_signals``."""
     m, S, b, c = aircraft.mass, aircraft.geometry.S, aircraft.geometry.b, aircraft.geometry.cbar
     rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
@@ -99,14 +103,19 @@ def _signals(aircraft: Aircraft, cos: Any, sin: Any, one: Any) -> Any:
     throttle = aircraft.throttle
     incline, arm = (throttle.inclination, throttle.arm) if throttle else (0.0, 0.0)
     cos_t, sin_t = math.cos(incline) * force, math.sin(incline) * force
-    names = layout(aircraft).regressors
+    names, timed = layout(aircraft).regressors, layout(aircraft).timed
     controls = {s: len(SAMPLE_COLUMNS) + i for i, s in enumerate(aircraft.control_symbols)}
 
     def signals(sample: Any) -> Any:
         ax, ay, az, p, q, r, V, alpha, beta, rho, thrust = sample[:11]
-        # flow angles at the CG: the vanes see the rotation (small-angle form)
-        alpha = alpha + (q * xa - p * ya) / V
-        beta = beta - (r * xa - p * za) / V
+        # the flow at the CG: the air-data probe's own speed, omega x arm, is in what it measures
+        forward = V * cos(beta)
+        u = forward * cos(alpha) - (q * za - r * ya)
+        v = V * sin(beta) - (r * xa - p * za)
+        w = forward * sin(alpha) - (p * ya - q * xa)
+        upright = sqrt(u * u + w * w)
+        V = sqrt(u * u + v * v + w * w)
+        alpha, beta = atan2(w, u), atan2(v, upright)
         # specific force at the CG: centripetal part of the lever arm here, tangential part below
         ax = ax + (q * q + r * r) * xi - p * q * yi - p * r * zi
         ay = ay - p * q * xi + (p * p + r * r) * yi - q * r * zi
@@ -124,6 +133,7 @@ def _signals(aircraft: Aircraft, cos: Any, sin: Any, one: Any) -> Any:
         known["k"] = lift * lift / k
         row = [lift, drag, FY, L, M, N, k, one(k)]
         row.extend(known[n] if n in known else k * sample[controls[n]] for n in names)
+        row.extend(none(k) for _ in timed)  # rates come with the interval
         # the angles carry the tangential acceleration of the lever arm into lift and drag
         return row, [ca, sa]
 

@@ -17,6 +17,7 @@ from sysid_node.online.regression import Plan, Solution, Uncertainty
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import Layout, ScalarSignals
 from sysid_node.online.table import Table
+from sysid_node.online.timing import Timing
 from sysid_node.online.transform import Transform
 
 Array = NDArray[np.float64]
@@ -32,6 +33,7 @@ class Model:
     plan: Plan
     table: Table
     spectrum: Spectrum
+    rates: tuple[tuple[int, int], ...]  # columns of the controls' rates and of the controls
     momentum: tuple[tuple[float, ...], ...]  # see ``signals.momentum_matrix``
     signals: ScalarSignals
     auxiliary: Auxiliary | None  # what makes instruments, where the method wants them
@@ -49,6 +51,7 @@ class Renewed:
     compensation: tuple[Array, Array] | None  # noise's part of the normal equations, see ``regression.bias_of``
     base: Array  # (W, W) Gram matrix of the finished segments
     factors: Array  # (P, C) squared standard error over (P_jj residual)
+    timing: Timing  # whether the controls are felt when they are measured
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
 
 
