@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -78,20 +79,22 @@ def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
 
     The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
     """
-    return cast(ScalarSignals, _signals(aircraft, math.cos, math.sin, lambda _: 1.0, lambda _: 0.0))
+    return cast(ScalarSignals, _signals(aircraft, math, lambda _: 1.0, lambda _: 0.0))
 
 
 def array_signals(aircraft: Aircraft) -> ArraySignals:
-    """As ``scalar_signals`` for columns (N,). Cosines come from the scalar library, for equal bits."""
+    """As ``scalar_signals`` for columns (N,). Functions come from the scalar library, for equal bits."""
 
-    def mapped(function: Callable[[float], float]) -> Callable[[Array], Array]:
-        return lambda x: np.fromiter(map(function, x.tolist()), np.float64, x.size)
+    def mapped(function: Callable[..., float]) -> Callable[..., Array]:
+        return lambda *xs: np.fromiter(map(function, *(x.tolist() for x in xs)), np.float64, xs[0].size)
 
-    return cast(ArraySignals, _signals(aircraft, mapped(math.cos), mapped(math.sin), np.ones_like, np.zeros_like))
+    functions = {name: mapped(getattr(math, name)) for name in ("cos", "sin", "sqrt", "atan2")}
+    return cast(ArraySignals, _signals(aircraft, SimpleNamespace(**functions), np.ones_like, np.zeros_like))
 
 
-def _signals(aircraft: Aircraft, cos: Any, sin: Any, one: Any, none: Any) -> Any:
+def _signals(aircraft: Aircraft, functions: Any, one: Any, none: Any) -> Any:
     """Build the signal function over scalars or arrays; see ``scalar_signals``."""
+    cos, sin, sqrt, atan2 = functions.cos, functions.sin, functions.sqrt, functions.atan2
     m, S, b, c = aircraft.mass, aircraft.geometry.S, aircraft.geometry.b, aircraft.geometry.cbar
     rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
     qbar0 = 0.5 * rho0 * V0 * V0
