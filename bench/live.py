@@ -47,35 +47,38 @@ def publish(seconds: float, together: bool) -> None:
     start = time.monotonic()
     for tick in range(int(seconds * IMU_RATE) + 1):
         t = tick / IMU_RATE
+        slow = [(air, air_data(t)), (joints, deflections(t))] if tick % SLOW_EVERY == 0 else []
+        fast = motion(t)
         time.sleep(max(0.0, start + t - time.monotonic()))
-        shared = time.time_ns()
-        if tick % SLOW_EVERY == 0:
-            stamp = stamp_message(shared)
-            air.publish(air_data(AirData(), t, stamp))
-            joints.publish(deflections(JointState(name=["elevator", "aileron", "rudder", "throttle"]), t, stamp))
-        imu.publish(motion(Imu(), t, stamp_message(shared if together else time.time_ns())))
+        stamp = stamp_message(time.time_ns())
+        for publisher, message in slow:
+            message.header.stamp = stamp
+            publisher.publish(message)
+        fast.header.stamp = stamp if together else stamp_message(time.time_ns())
+        imu.publish(fast)
     rclpy.shutdown()
 
 
-def motion(message, t, stamp):
-    message.header.stamp = stamp
+def motion(t):
+    message = Imu()
     message.linear_acceleration.x, message.linear_acceleration.z = 0.1 * math.sin(t), 9.8 + math.sin(2.0 * t)
     rates = message.angular_velocity
     rates.x, rates.y, rates.z = 0.3 * math.sin(3.0 * t), 0.2 * math.cos(2.0 * t), 0.1 * math.sin(2.5 * t)
     return message
 
 
-def air_data(message, t, stamp):
-    message.header.stamp = stamp
-    message.true_airspeed, message.air_density = 18.0 + 0.5 * math.sin(0.7 * t), 1.2
-    message.angle_of_attack, message.sideslip = 0.05 + 0.03 * math.sin(2.0 * t), 0.03 * math.sin(2.5 * t)
-    return message
+def air_data(t):
+    return AirData(
+        true_airspeed=18.0 + 0.5 * math.sin(0.7 * t),
+        angle_of_attack=0.05 + 0.03 * math.sin(2.0 * t),
+        sideslip=0.03 * math.sin(2.5 * t),
+        air_density=1.2,
+    )
 
 
-def deflections(message, t, stamp):
-    message.header.stamp = stamp
-    message.position = [0.05 * math.sin(3.1 * t), 0.05 * math.sin(2.3 * t), 0.05 * math.cos(1.9 * t), 0.5]
-    return message
+def deflections(t):
+    surfaces = [0.05 * math.sin(3.1 * t), 0.05 * math.sin(2.3 * t), 0.05 * math.cos(1.9 * t)]
+    return JointState(name=["elevator", "aileron", "rudder", "throttle"], position=[*surfaces, 0.5])
 
 
 @contextlib.contextmanager

@@ -6,8 +6,6 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-import numpy as np
-
 
 @dataclass
 class TopicMonitor:
@@ -40,7 +38,7 @@ class TopicMonitor:
 class Durations:
     """The last so many durations of one kind of work."""
 
-    seconds: deque[float] = field(default_factory=lambda: deque(maxlen=2000))
+    seconds: deque[float] = field(default_factory=lambda: deque(maxlen=500))
 
     def add(self, seconds: float) -> None:
         """One more, s."""
@@ -50,5 +48,5 @@ class Durations:
         """p50 and p99, s; NaN where there are none."""
         if not self.seconds:
             return float("nan"), float("nan")
-        p50, p99 = np.percentile(np.fromiter(self.seconds, float), (50, 99))
-        return float(p50), float(p99)
+        ordered = sorted(self.seconds)
+        return ordered[len(ordered) // 2], ordered[len(ordered) * 99 // 100]
