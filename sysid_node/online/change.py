@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gdtrix
 
-from sysid_node.online.information import about_mean, project
+from sysid_node.online.auxiliary import Auxiliary
+from sysid_node.online.information import clean_lines
 from sysid_node.online.regression import Plan, Solution, Uncertainty
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ class _Misfit:
     unexplained: bool  # whether nothing does
 
 
-def examine(plan: Plan, watch: Watch, density_per_gram: float, now: float) -> Finding:
+def examine(plan: Plan, model: Auxiliary | None, watch: Watch, density_per_gram: float, now: float) -> Finding:
     """Test every span of the last pieces; see the module's text.
 
     ``density_per_gram`` (s): A'KA over A'A where the span is much shorter than the period of the line spacing.
@@ -86,7 +87,7 @@ def examine(plan: Plan, watch: Watch, density_per_gram: float, now: float) -> Fi
         reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
         if reference is None:
             break
-        lines = project(about_mean(np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0)))
+        lines = clean_lines(np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0), model)
         gram = lines.T @ lines
         energy = 0.5 * lines.shape[0] * (now - start)
         for c in _suspects(plan, reference, gram):

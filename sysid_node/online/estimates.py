@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import regression, signals, transform
-from sysid_node.online.information import about_mean, inverse2
+from sysid_node.online.auxiliary import Auxiliary
+from sysid_node.online.information import about_mean, clean_lines, inverse2
 from sysid_node.online.prior import beliefs, weighed
 from sysid_node.online.regression import Solution, student_95
 from sysid_node.online.signals import OFFSET
@@ -37,7 +38,7 @@ class Present:
     solution: Solution
     variance: Array  # (P, C) squared standard errors
     gram: Array  # (W, W)
-    integrals: Array  # (W,) of the present segment
+    integrals: Array  # (T,) of the present segment's transformed signals
 
 
 def present(state: State) -> Present | None:
@@ -48,10 +49,7 @@ def present(state: State) -> Present | None:
     part = transform.current(state.transform)
     rate = state.model.spectrum.rate
     part -= state.segment * math.exp(0.5 * rate * (state.segment_start - last)) if rate else state.segment
-    lines = about_mean(part)
-    gram = lines.T @ lines
-    border = gram[:, _NUISANCES]
-    gram -= border @ inverse2(border[_NUISANCES]) @ border.T
+    gram = _gram(part, state.model.auxiliary)
     gram += renewed.base
     # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
     energy = renewed.total.energy
@@ -62,6 +60,18 @@ def present(state: State) -> Present | None:
     variance = renewed.factors * solution.residual
     variance *= np.abs(solution.inverse.diagonal())[:, None] / growth
     return Present(solution, variance, gram, part[-1])
+
+
+def _gram(part: Array, model: Auxiliary | None) -> Array:
+    """(W, W) of the clean lines; without instruments, constant and drift are projected out of the products instead."""
+    if model is not None:
+        lines = clean_lines(part, model)
+        return lines.T @ lines
+    lines = about_mean(part)
+    gram = lines.T @ lines
+    border = gram[:, _NUISANCES]
+    gram -= border @ inverse2(border[_NUISANCES]) @ border.T
+    return gram
 
 
 def estimate(state: State, now: float | None = None) -> Estimates:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.online import information, regression, signals, transform
-from sysid_node.online.auxiliary import INSTRUMENTED, at_rest, auxiliary_model, instruments
+from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
 from sysid_node.online.renewal import RENEWAL, begin_segment, finish_segment, renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import NUISANCES, OUTPUTS
@@ -28,13 +28,12 @@ from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
 DRIFT = OUTPUTS + NUISANCES.index("t")
-THRUST, INTERVAL, CONTROLS = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval"), len(SAMPLE_COLUMNS)
+THRUST, INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
 
 
 def init(aircraft: Aircraft, settings: Settings) -> State:
     """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate."""
-    auxiliary = auxiliary_model(aircraft) if settings.method == "iv_rft" else None
-    layout = signals.layout(aircraft, INSTRUMENTED if auxiliary else ())
+    layout = signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
     unformed = signals.unformed(aircraft)
     structure = {c: rs for c, rs in aircraft.structure.items() if c not in unformed and set(rs) - {"0"}}
     if not structure:
@@ -54,12 +53,12 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         rates=tuple((layout.column(f"{name} rate"), layout.column(name)) for name in layout.timed),
         momentum=tuple(tuple(row) for row in signals.momentum_matrix(aircraft).tolist()),
         signals=signals.scalar_signals(aircraft),
-        auxiliary=auxiliary,
+        auxiliary=auxiliary_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * RENEWAL),
         memory=memory,
     )
-    running = transform.start(grid, layout.width, memory)
-    return State(model, running, at_rest(auxiliary), information.nothing(layout.width))
+    running = transform.start(grid, layout.transformed, memory)
+    return State(model, running, information.nothing(layout))
 
 
 def update(state: State, time: float, sample: Sequence[float]) -> None:
@@ -81,9 +80,6 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
         return
     row, angles = state.model.signals(sample)
     row.insert(DRIFT, time)
-    if state.model.auxiliary is not None:
-        max_gap = state.model.settings.max_gap
-        row.extend(instruments(state.model.auxiliary, state.track, time, sample[CONTROLS:], max_gap))
     now = state.previous = (time, np.array(row), (*sample[3:6], *angles))
     if previous is None or time - previous[0] > state.model.settings.max_gap:
         interrupt(state, time)

@@ -19,13 +19,14 @@ band of lines: with the residual's density in each band it gives the covariance 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.signals import OFFSET
+from sysid_node.online.auxiliary import Auxiliary, with_instruments
+from sysid_node.online.signals import OFFSET, Layout
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
@@ -42,7 +43,7 @@ class Information:
     trace_square: float  # of the noise covariance squared, over all lines
     energy: float  # s: integral of the window squared: the duration, where nothing is forgotten
     bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
-    integrals: Array  # (W,) of the signals over time
+    integrals: Array  # (T,) of the transformed signals over time
     samples: float
 
     def __add__(self, other: Information) -> Information:
@@ -53,10 +54,13 @@ class Information:
         return Information(*(getattr(self, f) * factor for f in self.__dataclass_fields__))
 
 
-def nothing(width: int) -> Information:
+def nothing(layout: Layout) -> Information:
     """No information at all."""
+    width = layout.width
     zeros = np.zeros((BANDS, width, width))
-    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, np.zeros((width, width)), np.zeros(width), 0.0)
+    return Information(
+        zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, np.zeros((width, width)), np.zeros(layout.transformed), 0.0
+    )
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
 
 
 def about_mean(transform: Array) -> Array:
-    """(2F, W) lines of a transform (2F + 1, W) whose signals are taken about their means; nuisances are kept.
+    """(2F, T) lines of a transform (2F + 1, T) whose signals are taken about their means; nuisances are kept.
 
     The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
     """
@@ -93,7 +97,7 @@ def about_mean(transform: Array) -> Array:
 
 
 def project(lines: Array) -> Array:
-    """(2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
+    """(2F, T) with constant and drift projected out of the other columns; they themselves are kept."""
     n = lines[:, _N].copy()
     clean = lines - n @ (inverse2(n.T @ n) @ (n.T @ lines))
     clean[:, _N] = n
@@ -133,16 +137,25 @@ def window_energy(duration: float, rate: float) -> float:
     return -math.expm1(-rate * duration) / rate if rate else duration
 
 
-def measure(transform: Array, lines: Spectrum, begin: float, end: float) -> Information:
-    """What the transform (2F + 1, W) of begin..end (s) says; ``bias`` and ``samples`` are left at zero."""
+def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
+    """(2F, W) lines of a transform (2F + 1, T) without offset, constant and drift, and the instruments made of them."""
+    return with_instruments(model, project(about_mean(transform)))
+
+
+def measure(
+    transform: Array, lines: Spectrum, begin: float, end: float, clean: Array, empty: Information
+) -> Information:
+    """What the transform (2F + 1, T) of begin..end (s) says, whose ``clean_lines`` are ``clean``.
+
+    ``bias`` and ``samples`` stay as in ``empty``.
+    """
     F = lines.omega.size
-    clean = project(about_mean(transform))
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
     n = clean[:, _N]
     # what projecting the nuisances out leaves of the noise's square in each line: diagonal of (I - H) K
     left = covariance.diagonal() - ((n @ inverse2(n.T @ n)) * spread[:, _N]).sum(axis=1)
-    info = nothing(clean.shape[1])
+    info = replace(empty, grams=np.empty_like(empty.grams), scores=np.empty_like(empty.scores), traces=np.empty(BANDS))
     for band, part in enumerate(lines.bands):
         rows = np.r_[part, F + part.start : F + part.stop]
         info.grams[band] = clean[rows].T @ clean[rows]

@@ -57,7 +57,9 @@ def _measure_segment(state: State, lines: Array) -> Information:
     """What the present segment says up to now."""
     model = state.model
     begin, end = state.segment_start, state.transform.last
-    info = information.measure(lines - state.segment * _fading(state, begin), model.spectrum, begin, end)
+    part = lines - state.segment * _fading(state, begin)
+    clean = information.clean_lines(part, model.auxiliary)
+    info = information.measure(part, model.spectrum, begin, end, clean, information.nothing(model.layout))
     samples = max(state.samples, 1)
     mean = info.integrals / information.window_energy(end - begin, 0.5 * model.spectrum.rate)
     per_line_second = noise.gram_bias(
@@ -82,7 +84,7 @@ def _past(state: State) -> Information:
     state.past_time = now
     if window and state.inside and state.inside[0][0] <= now - window:
         state.inside.popleft()
-        state.past = sum((info for _, info in state.inside), information.nothing(state.model.layout.width))
+        state.past = sum((info for _, info in state.inside), information.nothing(state.model.layout))
     return state.past
 
 
@@ -114,7 +116,8 @@ def _solve_all(state: State, segment: Information) -> Renewed:
 def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
     density_per_gram = 0.5 / state.model.settings.frequencies[1]
-    finding = change.examine(state.model.plan, state.watch, density_per_gram, state.transform.last)
+    model, now = state.model, state.transform.last
+    finding = change.examine(model.plan, model.auxiliary, state.watch, density_per_gram, now)
     renewed.lost = finding.lost
     if finding.changed_since is not None:
         _begin_anew(state, lines, finding.changed_since)
@@ -127,7 +130,7 @@ def _begin_anew(state: State, lines: Array, since: float) -> None:
     # what is counted of the present segment is taken as even over its time
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
-    state.past = information.nothing(state.model.layout.width)
+    state.past = information.nothing(state.model.layout)
     state.inside.clear()
     state.segment, state.segment_start = lines - np.sum(kept, axis=0), since
     state.changed_at = now

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator, signals, transform
-from sysid_node.online.auxiliary import Auxiliary, instruments
 from sysid_node.online.estimates import estimate
 from sysid_node.online.renewal import renew
 from sysid_node.online.settings import Settings
@@ -75,12 +74,10 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     columns[thrust] = np.where(np.isfinite(columns[thrust]), columns[thrust], 0.0)
     grid = state.transform.grid
     if not time.size:
-        empty = np.empty((0, state.model.layout.width))
+        empty = np.empty((0, state.model.layout.transformed))
         return _Chunk(kept, missing, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
-    if state.model.auxiliary is not None:
-        rows.extend(_instruments(state, state.model.auxiliary, time, columns))
     values = np.stack(rows, axis=1)
     motion = [*columns[3:6], *angles]
     begins = np.concatenate([[np.nan], time[:-1]])
@@ -100,14 +97,6 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     kernels[:, 0, -1] = steps
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
     return _Chunk(kept, missing, time, begins, means, halves, kernels, columns[estimator.INTERVAL], last)
-
-
-def _instruments(state: State, model: Auxiliary, time: Array, columns: list[Array]) -> list[Array]:
-    """The instruments' columns (n,); a recursion, so sample by sample."""
-    controls = np.stack(columns[estimator.CONTROLS :], axis=1).tolist()
-    gap = state.model.settings.max_gap
-    made = [instruments(model, state.track, t, u, gap) for t, u in zip(time.tolist(), controls, strict=True)]
-    return list(np.array(made).T)
 
 
 def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:

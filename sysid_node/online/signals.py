@@ -57,6 +57,11 @@ class Layout:
         """Number of columns."""
         return len(self.names)
 
+    @property
+    def transformed(self) -> int:
+        """Number of columns that are transformed; the instruments, behind them, are made of their lines."""
+        return self.width - len(self.instrumented)
+
     def column(self, name: str) -> int:
         """Index of a coefficient, nuisance or regressor."""
         return self.names.index(name)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.auxiliary import Auxiliary, Track
+from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.change import Watch
 from sysid_node.online.information import Information, Spectrum
 from sysid_node.online.regression import Plan, Solution, Uncertainty
@@ -61,7 +61,6 @@ class State:
 
     model: Model
     transform: Transform
-    track: Track  # motion of the model that makes instruments
     past: Information  # finished segments, faded to ``past_time``
     past_time: float = math.nan
     inside: deque[tuple[float, Information]] = field(

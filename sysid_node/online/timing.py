@@ -76,12 +76,12 @@ def _with_rate(
     v = np.zeros(plan.width)
     v[plan.outputs[c]], v[J] = 1.0, -solution.theta[mine, c]
     # one regressor more, by the partitioned inverse
-    share = block @ gram[J, rate]
+    share = block @ gram[plan.instruments[mine], rate]
     left = float(gram[rate, rate] - gram[rate, J] @ share)
     effect = float(solution.theta[mine[place], c])
     if left <= 1e-6 * float(gram[rate, rate]) or effect == 0.0:
         return None, np.zeros(mine.size)
     slope = float(gram[rate] @ v) / left
     variance = np.maximum(spread.covariance[c].diagonal()[mine], 0.0)
-    colour = float(np.max(variance / np.maximum(block.diagonal(), 1e-300)))
+    colour = float(np.max(variance / np.maximum(np.abs(block.diagonal()), 1e-300)))
     return Lag(symbol, -slope / effect, math.sqrt(colour / left) / abs(effect)), np.abs(share * slope)
