@@ -19,7 +19,7 @@ band of lines: with the residual's density in each band it gives the covariance 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -58,9 +58,8 @@ def nothing(layout: Layout) -> Information:
     """No information at all."""
     width = layout.width
     zeros = np.zeros((BANDS, width, width))
-    return Information(
-        zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, np.zeros((width, width)), np.zeros(layout.transformed), 0.0
-    )
+    bias, integrals = np.zeros((width, width)), np.zeros(layout.transformed)
+    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, integrals, 0.0)
 
 
 @dataclass(frozen=True)
@@ -142,27 +141,23 @@ def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
     return with_instruments(model, project(about_mean(transform)))
 
 
-def measure(
-    transform: Array, lines: Spectrum, begin: float, end: float, clean: Array, empty: Information
-) -> Information:
-    """What the transform (2F + 1, T) of begin..end (s) says, whose ``clean_lines`` are ``clean``.
-
-    ``bias`` and ``samples`` stay as in ``empty``.
-    """
+def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
+    """What the transform (2F + 1, T) of begin..end (s) says; ``bias`` and ``samples`` are left at zero."""
     F = lines.omega.size
+    clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
     n = clean[:, _N]
     # what projecting the nuisances out leaves of the noise's square in each line: diagonal of (I - H) K
     left = covariance.diagonal() - ((n @ inverse2(n.T @ n)) * spread[:, _N]).sum(axis=1)
-    info = replace(empty, grams=np.empty_like(empty.grams), scores=np.empty_like(empty.scores), traces=np.empty(BANDS))
+    W = clean.shape[1]
+    grams, scores, traces = np.empty((BANDS, W, W)), np.empty((BANDS, W, W)), np.empty(BANDS)
     for band, part in enumerate(lines.bands):
         rows = np.r_[part, F + part.start : F + part.stop]
-        info.grams[band] = clean[rows].T @ clean[rows]
+        grams[band] = clean[rows].T @ clean[rows]
         score = clean[rows].T @ spread[rows]
-        info.scores[band] = 0.5 * (score + score.T)
-        info.traces[band] = left[rows].sum()
-    info.trace_square = float(np.vdot(covariance, covariance))
-    info.energy = window_energy(end - begin, lines.rate)
-    info.integrals = transform[-1].copy()
-    return info
+        scores[band] = 0.5 * (score + score.T)
+        traces[band] = left[rows].sum()
+    square = float(np.vdot(covariance, covariance))
+    energy = window_energy(end - begin, lines.rate)
+    return Information(grams, scores, traces, square, energy, np.zeros((W, W)), transform[-1].copy(), 0.0)

@@ -58,8 +58,7 @@ def _measure_segment(state: State, lines: Array) -> Information:
     model = state.model
     begin, end = state.segment_start, state.transform.last
     part = lines - state.segment * _fading(state, begin)
-    clean = information.clean_lines(part, model.auxiliary)
-    info = information.measure(part, model.spectrum, begin, end, clean, information.nothing(model.layout))
+    info = information.measure(part, model.auxiliary, model.spectrum, begin, end)
     samples = max(state.samples, 1)
     mean = info.integrals / information.window_energy(end - begin, 0.5 * model.spectrum.rate)
     per_line_second = noise.gram_bias(
