@@ -1,0 +1,98 @@
+"""What the identifier says on /diagnostics, without a node."""
+
+import math
+
+import pytest
+
+from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
+from sysid_node.ros.diagnostics import ERROR, OK, STALE, WARN, Source
+from sysid_node.ros.monitor import Durations, TopicMonitor
+
+SOURCE = Source("identifier", "cdrw")
+
+
+def values(status) -> dict[str, str]:
+    return {pair.key: pair.value for pair in status.values}
+
+
+def heard(name: str, count: int = 1) -> TopicMonitor:
+    monitor = TopicMonitor(name)
+    for _ in range(count):
+        monitor.arrived()
+    return monitor
+
+
+def test_all_is_well() -> None:
+    status = SOURCE.input([heard("imu/data", 3), heard("air_data")], {}, 60.0)
+    assert (status.level, status.name, status.hardware_id) == (OK, "identifier: input", "cdrw")
+    assert status.message == "all topics arrive"
+    assert values(status)["imu/data: received"] == "3"
+
+
+def test_what_never_came_is_named() -> None:
+    status = SOURCE.input([heard("imu/data"), TopicMonitor("air_data")], {}, 60.0)
+    assert (status.level, status.message) == (STALE, "air_data never received")
+
+
+def test_silence_is_named() -> None:
+    status = SOURCE.input([heard("imu/data")], {}, -1.0)
+    assert status.level == STALE
+    assert status.message.startswith("imu/data silent for 0.0 s")
+
+
+def test_rejected_messages_are_counted_by_reason() -> None:
+    rejected = {"imu/data: duplicate stamp": 2, "air_data: sideslip over pi/2 rad (degrees?)": 7}
+    status = SOURCE.input([heard("imu/data")], rejected, 60.0)
+    assert status.level == WARN
+    assert "9 messages rejected, most as air_data: sideslip over pi/2 rad (degrees?)" in status.message
+    assert values(status)["rejected, imu/data: duplicate stamp"] == "2"
+
+
+@pytest.mark.parametrize(("fault", "level", "message"), [("", OK, "active"), ("boom", ERROR, "active: boom")])
+def test_a_fault_is_an_error(fault: str, level: bytes, message: str) -> None:
+    status = SOURCE.state("active", fault, 1)
+    assert (status.level, status.message) == (level, message)
+
+
+def test_derivatives_are_grouped_by_what_is_wrong_with_them() -> None:
+    estimates = Estimates(
+        3.0,
+        {
+            "CL_alpha": DerivativeEstimate("CL_alpha", 3.0, 0.1, 2.8, 3.2, True, "ok"),
+            "Cl_p": DerivativeEstimate("Cl_p", 0.4, 0.5, -0.6, 1.4, False, "not excited"),
+            "Cn_r": DerivativeEstimate("Cn_r", math.nan, math.inf, -math.inf, math.inf, False, "not excited"),
+        },
+        {"CL": FitQuality("CL", 0.9, 0.01, 20.0, 600)},
+    )
+    status = SOURCE.estimate(estimates, 600)
+    assert (status.level, status.message) == (OK, "1 of 3 derivatives valid")
+    assert values(status)["not excited"] == "Cl_p Cn_r"
+    assert values(status)["R^2 of CL"] == "0.9"
+
+
+def test_times_are_told_by_their_percentiles() -> None:
+    durations = Durations()
+    assert all(map(math.isnan, durations.percentiles()))
+    for i in range(100):
+        durations.add(i * 1e-6)
+    status = SOURCE.computation({"update": durations}, 0.002)
+    assert status.message == "last estimate 2.0 ms after its sample"
+    assert values(status)["update p50 (us)"] == "50"
+    assert values(status)["update p99 (us)"] == "99"
+
+
+def test_a_replay_has_no_lag_worth_telling() -> None:
+    assert SOURCE.computation({}, 1e8).message == "last estimate of another clock's stamps"
+
+
+def test_a_rate_is_over_the_time_since_it_was_last_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("sysid_node.ros.monitor.time.monotonic", lambda: now[0])
+    monitor = TopicMonitor("imu/data", _since=100.0)
+    for _ in range(40):
+        now[0] += 0.05
+        monitor.arrived()
+    assert monitor.rate() == pytest.approx(20.0)
+    now[0] += 1.0
+    assert monitor.rate() == 0.0
+    assert monitor.silence() == pytest.approx(1.0)
