@@ -1,0 +1,131 @@
+"""Flights by the hundred: one compiled simulator over a batch of noise and turbulence, as aligned samples.
+
+The aircraft is flown at 200 Hz. Air data are taken at 100 Hz and interpolated linearly in between, as the intake does;
+surfaces and thrust are measured. The truth is the aircraft file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.online.types import SAMPLE_COLUMNS
+from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim.atmosphere import air_density
+from sysid_node.sim.autopilot import autopilot_for, fly_held
+from sysid_node.sim.dryden import INTENSITIES, Dryden
+from sysid_node.sim.layout import OUTPUTS
+
+Array = NDArray[np.float64]
+Effects = Mapping[str, Mapping[str, float]]
+
+RATE = 200.0  # Hz, of the IMU and the integration
+AIR_INTERVAL = 2 / RATE  # s between air data
+HEIGHT = 100.0  # m above the ground, for the turbulence
+ROTARY = slice(3, 6)  # of the gusts: the air's rotation
+AIR = [OUTPUTS.index(name) for name in ("V", "alpha", "beta")]
+
+#: 3-2-1-1 on each surface in turn, all of them within the first five seconds, every other one turned round.
+MULTISTEP = tuple(
+    f"3211:{surface}:amplitude={sign * amplitude}:width={width}:start={start + late}:every=12:repeat=5"
+    for surface, amplitude, width, start in (
+        ("elevator", 0.06, 0.3, 0.7),
+        ("aileron", 0.06, 0.25, 0.9),
+        ("rudder", 0.12, 0.3, 2.7),
+    )
+    for sign, late in ((1, 0), (-1, 6))
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """In what, and how, a batch is flown."""
+
+    name: str
+    turbulence: str = "none"
+    autopilot: bool = True
+    manoeuvre: Sequence[str] = MULTISTEP
+    seconds: float = 60.0
+    effects: Effects = field(default_factory=dict)
+    vane_noise: float = 1.0  # of the aircraft file's
+    rotary: bool = True  # whether the turbulence turns the air, too
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Aligned samples of F flights: time (N,) s, samples (F, N, M) as ``online.run`` takes them."""
+
+    time: Array
+    samples: Array
+
+
+def noisier(aircraft: Aircraft, vane_noise: float) -> Aircraft:
+    """The aircraft with so many times the file's noise on alpha and beta."""
+    noise = {n: v * vane_noise if n in ("alpha", "beta") else v for n, v in aircraft.noise.items()}
+    return replace(aircraft, noise=noise)
+
+
+def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
+    """One flight for each seed. Raises InputError where one diverges."""
+    simulator = _simulator(aircraft, setting.vane_noise)
+    effects = {**setting.effects, "sensor_noise": {"scale": 1.0}}
+    if setting.turbulence != "none":
+        effects["turbulence"] = {"intensity": INTENSITIES[setting.turbulence]}
+    theta = simulator.vector(effects)
+    trim = trim_flight(simulator, theta=theta)
+    plan = parse_manoeuvre(setting.manoeuvre, simulator.aircraft, RATE, setting.seconds)
+    commands = jnp.asarray(trim.command + np.column_stack([plan.surfaces(), np.zeros(plan.time.size)]))
+    pilot = autopilot_for(simulator, trim)
+
+    def one(gusts: Any, noise: Any) -> Any:
+        inputs = simulator.inputs(commands, turbulence=gusts, noise=noise)
+        if setting.autopilot:
+            return fly_held(simulator, theta, trim, inputs, pilot)
+        return simulator.rollout(theta, trim.initial, inputs)
+
+    flights = jax.vmap(one)(*_weather(simulator, setting, plan.time.size, seeds))
+    for i in range(len(seeds)):
+        simulator.check(jax.tree.map(lambda x, i=i: x[i], flights))
+    return Batch(plan.time, _samples(np.asarray(flights.outputs), np.asarray(flights.surfaces), flights.states))
+
+
+@lru_cache
+def _simulator(aircraft: str, vane_noise: float) -> Simulator:
+    return Simulator(noisier(load_aircraft(aircraft), vane_noise), RATE)
+
+
+def _weather(simulator: Simulator, setting: Setting, samples: int, seeds: Sequence[int]) -> tuple[Array, Array]:
+    """Gusts (F, N, 6) and noise (F, N, 12), unscaled, from the seeds."""
+    aircraft = simulator.aircraft
+    dryden = Dryden.at(HEIGHT, aircraft.geometry.b)
+    gusts, noise = np.zeros((len(seeds), samples, 6)), np.empty((len(seeds), samples, len(OUTPUTS)))
+    for i, seed in enumerate(seeds):
+        air, sensors = np.random.default_rng(seed).spawn(2)
+        noise[i] = sensors.standard_normal(noise.shape[1:])
+        if setting.turbulence != "none":
+            gusts[i] = dryden.realisation(samples, RATE, aircraft.reference.airspeed, air)
+    if not setting.rotary:
+        gusts[..., ROTARY] = 0.0
+    return gusts, noise
+
+
+def _samples(outputs: Array, surfaces: Array, states: Any) -> Array:
+    """(F, N, M) from readings (F, N, 12), surfaces and thrust (F, N, controls + 1) and true states (F, N, 13)."""
+    air = outputs[..., AIR]
+    air[:, 1:-1:2] = 0.5 * (air[:, :-2:2] + air[:, 2::2])
+    columns = {name: outputs[..., OUTPUTS.index(name)] for name in SAMPLE_COLUMNS if name in OUTPUTS}
+    columns |= dict(zip(("V", "alpha", "beta"), np.moveaxis(air, -1, 0), strict=True))
+    columns["rho"] = np.asarray(air_density(-states[..., 2]))
+    columns["thrust"] = surfaces[..., -1]
+    columns["air_interval"] = np.full(outputs.shape[:2], AIR_INTERVAL)
+    return np.concatenate([np.stack([columns[name] for name in SAMPLE_COLUMNS], axis=-1), surfaces[..., :-1]], axis=-1)
