@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from sysid_node.sim import body as rigid
@@ -22,6 +24,11 @@ from sysid_node.sim.stations.airflow import Air
 SEPARATION, MODE, MODE_RATE = 13, 14, 15
 
 
+@partial(
+    jax.tree_util.register_dataclass,
+    meta_fields=["layout"],
+    data_fields=["model", "effects", "body", "step", "altitude"],
+)
 @dataclass(frozen=True)
 class Chain:
     """An aircraft with its effects, ready to fly: what does not change during a flight."""
@@ -66,6 +73,7 @@ class Motion(NamedTuple):
     mode_acceleration: Scalar  # m/s^2
 
 
+@jax.jit
 def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, Motion]:
     """d/dt of the continuous state (16,), and the motion behind it."""
     effects, state = chain.effects, rigid.unpack(x)

@@ -14,7 +14,8 @@ def soft_clip(x: jax.Array, inverse_limit: jax.Array | float = 1.0) -> jax.Array
 
     ``x / (1 + |x / limit|^16)^(1/16)``: 4.3 % below the exact clip at its corner, 0.1 % at 1.3 times the limit.
     """
-    return x / (1.0 + (x * inverse_limit) ** 16) ** (1.0 / 16.0)
+    root = jnp.sqrt(jnp.sqrt(jnp.sqrt(jnp.sqrt(1.0 + (x * inverse_limit) ** 16))))
+    return x / root
 
 
 def soft_dead_zone(x: jax.Array, half_width: jax.Array) -> jax.Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 
 from sysid_node.sim.layout import Scalar
@@ -12,11 +13,8 @@ def shift_linear(series: Scalar, samples: Scalar) -> Scalar:
 
     Exact for a signal that is linear between samples. Its derivative jumps where ``samples`` is whole.
     """
-    n = series.shape[0]
-    position = jnp.arange(n) - samples
-    low = jnp.floor(position)
-    weight = _column(position - low, series)
-    return (1.0 - weight) * _held(series, low) + weight * _held(series, low + 1)
+    s, (a, b) = _neighbours(series, samples, 0, 2)
+    return (1.0 - s) * a + s * b
 
 
 def shift_cubic(series: Scalar, samples: Scalar) -> Scalar:
@@ -24,19 +22,26 @@ def shift_cubic(series: Scalar, samples: Scalar) -> Scalar:
 
     Once differentiable in ``samples``: at a whole number of samples the derivative is the central difference.
     """
-    n = series.shape[0]
-    position = jnp.arange(n) - samples
-    low = jnp.floor(position)
-    s = _column(position - low, series)
-    a, b, c, d = (_held(series, low + i) for i in (-1, 0, 1, 2))
+    s, (a, b, c, d) = _neighbours(series, samples, -1, 4)
     return b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
 
 
-def _held(series: Scalar, index: Scalar) -> Scalar:
-    """Rows of a series, the first and last held beyond the ends."""
-    return series[jnp.clip(index, 0, series.shape[0] - 1).astype(jnp.int32)]
+def shift_near_zero(series: Scalar, samples: Scalar) -> Scalar:
+    """Value and slope of ``shift_cubic`` at a shift of 0, without moving the series; ``samples`` may be per column."""
+    before = jnp.concatenate([series[:1], series[:-1]])
+    after = jnp.concatenate([series[1:], series[-1:]])
+    return series - 0.5 * samples * (after - before)
 
 
-def _column(weight: Scalar, series: Scalar) -> Scalar:
-    """A weight per row, shaped to multiply the series."""
-    return weight.reshape((-1,) + (1,) * (series.ndim - 1))
+def _neighbours(series: Scalar, samples: Scalar, first: int, count: int) -> tuple[Scalar, list[Scalar]]:
+    """Where each k - samples lies between two samples, 0 to 1, and ``count`` rows around it from ``first`` on.
+
+    The shift is the same for every row, so that the rows are slices of the series with its ends held.
+    """
+    n = series.shape[0]
+    whole = jnp.floor(-samples)
+    begin = jnp.broadcast_to(series[:1], series.shape)
+    end = jnp.broadcast_to(series[-1:], (n + count, *series.shape[1:]))
+    start = jnp.clip(n + whole.astype(jnp.int32) + first, 0, 2 * n)
+    window = jax.lax.dynamic_slice_in_dim(jnp.concatenate([begin, series, end]), start, n + count - 1)
+    return -samples - whole, [window[i : i + n] for i in range(count)]

@@ -1,8 +1,8 @@
 """The aircraft as a JSBSim model (JSBSim-ML 2.0).
 
 Coefficients are functions of JSBSim's own properties; forces are summed along body axes, so that no convention of wind
-axes comes between. Commands are ``fcs/<control>-cmd-rad`` (rad) and ``fcs/throttle-cmd-norm``. JSBSim's structural axes run
-aft, right, up, and its product of inertia is minus the usual Ixz.
+axes comes between. Commands are ``fcs/<control>-cmd-rad`` (rad) and ``fcs/throttle-cmd-norm``. JSBSim's structural
+axes run aft, right, up, and its product of inertia is minus the usual Ixz.
 """
 
 from __future__ import annotations
@@ -110,6 +110,8 @@ def _flight_control(root: Element, aircraft: Aircraft, effects: Effects) -> None
     control = SubElement(root, "flight_control", name="fcs")
     for name in aircraft.controls:
         _text(control, "property", f"fcs/{name}-cmd-rad", value="0")
+    if aircraft.throttle is not None:
+        _text(control, "property", "fcs/throttle-cmd-norm", value="0")
     channel = SubElement(control, "channel", name="actuators")
     for name, surface in aircraft.controls.items():
         actuator = SubElement(channel, "actuator", name=f"fcs/{name}-position-rad")

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 
 from sysid_node.sim.layout import Scalar, Values
-from sysid_node.sim.timing import shift_cubic
+from sysid_node.sim.timing import shift_cubic, shift_near_zero
 
-_IMU = 9  # columns of the IMU's messages in the outputs; the rest is air data
+_IMU, _AIR = 9, 3  # columns of the outputs that the IMU's and the air data's messages carry
 
 
 def stamp(effects: dict[str, Values], outputs: Scalar, step: Scalar) -> Scalar:
     """Outputs (N, 12) by their stamps, from outputs by the time of measurement; step in s."""
-    imu = shift_cubic(outputs[:, :_IMU], effects["imu_delay"]["delay"] / step)
-    air = shift_cubic(outputs[:, _IMU:], effects["air_data_delay"]["delay"] / step)
-    return jnp.concatenate([imu, air], axis=1)
+    imu, air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
+    late = jnp.concatenate([jnp.full(_IMU, imu), jnp.full(_AIR, air)])
+    # most flights have no such delay: their slopes need not be moved about
+    return jax.lax.cond(jnp.all(late == 0.0), shift_near_zero, _shift_each, outputs, late)
+
+
+def _shift_each(outputs: Scalar, late: Scalar) -> Scalar:
+    imu, air = outputs[:, :_IMU], outputs[:, _IMU:]
+    return jnp.concatenate([shift_cubic(imu, late[0]), shift_cubic(air, late[-1])], axis=1)
