@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 ENOUGH_FREEDOM = 6.0  # degrees of freedom under which an interval is not trusted
 HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apart at all
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
+STRONG = 15.0  # F statistic of an instrument under which an interval is not trusted: see ``regression``
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
@@ -166,6 +167,7 @@ def _judge(
     trusted = renewed.uncertainty.freedom >= ENOUGH_FREEDOM
     good = small & (inflation <= HOPELESS)
     good &= (trusted & ~renewed.lost)[table.coefficient]
+    good &= table.offset | (renewed.uncertainty.strength >= STRONG)[table.unknown]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
     good &= ~spoilt
     if not state.thrust_known:

@@ -30,7 +30,7 @@ from sysid_node.online.signals import OFFSET, Layout
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
-BANDS = 4
+BANDS = 6
 
 
 @dataclass
@@ -44,6 +44,8 @@ class Information:
     energy: float  # s: integral of the window squared: the duration, where nothing is forgotten
     bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
     integrals: Array  # (T,) of the transformed signals over time
+    motion: Array  # (T,) integral of the signals' squares, about their means
+    bursts: Array  # (T,) integral of the square of that motion's power
     samples: float
 
     def __add__(self, other: Information) -> Information:
@@ -58,8 +60,8 @@ def nothing(layout: Layout) -> Information:
     """No information at all."""
     width = layout.width
     zeros = np.zeros((BANDS, width, width))
-    bias, integrals = np.zeros((width, width)), np.zeros(layout.transformed)
-    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, integrals, 0.0)
+    bias, none = np.zeros((width, width)), np.zeros(layout.transformed)
+    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, none, none, 0.0)
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,19 @@ class Spectrum:
     plus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i + omega_j))
 
 
+def _band_edges(omega: Array) -> list[int]:
+    """Lines at which the bands begin, and their end: even on a logarithmic scale, no band without a line of its own."""
+    F = omega.size
+    even = np.searchsorted(omega, np.geomspace(omega[0], omega[-1], BANDS + 1)[1:-1])
+    edges = [0]
+    for band, edge in enumerate(even.tolist(), start=1):
+        edges.append(max(min(max(edge, edges[-1] + 1), F - BANDS + band), 0))
+    return [*edges, F]
+
+
 def spectrum(omega: Array, memory: float) -> Spectrum:
-    """Lines omega (F,) rad/s in ``BANDS`` runs of about equal length; the window fades with ``memory`` (s)."""
-    edges = np.linspace(0, omega.size, BANDS + 1).round().astype(int).tolist()
+    """Lines omega (F,) rad/s in ``BANDS`` octave-like bands; the window fades with ``memory`` (s)."""
+    edges = _band_edges(omega)
     bands = tuple(slice(a, b) for a, b in pairwise(edges))
     rate = 1.0 / memory if math.isfinite(memory) else 0.0
     minus, plus = (rate - 1j * (omega[:, None] + sign * omega) for sign in (-1.0, 1.0))
@@ -138,11 +150,11 @@ def window_energy(duration: float, rate: float) -> float:
 
 def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
     """(2F, W) lines of a transform (2F + 1, T) without offset, constant and drift, and the instruments made of them."""
-    return with_instruments(model, project(about_mean(transform)))
+    return project(with_instruments(model, about_mean(transform)))
 
 
 def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
-    """What the transform (2F + 1, T) of begin..end (s) says; ``bias`` and ``samples`` are left at zero."""
+    """What the transform (2F + 1, T) of begin..end (s) says; ``bias``, ``motion``, ``bursts``, ``samples``: zero."""
     F = lines.omega.size
     clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)
@@ -160,4 +172,5 @@ def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: f
         traces[band] = left[rows].sum()
     square = float(np.vdot(covariance, covariance))
     energy = window_energy(end - begin, lines.rate)
-    return Information(grams, scores, traces, square, energy, np.zeros((W, W)), transform[-1].copy(), 0.0)
+    bias, none = np.zeros((W, W)), np.zeros(transform.shape[1])
+    return Information(grams, scores, traces, square, energy, bias, transform[-1].copy(), none, none, 0.0)

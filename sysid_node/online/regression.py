@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: Weight of the mean density, in degrees of freedom, when the residual's density in one band is estimated.
-BAND_PRIOR = 20.0
+BAND_PRIOR = 8.0
 #: Energy under which a regressor has not moved at all.
 TINY = 1e-18
 
@@ -140,13 +140,18 @@ class Uncertainty:
     density: Array  # (C,) of the residual over the whole band
     bands: Array  # (C, B) of the residual in each band
     freedom: Array  # (C,) degrees of freedom
+    strength: Array  # (P,) of the instruments: infinite in least squares
 
 
-def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertainty:
-    """Sandwich covariance with the residual's spectral density estimated in each band."""
+def uncertainty(plan: Plan, solution: Solution, info: Information, scale_variance: Array) -> Uncertainty:
+    """Sandwich covariance with the residual's spectral density estimated in each band.
+
+    ``scale_variance`` (C,): of an error that scales all derivatives of a coefficient alike. Noise in the airspeed makes
+    one: it multiplies the motion, so it is there when the motion is, which a stationary density does not know.
+    """
     C, P = len(plan.coefficients), plan.columns.size
     if not solution.usable or info.trace_square <= 0.0:
-        return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
+        return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C), np.zeros(P))
     v = np.zeros((plan.width, C))
     np.add.at(v, (plan.columns[:, None], np.arange(C)), -solution.theta)
     v[plan.outputs, np.arange(C)] = 1.0
@@ -161,8 +166,27 @@ def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertaint
     bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
     middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
     covariance = solution.inverse @ middle @ solution.inverse.T
+    covariance += scale_variance[:, None, None] * (solution.theta.T[:, :, None] * solution.theta.T[:, None, :])
     covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
-    return Uncertainty(covariance, density, bands, freedom)
+    return Uncertainty(covariance, density, bands, freedom, _strength(plan, solution, info, float(freedom.min())))
+
+
+def _strength(plan: Plan, solution: Solution, info: Information, freedom: float) -> Array:
+    """(P,) the F statistic of each instrumented regressor: what instruments explain of it over what they do not.
+
+    Under about 10 the estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
+    instruments in linear IV regression", 2005). ``freedom``: of the residuals.
+    """
+    if plan.least_squares:
+        return np.full(plan.columns.size, np.inf)
+    gram = info.grams.sum(axis=0)
+    normal = gram.take(plan.normal) * plan.same
+    outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
+    best = np.linalg.pinv(normal, hermitian=True).diagonal()
+    achieved = (solution.inverse @ outer @ solution.inverse.T).diagonal()
+    efficiency = np.clip(best / np.maximum(achieved, TINY), 0.0, 1.0 - 1e-9)
+    strength: Array = freedom * efficiency / (1.0 - efficiency)
+    return strength
 
 
 def student_95(freedom: Array) -> Array:

@@ -21,6 +21,7 @@ def renew(state: State) -> None:
     time = state.transform.last
     lines = transform.current(state.transform)
     _watch_piece(state, lines)
+    _weigh_piece(state, lines)
     renewed = _solve_all(state, _measure_segment(state, lines))
     if state.model.settings.detect_changes:
         _look_for_changes(state, renewed, lines)
@@ -34,11 +35,13 @@ def renew(state: State) -> None:
 def begin_segment(state: State, lines: Array, time: float) -> None:
     """Begin a segment and a piece of the watch at ``time`` (s), where the transform is ``lines``."""
     state.segment, state.segment_start, state.samples, state.intervals = lines, time, 0, 0.0
+    state.motion = state.bursts = 0.0
     _begin_piece(state, lines, time)
 
 
 def _begin_piece(state: State, lines: Array, time: float) -> None:
     state.piece, state.piece_start, state.renew_at = lines, time, time + RENEWAL
+    state.piece_energy = transform.energy(state.transform)
 
 
 def _fading(state: State, since: float) -> float:
@@ -53,6 +56,19 @@ def _watch_piece(state: State, lines: Array) -> None:
         state.watch.pieces.append((state.piece_start, piece))
 
 
+def _weigh_piece(state: State, lines: Array) -> None:
+    """Count the piece's motion about the segment's mean: noise in the airspeed weighs where the motion is."""
+    duration = state.transform.last - state.piece_start
+    if duration <= 0.0:
+        return
+    span = state.transform.last - state.segment_start
+    mean = (lines[-1] - state.segment[-1] * _fading(state, state.segment_start)) / span
+    piece = lines[-1] - state.piece[-1] * _fading(state, state.piece_start)
+    motion = transform.energy(state.transform) - state.piece_energy - 2.0 * mean * piece + mean**2 * duration
+    state.motion = state.motion + motion
+    state.bursts = state.bursts + motion**2 / duration
+
+
 def _measure_segment(state: State, lines: Array) -> Information:
     """What the present segment says up to now."""
     model = state.model
@@ -65,6 +81,7 @@ def _measure_segment(state: State, lines: Array) -> Information:
         model.aircraft, model.layout, mean, (end - begin) / samples, state.intervals / samples
     )
     info.bias = _line_seconds(state, info) * per_line_second
+    info.motion, info.bursts = info.motion + state.motion, info.bursts + state.bursts
     info.samples = float(state.samples)
     state.present = info
     return info
@@ -100,8 +117,8 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     solution = regression.solve(plan, gram, compensation)
     if compensation is not None and not solution.usable:
         solution, compensation = regression.solve(plan, gram), None
-    spread = regression.uncertainty(plan, solution, total)
-    scale = solution.inverse.diagonal()[:, None] * solution.residual
+    spread = regression.uncertainty(plan, solution, total, _scale_variance(state, total))
+    scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
     variance = spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     lost = np.zeros(len(plan.coefficients), dtype=bool)
@@ -110,6 +127,17 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     state.renewed = renewed
     state.watch.references.append(Reference(state.transform.last, solution, spread))
     return renewed
+
+
+def _scale_variance(state: State, total: Information) -> Array:
+    """(C,) variance of the common scale error that the airspeed's noise gives to a coefficient's derivatives."""
+    model = state.model
+    outputs = model.plan.outputs
+    interval = state.intervals / max(state.samples, 1)
+    relative = (2.0 * model.aircraft.noise["airspeed"] / model.aircraft.reference.airspeed) ** 2 * interval
+    motion = np.maximum(total.motion[outputs], 1e-300)
+    variance: Array = np.minimum(relative * total.bursts[outputs] / motion**2, 1.0)
+    return variance
 
 
 def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
@@ -129,6 +157,7 @@ def _begin_anew(state: State, lines: Array, since: float) -> None:
     # what is counted of the present segment is taken as even over its time
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
+    state.motion, state.bursts = state.motion * share, state.bursts * share
     state.past = information.nothing(state.model.layout)
     state.inside.clear()
     state.segment, state.segment_start = lines - np.sum(kept, axis=0), since

@@ -17,7 +17,7 @@ class Settings:
     """Settings of the online estimator. Defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
     frequencies: tuple[float, float, float] = (0.1, 0.04, 2.0)  # Hz: first line, step, last line
-    method: str = "sls_rft"  # "sls_rft" least squares, "iv_rft" instrumental variables
+    method: str = "iv_rft"  # "iv_rft" instrumental variables, "sls_rft" least squares
     forgetting_time: float = 0.0  # s: older data count e^-1; 0 = nothing is forgotten
     window: float = 0.0  # s: only the last so many seconds count; 0 = the whole record
     settle_time: float = 0.5  # s left out at the start, while filters and pilots settle

@@ -70,6 +70,9 @@ class State:
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
+    piece_energy: Array = field(default_factory=lambda: np.empty(0))  # integral of the squares at the piece's start
+    motion: Array | float = 0.0  # see ``Information``, of the present segment
+    bursts: Array | float = 0.0
     renew_at: float = math.inf
     previous: tuple[float, Array, tuple[float, ...]] | None = None  # time, signals, (p, q, r, ca, sa)
     begin: float = math.nan  # time from which samples count

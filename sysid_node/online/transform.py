@@ -95,6 +95,7 @@ class Transform:
     done: Array  # (rows, width) at ``base``
     kernels: Array  # (2 BLOCK, rows) weights of the unfinished block
     values: Array  # (2 BLOCK, width) means and half-differences
+    squares: Array  # (width,) integral of the signals squared over the finished blocks; does not fade
     count: int = 0  # samples in the unfinished block
     base: float = 0.0  # s: time to which ``done`` has decayed
     last: float = 0.0  # s: end of the last interval
@@ -103,7 +104,8 @@ class Transform:
 def start(grid: Lines, width: int, memory: float = math.inf) -> Transform:
     """Empty transform of ``width`` signals."""
     kernels = np.zeros((2 * BLOCK, grid.rows))
-    return Transform(grid, width, memory, np.zeros((grid.rows, width)), kernels, np.zeros((2 * BLOCK, width)))
+    values = np.zeros((2 * BLOCK, width))
+    return Transform(grid, width, memory, np.zeros((grid.rows, width)), kernels, values, np.zeros(width))
 
 
 def add(state: Transform, begin: float, end: float, mean: Array, half: Array) -> None:
@@ -158,6 +160,7 @@ def _append(state: Transform, i: int, end: float, mean: Array, half: Array) -> N
 
 def _finish_block(state: Transform) -> None:
     state.done += state.kernels.T @ state.values
+    state.squares = energy(state)
     state.count = 0
 
 
@@ -177,3 +180,10 @@ def current(state: Transform) -> Array:
     if state.grid.padded == state.grid.count:
         return total
     return np.delete(total, state.grid.padding, axis=0)
+
+
+def energy(state: Transform) -> Array:
+    """(width,) integral of the signals squared up to the last sample."""
+    n = 2 * state.count
+    total: Array = state.squares + state.kernels[:n:2, -1] @ state.values[:n:2] ** 2
+    return total
