@@ -17,18 +17,21 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
+from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online import information, regression, signals, transform
 from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
 from sysid_node.online.renewal import RENEWAL, begin_segment, finish_segment, renew
 from sysid_node.online.settings import Settings
-from sysid_node.online.signals import NUISANCES, OUTPUTS
+from sysid_node.online.signals import NUISANCES, OUTPUTS, Layout
 from sysid_node.online.state import Model, State
 from sysid_node.online.table import table
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
 DRIFT = OUTPUTS + NUISANCES.index("t")
+AIRSPEED, DENSITY = SAMPLE_COLUMNS.index("V"), SAMPLE_COLUMNS.index("rho")
 THRUST, INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
+LIMIT = 1e9  # nothing measured is as large in SI units
 
 
 def init(aircraft: Aircraft, settings: Settings) -> State:
@@ -50,9 +53,9 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         plan=plan,
         table=table(aircraft, plan),
         spectrum=information.spectrum(grid.omega, memory),
-        rates=tuple((layout.column(f"{name} rate"), layout.column(name)) for name in layout.timed),
-        momentum=tuple(tuple(row) for row in signals.momentum_matrix(aircraft).tolist()),
+        lowest=_lowest(len(aircraft.controls)),
         signals=signals.scalar_signals(aircraft),
+        momentum=signals.momentum_gain(aircraft),
         auxiliary=auxiliary_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * RENEWAL),
         memory=memory,
@@ -61,17 +64,23 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
     return State(model, running, information.nothing(layout))
 
 
+def _lowest(controls: int) -> tuple[float, ...]:
+    """What each value of a sample must lie above."""
+    special = {"V": AIRSPEED_LOW, "rho": DENSITY_LOW}
+    return (*(special.get(column, -LIMIT) for column in SAMPLE_COLUMNS), *(-LIMIT,) * controls)
+
+
 def update(state: State, time: float, sample: Sequence[float]) -> None:
     """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s, increasing).
 
-    A sample that lacks a value other than thrust is left out and counted in ``incomplete``.
+    A sample that lacks a value other than thrust, or has an impossible one, is left out and counted in ``incomplete``.
     """
-    if math.isnan(state.begin):
+    if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = time + state.model.settings.settle_time
-    if time < state.begin:
+    if not time >= state.begin:
         return
-    if not math.isfinite(sum(sample)):
-        sample = _completed(state, sample)
+    if not (math.hypot(time, *sample) < LIMIT and sample[AIRSPEED] > AIRSPEED_LOW and sample[DENSITY] > DENSITY_LOW):
+        sample = _completed(state, time, sample)
         if not sample:
             return
     previous = state.previous
@@ -84,49 +93,48 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     if previous is None or time - previous[0] > state.model.settings.max_gap:
         interrupt(state, time)
         return
-    step = time - previous[0]
-    half = (now[1] - previous[1]) * 0.5
-    mean = previous[1] + half
-    add_momentum(state.model.momentum, step, previous[2], now[2], mean)
-    add_rates(state.model.rates, step, half, mean)
-    transform.add(state.transform, previous[0], time, mean, half)
+    gain = state.model.momentum(previous[2], now[2])
+    area, slant = over_interval(state.model.layout, time - previous[0], previous[1], now[1], gain)
+    transform.add(state.transform, previous[0], time, area, slant)
     count(state, sample[INTERVAL])
     if time >= state.renew_at:
         renew(state)
 
 
-def _completed(state: State, sample: Sequence[float]) -> Sequence[float]:
+def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[float]:
     """The sample with unknown thrust taken as none; empty, and counted, where anything else is missing."""
     filled = list(sample)
-    if not math.isfinite(filled[THRUST]):
+    if not abs(filled[THRUST]) < LIMIT:
         filled[THRUST] = 0.0
         state.thrust_known = False
     for column, value in enumerate(filled):
-        if not math.isfinite(value):
+        if not state.model.lowest[column] < value < LIMIT:
             leave_out(state, column)
             return ()
+    if not time < LIMIT:
+        state.incomplete["time"] = state.incomplete.get("time", 0) + 1
+        return ()
     return filled
 
 
 def leave_out(state: State, column: int) -> None:
-    """Count a sample that lacks the value of a column."""
+    """Count a sample that lacks a possible value of a column."""
     name = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols)[column]
     state.incomplete[name] = state.incomplete.get(name, 0) + 1
 
 
-def add_momentum(matrix: tuple[tuple[float, ...], ...], step: Any, before: Any, after: Any, mean: Array) -> None:
-    """Add the rate of change of momentum over the interval to the mean coefficients; scalars or columns."""
-    dp, dq, dr = ((after[i] - before[i]) / step for i in range(3))
-    ca, sa = (before[3] + after[3]) * 0.5, (before[4] + after[4]) * 0.5
-    X, Y, Z, L, M, N = (matrix[0][i] * dp + matrix[1][i] * dq + matrix[2][i] * dr for i in range(6))
-    for i, part in enumerate((X * sa - Z * ca, -X * ca - Z * sa, Y, L, M, N)):
-        mean[..., i] += part
+def over_interval(layout: Layout, step: Any, before: Array, after: Array, gain: Any) -> tuple[Array, Array]:
+    """Areas and slants (..., T) of the signals over a ``step`` (s), or over many (N, 1); see ``transform``.
 
-
-def add_rates(columns: tuple[tuple[int, int], ...], step: Any, half: Array, mean: Array) -> None:
-    """Put the controls' rates over the interval into their columns; one interval or many."""
-    for rate, control in columns:
-        mean[..., rate] = half[..., control] * (2.0 / step)
+    ``gain`` (..., 6) is what the coefficients gain by the angular accelerations, the controls' rates are their
+    increments: both are areas of derivatives.
+    """
+    slant = after - before
+    area = (after + before) * (0.5 * step)
+    area[..., :OUTPUTS] += gain
+    area[..., layout.rates] = slant[..., layout.deflections]
+    slant *= 0.5 * step * step
+    return area, slant
 
 
 def count(state: State, interval: float) -> None:

@@ -56,10 +56,11 @@ class _Chunk:
 
     kept: NDArray[np.intp]  # (N + 1,) usable samples among the first of those given
     missing: NDArray[np.intp]  # (N,) column that a sample lacks, -1 where it is usable or too early to count
+    powerless: NDArray[np.bool_]  # (N,) samples without a thrust
     time: Array  # (n,)
     begins: Array  # (n,) start of the interval; NaN where none leads to the sample
-    means: Array  # (n, W)
-    halves: Array  # (n, W)
+    areas: Array  # (n, T), see ``transform``
+    slants: Array  # (n, T)
     kernels: Array  # (n, 2, rows)
     intervals: Array  # (n,) of the air data
     last: tuple[float, Array, tuple[float, ...]] | None
@@ -67,15 +68,17 @@ class _Chunk:
 
 def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     """What ``update`` computes of each sample by itself, for many."""
-    usable, missing = _usable(state, time, samples)
+    usable, missing, powerless = _usable(state, time, samples)
     kept = np.concatenate([[0], np.cumsum(usable)])
     time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]
     thrust = estimator.THRUST
-    columns[thrust] = np.where(np.isfinite(columns[thrust]), columns[thrust], 0.0)
+    columns[thrust] = np.where(np.abs(columns[thrust]) < estimator.LIMIT, columns[thrust], 0.0)
     grid = state.transform.grid
     if not time.size:
         empty = np.empty((0, state.model.layout.transformed))
-        return _Chunk(kept, missing, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous)
+        return _Chunk(
+            kept, missing, powerless, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous
+        )
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -88,34 +91,31 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
             column[0] = value
     begins[~(time - begins <= state.model.settings.max_gap)] = np.nan
     steps = time - begins
-    halves = (values - before) * 0.5
-    means = before + halves
-    estimator.add_momentum(state.model.momentum, steps, motion_before, motion, means)
-    estimator.add_rates(state.model.rates, steps, halves, means)
-    kernels = np.zeros((time.size, 2, grid.rows))
-    transform.weights(grid, (begins + 0.5 * steps)[:, None], steps[:, None], kernels)
-    kernels[:, 0, -1] = steps
+    gain = np.stack(state.model.momentum(motion_before, motion), axis=1)
+    areas, slants = estimator.over_interval(state.model.layout, steps[:, None], before, values, gain)
+    kernels = transform.weights_of_many(grid, begins + 0.5 * steps, steps)
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
-    return _Chunk(kept, missing, time, begins, means, halves, kernels, columns[estimator.INTERVAL], last)
+    return _Chunk(kept, missing, powerless, time, begins, areas, slants, kernels, columns[estimator.INTERVAL], last)
 
 
-def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
-    """(N,) which samples ``update`` takes in, and which column the others lack."""
+def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.bool_]]:
+    """(N,) which samples ``update`` takes in, which column the others lack, and which have no thrust."""
     if np.isnan(state.begin) and time.size:
         state.begin = float(time[0]) + state.model.settings.settle_time
-    finite = np.isfinite(samples)
+    possible = (samples > np.array(state.model.lowest)) & (samples < estimator.LIMIT)
     late = time >= state.begin
-    if not finite[late, estimator.THRUST].all():
-        state.thrust_known = False
-    finite[:, estimator.THRUST] = True
-    complete = finite.all(axis=1)
-    return late & complete, np.where(late & ~complete, np.argmin(finite, axis=1), -1)
+    powerless = late & ~possible[:, estimator.THRUST]
+    possible[:, estimator.THRUST] = True
+    complete = possible.all(axis=1)
+    return late & complete, np.where(late & ~complete, np.argmin(possible, axis=1), -1), powerless
 
 
 def _advance(state: State, chunk: _Chunk, first: int, stop: int) -> None:
     """Take in the given samples first..stop (exclusive)."""
     for column in chunk.missing[first:stop][chunk.missing[first:stop] >= 0].tolist():
         estimator.leave_out(state, column)
+    if chunk.powerless[first:stop].any():
+        state.thrust_known = False
     _integrate(state, chunk, int(chunk.kept[first]), int(chunk.kept[stop]))
 
 
@@ -131,9 +131,8 @@ def _integrate(state: State, chunk: _Chunk, begin: int, end: int) -> None:
         gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
         stop = begin + int(gaps[0]) if gaps.size else stop
         part = slice(begin, stop)
-        transform.add_many(
-            state.transform, chunk.kernels[part], chunk.time[part], chunk.means[part], chunk.halves[part]
-        )
+        intervals = chunk.begins[part], chunk.time[part]
+        transform.add_many(state.transform, chunk.kernels[part], *intervals, chunk.areas[part], chunk.slants[part])
         for interval in chunk.intervals[part].tolist():
             estimator.count(state, interval)
         if state.transform.last >= state.renew_at:

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -24,28 +25,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.aircraft.names import COEFFICIENTS, STATE_REGRESSORS
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
 ScalarSignals = Callable[[Sequence[float]], tuple[list[float], list[float]]]
 ArraySignals = Callable[[Sequence[Array]], tuple[list[Array], list[Array]]]
+MomentumGain = Callable[[Any, Any], list[Any]]
 
 #: What is taken out of every segment: the offset's regressor k, a constant and a slow drift.
 NUISANCES = ("0", "1", "t")
 OUTPUTS = len(COEFFICIENTS)
 OFFSET = OUTPUTS + NUISANCES.index("0")
+_CONTROLS = len(SAMPLE_COLUMNS)
 
 
 @dataclass(frozen=True)
 class Layout:
     """Which column of the signal vector is what: six coefficients, three nuisances, then the regressors."""
 
-    regressors: tuple[str, ...]
+    regressors: tuple[str, ...]  # controls come last
     timed: tuple[str, ...] = ()  # controls whose rates are transformed too, see ``timing``
     instrumented: tuple[str, ...] = ()  # regressors that have an instrument of their own, see ``auxiliary``
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """All columns in order."""
         rates = (f"{name} rate" for name in self.timed)
@@ -62,6 +65,17 @@ class Layout:
         """Number of columns that are transformed; the instruments, behind them, are made of their lines."""
         return self.width - len(self.instrumented)
 
+    @property
+    def deflections(self) -> slice:
+        """Columns of the controls."""
+        end = OUTPUTS + len(NUISANCES) + len(self.regressors)
+        return slice(end - len(self.timed), end)
+
+    @property
+    def rates(self) -> slice:
+        """Columns of the controls' rates, in the same order."""
+        return slice(self.deflections.stop, self.deflections.stop + len(self.timed))
+
     def column(self, name: str) -> int:
         """Index of a coefficient, nuisance or regressor."""
         return self.names.index(name)
@@ -72,11 +86,11 @@ class Layout:
 
 
 def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> Layout:
-    """The union of the regressors in the aircraft's model, each once, in the order of the file."""
-    wanted = (r for regressors in aircraft.structure.values() for r in regressors)
-    regressors = tuple(dict.fromkeys(r for r in wanted if r != "0"))
-    timed = tuple(r for r in regressors if r in aircraft.control_symbols)
-    return Layout(regressors, timed, tuple(r for r in regressors if r in instrumented))
+    """The union of the regressors in the aircraft's model, each once, in the order of the file but controls last."""
+    wanted = dict.fromkeys(r for regressors in aircraft.structure.values() for r in regressors if r != "0")
+    timed = tuple(r for r in wanted if r in aircraft.control_symbols)
+    states = tuple(r for r in wanted if r not in timed)
+    return Layout(states + timed, timed, tuple(r for r in states if r in instrumented))
 
 
 def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
@@ -112,7 +126,8 @@ def _signals(aircraft: Aircraft, functions: Any, one: Any, none: Any) -> Any:
     incline, arm = (throttle.inclination, throttle.arm) if throttle else (0.0, 0.0)
     cos_t, sin_t = math.cos(incline) * force, math.sin(incline) * force
     names, timed = layout(aircraft).regressors, layout(aircraft).timed
-    controls = {s: len(SAMPLE_COLUMNS) + i for i, s in enumerate(aircraft.control_symbols)}
+    candidates = (*(r for r in STATE_REGRESSORS if r != "0"), *aircraft.control_symbols)
+    chosen = [candidates.index(name) for name in names]
 
     def signals(sample: Any) -> Any:
         ax, ay, az, p, q, r, V, alpha, beta, rho, thrust = sample[:11]
@@ -136,16 +151,32 @@ def _signals(aircraft: Aircraft, functions: Any, one: Any, none: Any) -> Any:
         M = ((Ixx - Izz) * p * r + Ixz * (p * p - r * r) - arm * thrust) * pitch
         N = ((Iyy - Ixx) * p * q + Ixz * q * r) * roll
         half = 0.5 * k / V
-        known = {"alpha": k * alpha, "beta": k * beta, "p": p * b * half, "q": q * c * half, "r": r * b * half}
-        known["V"] = k * V / V0
-        known["k"] = lift * lift / k
+        span, chord = b * half, c * half
+        known = [k * alpha, k * beta, p * span, q * chord, r * span, k * V / V0, lift * lift / k]
+        known += [k * control for control in sample[_CONTROLS:]]
         row = [lift, drag, FY, L, M, N, k, one(k)]
-        row.extend(known[n] if n in known else k * sample[controls[n]] for n in names)
-        row.extend(none(k) for _ in timed)  # rates come with the interval
+        row += [known[i] for i in chosen]
+        row += [none(k)] * len(timed)  # rates come with the interval
         # the angles carry the tangential acceleration of the lever arm into lift and drag
         return row, [ca, sa]
 
     return signals
+
+
+def momentum_gain(aircraft: Aircraft) -> MomentumGain:
+    """Function from p, q, r, cos alpha, sin alpha at both ends of an interval to what the six coefficients gain by it.
+
+    That is the area (see ``transform``) of their parts in the angular accelerations. Scalars or columns.
+    """
+    (_, pY, pZ, pL, _, pN), (qX, _, qZ, _, qM, _), (rX, rY, _, rL, _, rN) = momentum_matrix(aircraft).tolist()
+
+    def gain(before: Any, after: Any) -> list[Any]:
+        p, q, r = after[0] - before[0], after[1] - before[1], after[2] - before[2]
+        ca, sa = 0.5 * (before[3] + after[3]), 0.5 * (before[4] + after[4])
+        X, Y, Z = qX * q + rX * r, pY * p + rY * r, pZ * p + qZ * q
+        return [X * sa - Z * ca, -X * ca - Z * sa, Y, pL * p + rL * r, qM * q, pN * p + rN * r]
+
+    return gain
 
 
 def momentum_matrix(aircraft: Aircraft) -> Array:

@@ -15,7 +15,7 @@ from sysid_node.online.change import Watch
 from sysid_node.online.information import Information, Spectrum
 from sysid_node.online.regression import Plan, Solution, Uncertainty
 from sysid_node.online.settings import Settings
-from sysid_node.online.signals import Layout, ScalarSignals
+from sysid_node.online.signals import Layout, MomentumGain, ScalarSignals
 from sysid_node.online.table import Table
 from sysid_node.online.timing import Timing
 from sysid_node.online.transform import Transform
@@ -33,9 +33,9 @@ class Model:
     plan: Plan
     table: Table
     spectrum: Spectrum
-    rates: tuple[tuple[int, int], ...]  # columns of the controls' rates and of the controls
-    momentum: tuple[tuple[float, ...], ...]  # see ``signals.momentum_matrix``
+    lowest: tuple[float, ...]  # what each value of a sample must lie above
     signals: ScalarSignals
+    momentum: MomentumGain
     auxiliary: Auxiliary | None  # what makes instruments, where the method wants them
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten

@@ -6,12 +6,13 @@ Morelli, "Real-time parameter estimation in the frequency domain", J. Guidance 2
 changes. The samples' own times are used: between two samples the signal is the straight line, whose transform over an
 interval of length h about its middle t_m is
 
-    h exp(-j omega t_m) (mean sinc(phi) - j half-difference s(phi)),
+    exp(-j omega t_m) (area sinc(phi) - j slant s(phi) / h),
     phi = omega h / 2,  s = (sin phi - phi cos phi) / phi^2
 
-so that jitter, lost and late samples do not bias it. A rate's derivative enters as its increment over the interval,
-constant between the samples of the same straight line: summed by parts this is j omega X plus the boundary terms of the
-finite transform, without differentiating anything. Phases come from absolute time, so nothing drifts.
+with the area h (x_0 + x_1) / 2 and the slant h^2 (x_1 - x_0) / 2, so that jitter, lost and late samples do not bias it.
+A rate's derivative enters as its increment over the interval, which is the derivative's area: summed by parts this is
+j omega X plus the boundary terms of the finite transform, without differentiating anything. Phases come from absolute
+time, so nothing drifts.
 
 Samples are collected in blocks of ``BLOCK``; a block is one matrix product. The transform at any sample is the sum of
 the finished blocks and the unfinished one, so the per-sample and the vectorised path give the same bits.
@@ -28,30 +29,36 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 BLOCK = 16
 _LANES = 8  # vectors are padded to whole SIMD registers: a value's bits then do not depend on its place
+_SMALL = 0.15  # phi up to which the power series of sinc and s are right to 1e-8
 
 
 @dataclass
 class Lines:
-    """The frequency lines and what the weights need of them."""
+    """The frequency lines and what the weights need of them. Rows of areas' and of slants' weights, P padded lines."""
 
     omega: Array  # (F,) rad/s
     padded: int  # F rounded up to whole registers
-    phase: Array = field(init=False)  # (3P,) rad/s: omega thrice
-    shift: Array = field(init=False)  # (3P,) rad: 0, pi/2, pi: cosines become cos, -sin, -cos
-    sinc: tuple[Array, Array] = field(init=False)  # coefficients of h^2 and h^4 in sinc(phi)
-    slope: tuple[Array, Array] = field(init=False)  # coefficients of h and h^3 in s(phi)
+    phase: Array = field(init=False)  # (2, 2P) rad/s
+    shift: Array = field(init=False)  # (2, 2P) rad: cosines become cos and -sin for areas, -sin and -cos for slants
+    series: tuple[Array, Array, Array] = field(init=False)  # (2, 2P): sinc(phi) and s(phi) / h in powers of h^2
+    longest: float = field(init=False)  # s: step up to which the series hold
     padding: NDArray[np.intp] = field(init=False)  # rows that are only there to fill registers
 
     def __post_init__(self) -> None:
         spare = np.arange(self.omega.size, self.padded)
         self.padding = np.concatenate([spare, self.padded + spare])
-        w = np.zeros(self.padded)
+        w = np.ones(self.padded)
         w[: self.omega.size] = self.omega
-        self.phase = np.tile(w, 3)
-        self.shift = np.repeat([0.0, 0.5 * math.pi, math.pi], self.padded)
-        w2 = np.tile(w, 2)
-        self.sinc = (-(w2**2) / 24.0, w2**4 / 1920.0)  # sinc(phi) = 1 - phi^2/6 + phi^4/120 - ...
-        self.slope = (w2 / 6.0, -(w2**3) / 240.0)  # s(phi) = phi/3 (1 - phi^2/10 + ...)
+        self.phase = np.tile(w, (2, 2))
+        self.shift = np.repeat([[0.0, 0.5 * math.pi], [0.5 * math.pi, math.pi]], self.padded, axis=1)
+        # sinc(phi) = 1 - phi^2/6 + phi^4/120 - ..., s(phi) = phi/3 - phi^3/30 + phi^5/840 - ...
+        halved = np.tile(0.5 * w, 2)
+        self.series = (
+            np.stack([np.ones(2 * self.padded), halved / 3.0]),
+            np.stack([-(halved**2) / 6.0, -(halved**3) / 30.0]),
+            np.stack([halved**4 / 120.0, halved**5 / 840.0]),
+        )
+        self.longest = 2.0 * _SMALL / float(self.omega[-1])
 
     @property
     def rows(self) -> int:
@@ -71,18 +78,44 @@ def lines(start_hz: float, step_hz: float, stop_hz: float) -> Lines:
     return Lines(omega, -(-count // _LANES) * _LANES)
 
 
-def weights(grid: Lines, middle: Array | float, step: Array | float, out: Array) -> None:
-    """Two rows a sample into ``out`` (..., 2, rows): for the mean and the half-difference over the interval.
-
-    ``middle`` and ``step`` (s) are scalars or (N, 1). The last column integrates: h for the mean, 0 for the difference.
-    """
-    wide = 2 * grid.padded
-    wave = np.cos(grid.phase * middle + grid.shift)
+def weights(grid: Lines, middle: float, step: float, out: Array) -> None:
+    """Weights of an interval's area and slant into ``out`` (2, rows); ``middle`` and ``step`` in s."""
     square = step * step
-    np.multiply(
-        wave[..., :wide], step + (step * square) * (grid.sinc[0] + square * grid.sinc[1]), out=out[..., 0, :wide]
-    )
-    np.multiply(wave[..., grid.padded :], square * (grid.slope[0] + square * grid.slope[1]), out=out[..., 1, :wide])
+    wave = grid.phase * middle
+    wave += grid.shift
+    np.cos(wave, out=wave)
+    gains = grid.series[2] * square
+    gains += grid.series[1]
+    gains *= square
+    gains += grid.series[0]
+    if step > grid.longest:
+        gains = _exact_gains(grid, step)
+    np.multiply(wave, gains, out=out[:, :-1])
+
+
+def weights_of_many(grid: Lines, middles: Array, steps: Array) -> Array:
+    """(N, 2, rows) weights of N intervals, to the last bit those of ``weights``; middles and steps (N,) s."""
+    squares = (steps * steps)[:, None, None]
+    gains = (grid.series[2] * squares + grid.series[1]) * squares + grid.series[0]
+    for i in np.flatnonzero(steps > grid.longest).tolist():
+        gains[i] = _exact_gains(grid, float(steps[i]))
+    kernels = blank_kernels(grid, steps.size)
+    np.multiply(np.cos(grid.phase * middles[:, None, None] + grid.shift), gains, out=kernels[:, :, :-1])
+    return kernels
+
+
+def blank_kernels(grid: Lines, count: int) -> Array:
+    """(count, 2, rows) weights of which only the last column is set: the integral is the sum of the areas."""
+    kernels = np.zeros((count, 2, grid.rows))
+    kernels[:, 0, -1] = 1.0
+    return kernels
+
+
+def _exact_gains(grid: Lines, step: float) -> Array:
+    """(2, 2P) sinc(phi) and s(phi) / h."""
+    phi = 0.5 * step * grid.phase[0]
+    sine = np.sin(phi)
+    return np.stack([sine / phi, (sine - phi * np.cos(phi)) / (phi * phi * step)])
 
 
 @dataclass
@@ -93,8 +126,9 @@ class Transform:
     width: int
     memory: float  # s: tau of the energy's decay, inf = none
     done: Array  # (rows, width) at ``base``
-    kernels: Array  # (2 BLOCK, rows) weights of the unfinished block
-    values: Array  # (2 BLOCK, width) means and half-differences
+    kernels: Array  # (BLOCK, 2, rows) weights of the unfinished block
+    values: Array  # (BLOCK, 2, width) areas and slants
+    steps: Array  # (BLOCK,) s
     squares: Array  # (width,) integral of the signals squared over the finished blocks; does not fade
     count: int = 0  # samples in the unfinished block
     base: float = 0.0  # s: time to which ``done`` has decayed
@@ -103,63 +137,71 @@ class Transform:
 
 def start(grid: Lines, width: int, memory: float = math.inf) -> Transform:
     """Empty transform of ``width`` signals."""
-    kernels = np.zeros((2 * BLOCK, grid.rows))
-    values = np.zeros((2 * BLOCK, width))
-    return Transform(grid, width, memory, np.zeros((grid.rows, width)), kernels, values, np.zeros(width))
+    done, values = np.zeros((grid.rows, width)), np.zeros((BLOCK, 2, width))
+    return Transform(grid, width, memory, done, blank_kernels(grid, BLOCK), values, np.ones(BLOCK), np.zeros(width))
 
 
-def add(state: Transform, begin: float, end: float, mean: Array, half: Array) -> None:
-    """Add the interval begin..end (s) over which signals go in a straight line from mean - half to mean + half."""
-    i = 2 * state.count
+def add(state: Transform, begin: float, end: float, area: Array, slant: Array) -> None:
+    """Add the interval begin..end (s) with the signals' areas and slants (width,), see the module's text."""
     step = end - begin
-    weights(state.grid, begin + 0.5 * step, step, state.kernels[i : i + 2])
-    state.kernels[i, -1] = step
-    _append(state, i, end, mean, half)
+    weights(state.grid, begin + 0.5 * step, step, state.kernels[state.count])
+    _append(state, begin, end, area, slant)
 
 
-def add_many(state: Transform, kernels: Array, ends: Array, means: Array, halves: Array) -> None:
-    """``add`` for consecutive intervals with weights (N, 2, rows) that ``weights`` has computed, to the last bit.
+def add_many(state: Transform, kernels: Array, begins: Array, ends: Array, areas: Array, slants: Array) -> None:
+    """``add`` for consecutive intervals with weights (N, 2, rows) from ``weights_of_many``, to the last bit.
 
-    ``ends`` (N,) s; ``means`` and ``halves`` (N, width).
+    ``begins`` and ``ends`` (N,) s; ``areas`` and ``slants`` (N, width).
     """
     if math.isfinite(state.memory):
-        for kernel, end, mean, half in zip(kernels, ends.tolist(), means, halves, strict=True):
-            i = 2 * state.count
-            state.kernels[i : i + 2] = kernel
-            _append(state, i, end, mean, half)
+        for kernel, begin, end, area, slant in zip(kernels, begins.tolist(), ends.tolist(), areas, slants, strict=True):
+            state.kernels[state.count] = kernel
+            _append(state, begin, end, area, slant)
         return
-    begin = 0
-    while begin < ends.size:
-        i, n = 2 * state.count, min(BLOCK - state.count, ends.size - begin)
-        part = slice(begin, begin + n)
-        state.kernels[i : i + 2 * n] = kernels[part].reshape(2 * n, -1)
-        state.values[i : i + 2 * n : 2] = means[part]
-        state.values[i + 1 : i + 2 * n : 2] = halves[part]
+    at = 0
+    while at < ends.size:
+        n = min(BLOCK - state.count, ends.size - at)
+        here, there = slice(state.count, state.count + n), slice(at, at + n)
+        state.kernels[here] = kernels[there]
+        state.values[here, 0] = areas[there]
+        state.values[here, 1] = slants[there]
+        state.steps[here] = ends[there] - begins[there]
         state.count += n
-        begin += n
+        at += n
         if state.count == BLOCK:
             _finish_block(state)
     state.last = float(ends[-1])
 
 
-def _append(state: Transform, i: int, end: float, mean: Array, half: Array) -> None:
-    if state.count == 0 and math.isfinite(state.memory):
-        decay(state, end)
-    values = state.values
-    values[i] = mean
-    values[i + 1] = half
-    if math.isfinite(state.memory):
+def _append(state: Transform, begin: float, end: float, area: Array, slant: Array) -> None:
+    i, fades = state.count, math.isfinite(state.memory)
+    if fades:
+        if i == 0:
+            decay(state, end)
         # within a block growth instead of decay, taken back when the block is read
-        values[i : i + 2] *= math.exp((end - state.base) / (2.0 * state.memory))
-    state.count += 1
+        growth = math.exp((0.5 * (begin + end) - state.base) / (2.0 * state.memory))
+        kernel = state.kernels[i]
+        kernel[:, :-1] *= growth
+        kernel[0, -1] = growth
+    state.values[i, 0] = area
+    state.values[i, 1] = slant
+    state.steps[i] = end - begin
+    state.count = i + 1
     state.last = end
     if state.count == BLOCK:
         _finish_block(state)
         decay(state, end)
 
 
+def _unfinished(state: Transform) -> Array:
+    """(rows, width) the unfinished block's part."""
+    kernels, values = state.kernels[: state.count], state.values[: state.count]
+    part: Array = kernels.reshape(-1, state.grid.rows).T @ values.reshape(-1, state.width)
+    return part
+
+
 def _finish_block(state: Transform) -> None:
-    state.done += state.kernels.T @ state.values
+    state.done += _unfinished(state)
     state.squares = energy(state)
     state.count = 0
 
@@ -173,8 +215,11 @@ def decay(state: Transform, time: float) -> None:
 
 def current(state: Transform) -> Array:
     """(2F + 1, width) the transform up to the last sample: real parts, imaginary parts, integrals."""
-    n = 2 * state.count
-    total = state.done + state.kernels[:n].T @ state.values[:n] if n else state.done.copy()
+    if state.count:
+        total = _unfinished(state)
+        total += state.done
+    else:
+        total = state.done.copy()
     if math.isfinite(state.memory):
         total *= math.exp((state.base - state.last) / (2.0 * state.memory))
     if state.grid.padded == state.grid.count:
@@ -183,7 +228,7 @@ def current(state: Transform) -> Array:
 
 
 def energy(state: Transform) -> Array:
-    """(width,) integral of the signals squared up to the last sample."""
-    n = 2 * state.count
-    total: Array = state.squares + state.kernels[:n:2, -1] @ state.values[:n:2] ** 2
+    """(width,) integral of the signals squared up to the last sample, each even over its interval."""
+    n = state.count
+    total: Array = state.squares + (state.values[:n, 0] ** 2 / state.steps[:n, None]).sum(axis=0)
     return total

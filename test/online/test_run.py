@@ -1,0 +1,172 @@
+"""A whole record at once gives what ``update`` with every sample gives, to the last bit, whatever the record holds."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from plant import exact_flight, made_aircraft
+
+from sysid_node.aircraft.model import Aircraft, Sensors
+from sysid_node.online import estimator, run
+from sysid_node.online.estimates import estimate
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
+
+Array = NDArray[np.float64]
+AIRCRAFT = made_aircraft(sensors=Sensors((0.05, 0.01, -0.02), (0.5, 0.1, -0.05)))
+SECONDS, RATE = 14.0, 100.0
+THRUST = SAMPLE_COLUMNS.index("thrust")
+
+
+def flight(seed: int = 0, aircraft: Aircraft = AIRCRAFT) -> tuple[Array, Array]:
+    """Jittered times and noisy samples."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, SECONDS, 1.0 / RATE)
+    time += rng.uniform(-0.3, 0.3, time.size) / RATE
+    samples = exact_flight(aircraft, time, seed)
+    samples[:, :9] *= 1.0 + 0.05 * rng.normal(size=(time.size, 9))
+    return time, samples
+
+
+def one_by_one(aircraft: Aircraft, settings: Settings, time: Array, samples: Array, publish: Array) -> list[Estimates]:
+    """Estimates after the first sample at or past each time, through ``update``."""
+    state = estimator.init(aircraft, settings)
+    due = sorted({int(i) for i in np.searchsorted(time, publish) if i < time.size})
+    found = []
+    for i, (t, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
+        estimator.update(state, t, sample)
+        if i in due:
+            found.append(estimate(state, t))
+    return found
+
+
+def assert_same(aircraft: Aircraft, settings: Settings, time: Array, samples: Array, publish: Array) -> list[Estimates]:
+    """``repr`` of a float tells every bit of it."""
+    single = one_by_one(aircraft, settings, time, samples, publish)
+    whole = run.run(aircraft, settings, time, samples, publish)
+    assert len(single) == len(whole)
+    for one, many in zip(single, whole, strict=True):
+        assert repr(one) == repr(many)
+    return whole
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(),
+        Settings(method="sls_rft"),
+        Settings(method="iv_rft"),
+        Settings(forgetting_time=5.0),
+        Settings(window=10.0),
+        Settings(use_prior=True),
+        Settings(detect_changes=False),
+        Settings(settle_time=0.0),
+        Settings(frequencies=(0.2, 0.1, 1.1)),  # ten lines: not a whole number of registers
+        Settings(frequencies=(0.1, 0.037, 1.9), forgetting_time=8.0, method="sls_rft"),
+        Settings(frequencies=(0.5, 0.5, 10.0)),  # lines whose period is near the sampling interval
+    ],
+    ids=str,
+)
+def test_settings(settings: Settings) -> None:
+    time, samples = flight()
+    found = assert_same(AIRCRAFT, settings, time, samples, np.arange(0.3, SECONDS, 0.7))
+    assert math.isfinite(found[-1].derivatives["Cm_de"].value)
+
+
+def test_lost_samples_gaps_and_columns_that_are_missing() -> None:
+    time, samples = flight(1)
+    rng = np.random.default_rng(2)
+    samples[rng.random(time.size) < 0.03, 7] = np.nan
+    samples[rng.random(time.size) < 0.02, 2] = np.inf
+    samples[500:800, THRUST] = np.nan
+    keep = rng.random(time.size) > 0.1
+    keep[300:330] = keep[900:1000] = False
+    assert_same(AIRCRAFT, Settings(), time[keep], samples[keep], np.arange(0.0, SECONDS, 0.25))
+
+
+def test_thrust_lost_late_is_not_known_early() -> None:
+    """Only what came before an estimate may count in it."""
+    time, samples = flight(2)
+    samples[1000:, THRUST] = np.nan
+    found = assert_same(AIRCRAFT, Settings(detect_changes=False), time, samples, np.array([9.0, 13.0]))
+    assert found[0].derivatives["CL_0"].status != "thrust not measured"
+    assert found[1].derivatives["CL_0"].status == "thrust not measured"
+
+
+def test_an_abrupt_change() -> None:
+    time, samples = flight(3)
+    rows = time >= 8.0
+    samples[rows] = exact_flight(
+        made_aircraft(
+            {n: d.value * (0.4 if n == "Cm_de" else 1.0) for n, d in AIRCRAFT.derivatives.items()},
+            sensors=AIRCRAFT.sensors,
+        ),
+        time[rows],
+        3,
+    )
+    assert_same(AIRCRAFT, Settings(), time, samples, np.arange(5.0, SECONDS, 0.25))
+
+
+def test_chunks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    time, samples = flight(4)
+    monkeypatch.setattr(run, "CHUNK", 137)
+    assert_same(AIRCRAFT, Settings(), time, samples, np.arange(0.0, SECONDS, 1.0))
+
+
+def test_at_most_one_estimate_a_sample_and_none_beyond_the_end() -> None:
+    time, samples = flight(5)
+    found = run.run(AIRCRAFT, Settings(settle_time=0.0), time[:50], samples[:50], np.arange(0.0, 10.0, 0.001))
+    assert [one.time for one in found] == time[:50].tolist()
+
+
+def test_progress_is_told() -> None:
+    time, samples = flight(6)
+    heard: list[float] = []
+    run.run(AIRCRAFT, Settings(), time, samples, np.empty(0), heard.append)
+    assert heard == [time[-1]]
+
+
+def test_no_samples_give_no_estimates() -> None:
+    assert run.run(AIRCRAFT, Settings(), np.empty(0), np.empty((0, 15)), np.array([1.0])) == []
+
+
+spoilers: dict[str, Callable[[np.random.Generator, Array], None]] = {
+    "nan": lambda rng, x: x.__setitem__((rng.integers(len(x)), rng.integers(x.shape[1])), np.nan),
+    "inf": lambda rng, x: x.__setitem__((rng.integers(len(x)), rng.integers(x.shape[1])), -np.inf),
+    "stopped": lambda rng, x: x.__setitem__((slice(rng.integers(len(x)), None), 6), 0.0),
+    "huge": lambda rng, x: x.__setitem__((rng.integers(len(x)), rng.integers(x.shape[1])), 1e300),
+}
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    spoilt=st.lists(st.sampled_from(sorted(spoilers)), max_size=6),
+    count=st.integers(0, 400),
+    gaps=st.lists(st.tuples(st.integers(0, 399), st.floats(0.0, 3.0)), max_size=4),
+    settings=st.builds(
+        Settings,
+        method=st.sampled_from(["sls_rft", "iv_rft"]),
+        forgetting_time=st.sampled_from([0.0, 2.0]),
+        window=st.sampled_from([0.0, 3.0]),
+        settle_time=st.sampled_from([0.0, 0.5]),
+        frequencies=st.sampled_from([(0.1, 0.04, 2.0), (0.3, 0.17, 1.7)]),
+        use_prior=st.booleans(),
+    ),
+)
+@hypothesis_settings(max_examples=40, deadline=None)
+def test_any_record(
+    seed: int, spoilt: list[str], count: int, gaps: list[tuple[int, float]], settings: Settings
+) -> None:
+    rng = np.random.default_rng(seed)
+    time = 0.02 * np.arange(400) + rng.uniform(0.0, 0.015, 400)
+    samples = exact_flight(AIRCRAFT, time, seed % 7)
+    for kind in spoilt:
+        spoilers[kind](rng, samples)
+    for at, length in gaps:
+        time[at:] += length
+    assert_same(AIRCRAFT, settings, time[:count], samples[:count], np.arange(0.0, 12.0, 0.9))
