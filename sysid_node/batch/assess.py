@@ -21,9 +21,9 @@ def assess(
 
     ``complaint`` says how it failed to converge, or is empty.
     """
-    unknowns, factor, answers = problem.unknowns, problem.noise(z), problem.answers(z)
-    residuals, sensitivities = problem.whitened(z, factor)
-    information = _information(unknowns, sensitivities)
+    unknowns, noise, answers = problem.unknowns, problem.noise(z), problem.answers(z)
+    residuals, sensitivities = problem.weighted(z, noise)
+    information = _information(problem, sensitivities)
     count = len(unknowns.free)
     lost = null_combination(_condensed(information, count), unknowns.names)
     inverse = np.asarray(np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=np.float64)
@@ -35,13 +35,12 @@ def assess(
         name: _estimate(name, float(z[i]), float(np.sqrt(covariance[i, i])), freedom, status[name], float(white[i]))
         for i, name in enumerate(unknowns.names)
     }
-    noise = np.sqrt(np.diag(factor @ factor.T))
     return Fit(
         method=method,
         estimates=estimates,
         covariance=covariance,
         noise=dict(zip(unknowns.model.outputs, (float(s) for s in noise), strict=True)),
-        log_det=float(2.0 * np.sum(np.log(np.diag(factor)))),
+        log_det=float(2.0 * np.sum(np.log(noise))),
         answers=answers,
         converged=not complaint,
         iterations=iterations,
@@ -52,11 +51,11 @@ def assess(
     )
 
 
-def _information(unknowns: Unknowns, sensitivities: Sequence[Array]) -> Array:
+def _information(problem: Problem, sensitivities: Sequence[Array]) -> Array:
     """Fisher information (n, n), the priors' included."""
     parts = [np.tensordot(block, block, axes=([0, 1], [0, 1])) for block in sensitivities]
     information: Array = np.sum(parts, axis=0)
-    index, _, sigma = unknowns.priors()
+    index, _, sigma = problem.priors()
     information[index, index] += 1.0 / sigma**2
     return information
 

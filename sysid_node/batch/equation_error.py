@@ -1,12 +1,14 @@
 """Equation error in the time domain: each coefficient regressed on what should explain it, at every sample.
 
 Klein & Morelli (2006), ch. 5. No model is integrated, no start values are needed, and turbulence does not bias it;
-noise on the regressors (the flow angles') does, towards zero.
+noise on the regressors (the flow angles') does, towards zero. Both sides are low-pass filtered first, which leaves the
+constants as they are and most of that noise behind.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,22 +17,34 @@ from sysid_node.batch.coefficients import Equations, equations, usable
 from sysid_node.batch.identifiability import inseparable_pairs, sentences
 from sysid_node.batch.regression import Regression, regress
 from sysid_node.batch.result import Answer, Fit
+from sysid_node.batch.signals import lowpass
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
+#: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
+DEFAULT_LOWPASS = 5.0
 
-def equation_error(aircraft: Aircraft, records: Sequence[FlightRecord]) -> Fit:
-    """The aircraft file's derivatives from all flights together. Raises InputError where signals are missing."""
+
+def equation_error(aircraft: Aircraft, records: Sequence[FlightRecord], low_pass: float = DEFAULT_LOWPASS) -> Fit:
+    """The aircraft file's derivatives from all flights together.
+
+    ``low_pass`` Hz bounds what is used of the signals; 0 uses all. Raises InputError where signals are missing.
+    """
     flights = [equations(aircraft, record) for record in records]
     fits = {
-        coefficient: regress(
-            [f"{coefficient}_{name}" for name in regressors],
-            [flight.coefficients[coefficient] for flight in flights],
-            [columns(flight, regressors) for flight in flights],
-        )
+        coefficient: _fit(coefficient, regressors, flights, low_pass)
         for coefficient, regressors in structure_of(aircraft, flights).items()
     }
     return collected("equation_error", fits, flights)
+
+
+def _fit(coefficient: str, regressors: Sequence[str], flights: Sequence[Equations], low_pass: float) -> Regression:
+    names = [f"{coefficient}_{name}" for name in regressors]
+    ys = [lowpass(flight.time, flight.coefficients[coefficient], low_pass) for flight in flights]
+    Xs = [columns(flight, regressors) for flight in flights]
+    fit = regress(names, ys, [lowpass(flight.time, X, low_pass) for flight, X in zip(flights, Xs, strict=True)])
+    values = np.array([estimate.value for estimate in fit.estimates.values()])
+    return replace(fit, modelled=[X @ values for X in Xs])
 
 
 def structure_of(aircraft: Aircraft, flights: list[Equations]) -> dict[str, tuple[str, ...]]:

@@ -21,15 +21,18 @@ import numpy as np
 
 from sysid_node.batch import kalman
 from sysid_node.batch.assess import assess
-from sysid_node.batch.likelihood import DEFAULT_SEARCH, Problem, Search, diagonal_noise, maximise
-from sysid_node.batch.model import Manoeuvre, Model, check_manoeuvres
+from sysid_node.batch.likelihood import DEFAULT_SEARCH, Problem, Search, answer_with_own, maximise
+from sysid_node.batch.model import Dynamics, Manoeuvre, Model, check_manoeuvres
 from sysid_node.batch.result import Answer, Fit
-from sysid_node.batch.unknowns import Unknowns
+from sysid_node.batch.unknowns import Priors, Unknowns
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
 #: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
 _NOISE_RANGE = 1e3
+
+#: 1-sigma of the logarithm of a noise about its start value: a factor of twenty either way is no surprise.
+_NOISE_PRIOR = 3.0
 
 
 def filter_error(
@@ -54,16 +57,23 @@ def filter_error(
 
 
 def predict_filter(
-    model: Model, manoeuvres: Sequence[Manoeuvre], values: Mapping[str, float], noises: Mapping[str, float]
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    values: Mapping[str, float],
+    noises: Mapping[str, float],
+    *,
+    initial_states: Sequence[str] = (),
+    biases: Sequence[str] = (),
 ) -> list[Answer]:
-    """One-step predictions on other manoeuvres, parameters and noises (a fit's ``extras``) held."""
+    """One-step predictions on other manoeuvres, parameters and noises (a fit's ``extras``) held.
+
+    Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
+    """
     held = model.started_at(values)
     check_manoeuvres(held, manoeuvres)
-    problem = _FilterError(Unknowns.of(held, manoeuvres, (), ()))
+    problem = _FilterError(Unknowns.of(held, manoeuvres, initial_states, biases))
     logs = np.log([noises[name] for name in _noise_names(model)])
-    z = np.concatenate([problem.unknowns.start(), logs])
-    problem.check(z)
-    return problem.answers(z)
+    return answer_with_own(problem, np.concatenate([problem.unknowns.start(), logs]))
 
 
 class _FilterError(Problem):
@@ -96,8 +106,12 @@ class _FilterError(Problem):
             blocks.append(block)
         return blocks
 
-    def noise(self, z: Array) -> Array:
-        return diagonal_noise(self.answers(z))
+    def priors(self) -> Priors:
+        """Besides the parameters': noises of about the start values, so that one that does not matter stays put."""
+        index, mean, sigma = super().priors()
+        noises = self.unknowns.size + np.arange(self._noise_start.size)
+        vague = np.full(noises.size, _NOISE_PRIOR)
+        return np.r_[index, noises], np.r_[mean, self._noise_start], np.r_[sigma, vague]
 
     def noises(self, z: Array) -> dict[str, float]:
         """Standard deviations of process and measurement noise, scaled so that the filter expects its innovations."""
@@ -105,8 +119,8 @@ class _FilterError(Problem):
         logs = z[self.unknowns.size :]
         q, r = np.split(np.exp(2.0 * logs), [len(model.states)])
         theta, x0 = self.unknowns.theta(z), self.unknowns.initial_state(z, 0)
-        expected = kalman.innovation_variance(model, manoeuvre.step, manoeuvre.inputs[0], x0, theta, q, r)
-        scale = np.exp(np.mean(np.log(np.diag(self.noise(z)) / np.sqrt(np.asarray(expected)))))
+        expected = kalman.innovation_variance(model.dynamics, manoeuvre.step, manoeuvre.inputs[0], x0, theta, q, r)
+        scale = np.exp(np.mean(np.log(self.noise(z) / np.sqrt(np.asarray(expected)))))
         return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
 
     def _columns(self, index: int, z: Array) -> list[int]:
@@ -115,18 +129,18 @@ class _FilterError(Problem):
         noises = range(self.unknowns.size, z.size)
         return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
 
-    def _of(self, index: int, z: Array) -> tuple[Model, Chosen, Array, Array, Array, Array, Array, Array]:
+    def _of(self, index: int, z: Array) -> tuple[Dynamics, Chosen, Array, Array, Array, Array, Array, Array]:
         u, m = self.unknowns, self.unknowns.manoeuvres[index]
         chosen = (u.free, u.states, u.biases)
         local = z[self._columns(index, z)]
-        return u.model, chosen, m.time, m.inputs, m.outputs, m.initial_state, u.model.start, local
+        return u.model.dynamics, chosen, m.time, m.inputs, m.outputs, m.initial_state, u.model.start, local
 
 
 Chosen = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
 
 def _predict(
-    model: Model,
+    dynamics: Dynamics,
     chosen: Chosen,
     time: jax.Array,
     inputs: jax.Array,
@@ -139,13 +153,13 @@ def _predict(
 
     ``chosen``: indices of the free parameters, of the free initial states, of the biased outputs.
     """
-    sizes = np.cumsum([*(len(part) for part in chosen), len(model.states)])
+    sizes = np.cumsum([*(len(part) for part in chosen), x0.size])
     values, states, bias, log_q, log_r = jnp.split(local, sizes)
     theta = theta.at[jnp.array(chosen[0], dtype=int)].set(values)
     x0 = x0.at[jnp.array(chosen[1], dtype=int)].set(states)
-    offset = jnp.zeros(len(model.outputs)).at[jnp.array(chosen[2], dtype=int)].set(bias)
+    offset = jnp.zeros(outputs.shape[1]).at[jnp.array(chosen[2], dtype=int)].set(bias)
     q, r = jnp.exp(2.0 * log_q), jnp.exp(2.0 * log_r)
-    return kalman.predictions(model, time, inputs, outputs - offset, x0, theta, q, r) + offset
+    return kalman.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, r) + offset
 
 
 _predict_jit = jax.jit(_predict, static_argnums=(0, 1))

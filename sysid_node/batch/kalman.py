@@ -12,7 +12,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.model import Model
+from sysid_node.batch.model import Dynamics
 from sysid_node.batch.rollout import output, rk4_step
 
 #: Doubling steps of the Riccati equation: time constants up to 2^16 samples have settled.
@@ -45,7 +45,7 @@ def gain(covariance: jax.Array, observation: jax.Array, r: jax.Array) -> jax.Arr
 
 
 def predictions(
-    model: Model,
+    dynamics: Dynamics,
     time: jax.Array,
     inputs: jax.Array,
     outputs: jax.Array,
@@ -60,31 +60,31 @@ def predictions(
     variance. The gain is the steady one of the linearisation at the first sample.
     """
     dt = jnp.diff(time)
-    covariance, observation = _linearised(model, dt[0], inputs[0], x0, theta, q, r)
+    covariance, observation = _linearised(dynamics, dt[0], inputs[0], x0, theta, q, r)
     k = gain(covariance, observation, r)
 
     def advance(x: jax.Array, interval: tuple[jax.Array, ...]) -> tuple[jax.Array, jax.Array]:
         u0, u1, y, width = interval
-        predicted = output(model, x, u0, theta)
-        return rk4_step(model, x + k @ (y - predicted), u0, u1, width, theta), predicted
+        predicted = output(dynamics, x, u0, theta)
+        return rk4_step(dynamics, x + k @ (y - predicted), u0, u1, width, theta), predicted
 
     x, predicted = jax.lax.scan(advance, x0, (inputs[:-1], inputs[1:], outputs[:-1], dt))
-    return jnp.concatenate([predicted, output(model, x, inputs[-1], theta)[None, :]])
+    return jnp.concatenate([predicted, output(dynamics, x, inputs[-1], theta)[None, :]])
 
 
 @partial(jax.jit, static_argnums=0)
 def innovation_variance(
-    model: Model, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
+    dynamics: Dynamics, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> jax.Array:
     """Variance (ny,) of each output's innovation that the filter expects at one flight condition."""
-    covariance, observation = _linearised(model, dt, u, x, theta, q, r)
+    covariance, observation = _linearised(dynamics, dt, u, x, theta, q, r)
     return jnp.einsum("os,st,ot->o", observation, covariance, observation) + r
 
 
 def _linearised(
-    model: Model, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
+    dynamics: Dynamics, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
     """Steady covariance of the predicted state, and the observation matrix, about one flight condition."""
-    transition = jax.jacfwd(partial(rk4_step, model))(x, u, u, dt, theta)
-    observation = jax.jacfwd(partial(output, model))(x, u, theta)
+    transition = jax.jacfwd(partial(rk4_step, dynamics))(x, u, u, dt, theta)
+    observation = jax.jacfwd(partial(output, dynamics))(x, u, theta)
     return steady_covariance(transition, observation, q * dt, r), observation

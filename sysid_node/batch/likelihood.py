@@ -8,16 +8,14 @@ neither moves (Jategaonkar, 2015, sec. 4.6).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from sysid_node.batch.result import Answer
-from sysid_node.batch.unknowns import Unknowns
+from sysid_node.batch.unknowns import Priors, Unknowns
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
@@ -35,13 +33,15 @@ class Search:
 
 DEFAULT_SEARCH = Search()
 
+#: Rounds of noise relaxation for initial states and biases alone.
+_OWN_ROUNDS = 4
+
 
 class Problem(ABC):
     """An estimation as functions of z (n,): the unknowns first, then what a method adds."""
 
     def __init__(self, unknowns: Unknowns) -> None:
         self.unknowns = unknowns
-        self._prior_index, self._prior_mean, self._prior_sigma = unknowns.priors()
 
     @abstractmethod
     def start(self) -> Array:
@@ -59,25 +59,34 @@ class Problem(ABC):
     def sensitivities(self, z: Array) -> list[Array]:
         """d modelled / d z (N, ny, n) of each manoeuvre, zero where nothing was measured."""
 
-    @abstractmethod
+    def priors(self) -> Priors:
+        """What is known beforehand: indices into z, means, 1-sigma uncertainties."""
+        return self.unknowns.priors()
+
     def noise(self, z: Array) -> Array:
-        """Lower Cholesky factor (ny, ny) of the residuals' covariance at ``z``."""
+        """Standard deviation (ny,) of each output's residuals; at least a rounding error of the output's size."""
+        answers = self.answers(z)
+        residuals = np.concatenate([answer.residuals for answer in answers])
+        size = np.nanmax(np.abs(np.concatenate([answer.measured for answer in answers])), axis=0, initial=0.0)
+        return np.asarray(np.maximum(np.sqrt(np.nanmean(residuals**2, axis=0)), 1e-12 * (1.0 + size)))
 
-    def whitened(self, z: Array, factor: Array) -> tuple[list[Array], list[Array]]:
-        """Residuals (N, ny) and sensitivities (N, ny, n) of each manoeuvre in units of the noise."""
-        residuals = [whiten(factor, np.nan_to_num(a.residuals, nan=0.0)) for a in self.answers(z)]
-        return residuals, [whiten(factor, block) for block in self.sensitivities(z)]
+    def weighted(self, z: Array, noise: Array) -> tuple[list[Array], list[Array]]:
+        """Residuals (N, ny), zero where nothing was measured, and sensitivities (N, ny, n), in units of the noise."""
+        residuals = [np.nan_to_num(answer.residuals / noise, nan=0.0) for answer in self.answers(z)]
+        return residuals, [block / noise[None, :, None] for block in self.sensitivities(z)]
 
-    def residuals(self, z: Array, factor: Array) -> Array:
+    def residuals(self, z: Array, noise: Array) -> Array:
         """Measured minus modelled in units of the noise, zero where nothing was measured, then the priors."""
-        parts = [whiten(factor, np.nan_to_num(a.residuals, nan=0.0)).ravel() for a in self.answers(z)]
-        return np.concatenate([*parts, (self._prior_mean - z[self._prior_index]) / self._prior_sigma])
+        index, mean, sigma = self.priors()
+        parts = [np.nan_to_num(answer.residuals / noise, nan=0.0).ravel() for answer in self.answers(z)]
+        return np.concatenate([*parts, (mean - z[index]) / sigma])
 
-    def jacobian(self, z: Array, factor: Array) -> Array:
+    def jacobian(self, z: Array, noise: Array) -> Array:
         """d residuals / d z."""
-        parts = [-whiten(factor, block).reshape(-1, z.size) for block in self.sensitivities(z)]
-        prior = np.zeros((self._prior_index.size, z.size))
-        prior[np.arange(self._prior_index.size), self._prior_index] = -1.0 / self._prior_sigma
+        index, _, sigma = self.priors()
+        prior = np.zeros((index.size, z.size))
+        prior[np.arange(index.size), index] = -1.0 / sigma
+        parts = [(block / -noise[None, :, None]).reshape(-1, z.size) for block in self.sensitivities(z)]
         return np.concatenate([*parts, prior])
 
     def check(self, z: Array) -> None:
@@ -99,32 +108,16 @@ class Problem(ABC):
                 )
 
 
-def diagonal_noise(answers: Sequence[Answer]) -> Array:
-    """Factor (ny, ny) of independent noises; no output's is taken to be below a rounding error of its size."""
-    residuals = np.concatenate([answer.residuals for answer in answers])
-    size = np.nanmax(np.abs(np.concatenate([answer.measured for answer in answers])), axis=0, initial=0.0)
-    return np.diag(np.maximum(np.sqrt(np.nanmean(residuals**2, axis=0)), 1e-12 * (1.0 + size)))
-
-
-def whiten(factor: Array, rows: Array) -> Array:
-    """``rows`` (N, ny, ...) in units of the noise: factor^-1 applied to the second axis."""
-    if not np.any(np.tril(factor, -1)):
-        return np.asarray(rows / np.diag(factor).reshape(1, -1, *(1,) * (rows.ndim - 2)))
-    channels_first = np.moveaxis(rows, 1, 0)
-    white = solve_triangular(factor, channels_first.reshape(len(factor), -1), lower=True)
-    return np.moveaxis(white.reshape(channels_first.shape), 0, 1)
-
-
 def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
     """The unknowns of maximum likelihood, the rounds it took, and a complaint where it did not converge."""
     z = problem.start()
     problem.check(z)
     moved = np.inf
     for iteration in range(1, search.rounds + 1):
-        previous, factor = z, problem.noise(z)
-        z = weighted_least_squares(problem, z, np.arange(z.size), factor, search.evaluations)
+        previous, noise = z, problem.noise(z)
+        z = weighted_least_squares(problem, z, np.arange(z.size), noise, search.evaluations)
         # |J dz| bounds every |dz_i| over its standard error
-        moved = float(np.linalg.norm(problem.jacobian(z, factor) @ (z - previous)))
+        moved = float(np.linalg.norm(problem.jacobian(z, noise) @ (z - previous)))
         if moved < TOLERANCE:
             return z, iteration, ""
     return (
@@ -136,7 +129,7 @@ def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
 
 
 def weighted_least_squares(
-    problem: Problem, z: Array, chosen: NDArray[np.intp], factor: Array, evaluations: int
+    problem: Problem, z: Array, chosen: NDArray[np.intp], noise: Array, evaluations: int
 ) -> Array:
     """The unknowns with those of index ``chosen`` moved to the least squares for this noise."""
 
@@ -146,10 +139,10 @@ def weighted_least_squares(
         return full
 
     def residuals(x: Array) -> Array:
-        return problem.residuals(moved(x), factor)
+        return problem.residuals(moved(x), noise)
 
     def jacobian(x: Array) -> Array:
-        return problem.jacobian(moved(x), factor)[:, chosen]
+        return problem.jacobian(moved(x), noise)[:, chosen]
 
     lower, upper = problem.bounds()
     # a start value on its bound would leave the interior method no step
@@ -163,3 +156,12 @@ def weighted_least_squares(
         max_nfev=evaluations,
     )
     return moved(solution.x)
+
+
+def answer_with_own(problem: Problem, z: Array) -> list[Answer]:
+    """The model's answers at ``z``, with only the manoeuvres' own unknowns (initial states, biases) estimated."""
+    problem.check(z)
+    own = np.arange(len(problem.unknowns.free), problem.unknowns.size)
+    for _ in range(_OWN_ROUNDS if own.size else 0):
+        z = weighted_least_squares(problem, z, own, problem.noise(z), DEFAULT_SEARCH.evaluations)
+    return problem.answers(z)

@@ -7,7 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.coefficients import at_cg
 from sysid_node.batch.model import Manoeuvre, Model
+from sysid_node.batch.models.rigid_body import AT_CG
 from sysid_node.batch.signals import differentiate
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -35,6 +38,13 @@ def manoeuvre(model: Model, record: FlightRecord, initial_state: Mapping[str, fl
     inputs = np.column_stack([record[name] for name in model.inputs])
     outputs = np.column_stack([_output(record, name) for name in model.outputs])
     return Manoeuvre(record.time - record.time[0], inputs, outputs, start, record.name or "flight")
+
+
+def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
+    """The record with the specific forces at the CG as further columns, for models that take them as inputs."""
+    moved = at_cg(aircraft, record)
+    columns = {**record.columns, **dict(zip(AT_CG, (moved["ax"], moved["ay"], moved["az"]), strict=True))}
+    return FlightRecord(record.time, columns, record.name, record.start_ns, record.rejected)
 
 
 def segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -19,12 +20,19 @@ Scalars = Sequence[jax.Array]
 Equations = Callable[[Scalars, Scalars, Scalars], Scalars]
 
 
+class Dynamics(NamedTuple):
+    """A model's equations alone: what compiled code belongs to, whatever the parameters' values and bounds."""
+
+    derivative: Equations
+    output: Equations
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One constant of a model: where its estimation starts and what is known of it beforehand.
 
-    ``prior`` is the 1-sigma uncertainty of ``start`` as knowledge from elsewhere (None: nothing is known);
-    ``fixed`` keeps it at ``start``. Raises InputError where ``start`` is not finite or outside the bounds.
+    ``prior`` is what is known from elsewhere, a value and its 1-sigma uncertainty (None: nothing); ``fixed`` keeps the
+    parameter at ``start``. Raises InputError where ``start`` is not finite or outside the bounds.
     """
 
     name: str
@@ -32,7 +40,7 @@ class Parameter:
     unit: str = ""
     lower: float = -math.inf
     upper: float = math.inf
-    prior: float | None = None
+    prior: tuple[float, float] | None = None
     fixed: bool = False
 
     def __post_init__(self) -> None:
@@ -45,13 +53,16 @@ class Parameter:
             )
         if not self.lower < self.upper:
             raise InputError(f"parameter {self.name}: bounds {self.lower:g} to {self.upper:g} hold no value")
-        if self.prior is not None and not self.prior > 0.0:
-            raise InputError(f"parameter {self.name}: prior {self.prior:g}; expected a 1-sigma uncertainty above zero")
+        if self.prior is not None and not (math.isfinite(self.prior[0]) and self.prior[1] > 0.0):
+            raise InputError(
+                f"parameter {self.name}: prior {self.prior[0]:g} +- {self.prior[1]:g}; expected a number and a 1-sigma "
+                "uncertainty above zero"
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A dynamic system with unknown constants; compared by identity, so that compiled code is kept per model.
+    """A dynamic system with unknown constants.
 
     ``derivative`` gives the states' derivatives and ``output`` the outputs, from states, inputs and parameters one by
     one, each in the order of the names given here; units are those of the names (SI, radians, body axes FRD).
@@ -72,6 +83,11 @@ class Model:
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise InputError(f"model {self.name}: {kind} named twice: {', '.join(twice)}")
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """The equations alone."""
+        return Dynamics(self.derivative, self.output)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -15,21 +15,11 @@ import numpy as np
 
 from sysid_node.batch import rollout
 from sysid_node.batch.assess import assess
-from sysid_node.batch.likelihood import (
-    DEFAULT_SEARCH,
-    Problem,
-    Search,
-    diagonal_noise,
-    maximise,
-    weighted_least_squares,
-)
+from sysid_node.batch.likelihood import DEFAULT_SEARCH, Problem, Search, answer_with_own, maximise
 from sysid_node.batch.model import Manoeuvre, Model, check_manoeuvres
 from sysid_node.batch.result import Answer, Fit
 from sysid_node.batch.unknowns import Unknowns
 from sysid_node.flight.record import Array
-
-#: Rounds of noise relaxation for initial states and biases alone.
-_NUISANCE_ROUNDS = 5
 
 
 def output_error(
@@ -67,12 +57,7 @@ def predict(
     held = model.started_at(values)
     check_manoeuvres(held, manoeuvres)
     problem = _OutputError(Unknowns.of(held, manoeuvres, initial_states, biases))
-    z = problem.start()
-    problem.check(z)
-    own = np.arange(len(problem.unknowns.free), z.size)
-    for _ in range(_NUISANCE_ROUNDS if own.size else 0):
-        z = weighted_least_squares(problem, z, own, problem.noise(z), DEFAULT_SEARCH.evaluations)
-    return problem.answers(z)
+    return answer_with_own(problem, problem.start())
 
 
 class _OutputError(Problem):
@@ -117,6 +102,3 @@ class _OutputError(Problem):
             block[~self._measured[i]] = 0.0
             blocks.append(block)
         return blocks
-
-    def noise(self, z: Array) -> Array:
-        return diagonal_noise(self.answers(z))

@@ -56,7 +56,8 @@ def regress(
         inverse, [X[:, None, :] for X in Xs], [r[:, None] for r in residuals], [Z[:, None, :] for Z in Zs]
     )
     lost = null_combination(information, names)
-    white = noise * np.sqrt(np.clip(np.diag(inverse), 0.0, None) * samples / (samples - len(names)))
+    scatter: Array = np.sum([Z.T @ Z for Z in Zs], axis=0)
+    white = noise * np.sqrt(np.clip(np.diag(inverse @ scatter @ inverse), 0.0, None) * samples / (samples - len(names)))
     freedom = min(freedom, degrees_of_freedom([len(y) for y in ys]))
     errors = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     estimates = {

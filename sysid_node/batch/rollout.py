@@ -12,14 +12,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sysid_node.batch.model import Manoeuvre, Model
+from sysid_node.batch.model import Dynamics, Manoeuvre, Model
 from sysid_node.flight.record import Array
 
 #: Where in the step each stage looks, and its share in the result.
 _PLACES, _SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
-def rk4_step(model: Model, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array) -> jax.Array:
+def rk4_step(
+    dynamics: Dynamics, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array
+) -> jax.Array:
     """State (nx,) after ``dt`` s, the input (nu,) going linearly from ``u0`` to ``u1``.
 
     The stages are a loop: written out one after the other, XLA fuses them into code whose size grows exponentially.
@@ -30,7 +32,7 @@ def rk4_step(model: Model, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.A
     ) -> tuple[tuple[jax.Array, jax.Array], None]:
         slope, total = carry
         place, share = at
-        slope = derivative(model, x + place * dt * slope, u0 + place * (u1 - u0), theta)
+        slope = derivative(dynamics, x + place * dt * slope, u0 + place * (u1 - u0), theta)
         return (slope, total + share * slope), None
 
     nothing = jnp.zeros_like(x)
@@ -38,30 +40,30 @@ def rk4_step(model: Model, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.A
     return x + dt * total
 
 
-def derivative(model: Model, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+def derivative(dynamics: Dynamics, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
     """State derivative (nx,)."""
-    return jnp.stack(model.derivative(tuple(x), tuple(u), tuple(theta)))
+    return jnp.stack(dynamics.derivative(tuple(x), tuple(u), tuple(theta)))
 
 
-def output(model: Model, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+def output(dynamics: Dynamics, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
     """Outputs (..., ny) at states (..., nx) and inputs (..., nu)."""
-    values = model.output(tuple(jnp.moveaxis(x, -1, 0)), tuple(jnp.moveaxis(u, -1, 0)), tuple(theta))
+    values = dynamics.output(tuple(jnp.moveaxis(x, -1, 0)), tuple(jnp.moveaxis(u, -1, 0)), tuple(theta))
     return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
 
-def simulate(model: Model, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
+def simulate(dynamics: Dynamics, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
     """States (N, nx) at each time from ``x0`` (nx,); pure, differentiable."""
 
     def advance(x: jax.Array, interval: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        following = rk4_step(model, x, *interval, theta)
+        following = rk4_step(dynamics, x, *interval, theta)
         return following, following
 
     _, states = jax.lax.scan(advance, x0, (inputs[:-1], inputs[1:], jnp.diff(time)))
     return jnp.concatenate([x0[None, :], states])
 
 
-def _outputs(model: Model, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
-    return output(model, simulate(model, time, inputs, x0, theta), inputs, theta)
+def _outputs(dynamics: Dynamics, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
+    return output(dynamics, simulate(dynamics, time, inputs, x0, theta), inputs, theta)
 
 
 _outputs_jit = jax.jit(_outputs, static_argnums=0)
@@ -69,7 +71,7 @@ _outputs_jit = jax.jit(_outputs, static_argnums=0)
 
 @partial(jax.jit, static_argnums=(0, 5, 6))
 def _sensitivities(
-    model: Model,
+    dynamics: Dynamics,
     time: jax.Array,
     inputs: jax.Array,
     x0: jax.Array,
@@ -82,7 +84,7 @@ def _sensitivities(
     def of(change: jax.Array) -> jax.Array:
         moved_theta = theta.at[jnp.array(free, dtype=int)].add(change[: len(free)])
         moved_x0 = x0.at[jnp.array(free_states, dtype=int)].add(change[len(free) :])
-        return _outputs(model, time, inputs, moved_x0, moved_theta)
+        return _outputs(dynamics, time, inputs, moved_x0, moved_theta)
 
     jacobian: jax.Array = jax.jacfwd(of)(jnp.zeros(len(free) + len(free_states)))
     return jacobian
@@ -91,7 +93,7 @@ def _sensitivities(
 def outputs(model: Model, manoeuvre: Manoeuvre, theta: Array, x0: Array | None = None) -> Array:
     """Modelled outputs (N, ny), from the manoeuvre's initial state unless ``x0`` (nx,) says otherwise."""
     start = manoeuvre.initial_state if x0 is None else x0
-    return np.asarray(_outputs_jit(model, manoeuvre.time, manoeuvre.inputs, start, theta))
+    return np.asarray(_outputs_jit(model.dynamics, manoeuvre.time, manoeuvre.inputs, start, theta))
 
 
 def sensitivities(
@@ -104,5 +106,7 @@ def sensitivities(
 ) -> Array:
     """Exact Jacobian (N, ny, n) of the outputs with respect to the chosen parameters and initial states."""
     return np.asarray(
-        _sensitivities(model, manoeuvre.time, manoeuvre.inputs, jnp.asarray(x0), jnp.asarray(theta), free, free_states)
+        _sensitivities(
+            model.dynamics, manoeuvre.time, manoeuvre.inputs, jnp.asarray(x0), jnp.asarray(theta), free, free_states
+        )
     )

@@ -1,11 +1,12 @@
-"""Time derivatives of measured signals."""
+"""Filters for measured signals: derivatives, low-pass, averages."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy.signal import butter, sosfiltfilt
 
-from sysid_node.flight.record import Array
+from sysid_node.flight.record import Array, FlightRecord
 
 
 def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -> Array:
@@ -25,3 +26,35 @@ def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -
     moments = np.swapaxes(basis, 1, 2) @ sliding_window_view(y, 2 * h + 1)[:, :, None]
     slope: Array = np.linalg.solve(gram, moments)[:, 1, 0] / scale[:, 0]
     return slope
+
+
+def lowpass(time: Array, X: Array, cutoff: float) -> Array:
+    """``X`` (N, p) without what is above ``cutoff`` Hz, undelayed (Butterworth, both ways: -6 dB there, 24 dB/octave).
+
+    The same filter on both sides of an equation changes none of its constants. Unchanged where ``cutoff`` is 0, or not
+    below half the sampling rate; the time steps are taken to be equal.
+    """
+    rate = 1.0 / float(np.median(np.diff(time)))
+    if not 0.0 < cutoff < 0.5 * rate:
+        return X
+    sections = butter(2, cutoff, fs=rate, output="sos")
+    return np.asarray(sosfiltfilt(sections, X, axis=0, padlen=min(len(X) - 1, int(3 * rate / cutoff))))
+
+
+def averaged(record: FlightRecord, rate: float) -> FlightRecord:
+    """The record at ``rate`` Hz or a little above, each sample the mean of those it replaces; 0 leaves it as it is.
+
+    Means use all samples, and keep what is said of one instant together: a mean of the states belongs to the mean
+    time as the mean of the inputs does. A mean over a missing value is missing.
+    """
+    step = float(np.median(np.diff(record.time)))
+    together = int(1.0 / (rate * step) + 1e-6) if rate > 0.0 else 1
+    if together < 2 or len(record) < 2 * together:
+        return record
+    whole = len(record) // together * together
+
+    def mean(values: Array) -> Array:
+        return np.asarray(values[:whole].reshape(-1, together).mean(axis=1))
+
+    columns = {name: mean(values) for name, values in record.columns.items()}
+    return FlightRecord(mean(record.time), columns, record.name, record.start_ns, record.rejected)

@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.batch.model import Manoeuvre, Model
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
+
+#: Indices of unknowns with a prior, its mean, its 1-sigma uncertainty.
+Priors = tuple[NDArray[np.intp], Array, Array]
 
 
 @dataclass(frozen=True)
@@ -69,12 +73,12 @@ class Unknowns:
         upper[: len(self.free)] = [self.model.parameters[i].upper for i in self.free]
         return lower, upper
 
-    def priors(self) -> tuple[Array, Array, Array]:
+    def priors(self) -> Priors:
         """Indices of the unknowns with a prior, their means and 1-sigma uncertainties."""
-        held = [(k, self.model.parameters[i]) for k, i in enumerate(self.free)]
-        known = [(k, parameter.start, parameter.prior) for k, parameter in held if parameter.prior is not None]
-        index, mean, sigma = zip(*known, strict=True) if known else ((), (), ())
-        return np.array(index, dtype=np.intp), np.array(mean, dtype=float), np.array(sigma, dtype=float)
+        priors = {k: self.model.parameters[i].prior for k, i in enumerate(self.free)}
+        known = [(k, *prior) for k, prior in priors.items() if prior is not None]
+        index, mean, sigma = np.array(known, dtype=float).reshape(-1, 3).T
+        return index.astype(np.intp), mean, sigma
 
     def theta(self, z: Array) -> Array:
         """All parameters (P,) at the unknowns ``z``."""

@@ -19,8 +19,8 @@ Coefficients = Callable[[Signals, Scalars], dict[str, jax.Array]]
 def derivative_parameters(aircraft: Aircraft, coefficients: Sequence[str], use_prior: bool) -> tuple[Parameter, ...]:
     """The derivatives of these coefficients as parameters that start at the aircraft file's values."""
     return tuple(
-        Parameter(name, derivative.value, unit="1", prior=derivative.tolerance if use_prior else None)
-        for name, derivative in aircraft.derivatives.items()
+        Parameter(name, d.value, prior=(d.value, d.tolerance) if use_prior and d.tolerance is not None else None)
+        for name, d in aircraft.derivatives.items()
         if split_derivative(name)[0] in coefficients
     )
 

@@ -17,9 +17,8 @@ import jax.numpy as jnp
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.model import Model, Scalars
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
+from sysid_node.batch.models.kinematics import at_probe, attitude_rates, flow_rates
 from sysid_node.errors import InputError
-
-GRAVITY = 9.80665  # m/s^2
 
 #: States that may be integrated, each with the coefficient without which it cannot be; None: kinematics alone.
 STATES: dict[str, str | None] = {
@@ -48,7 +47,8 @@ OUTPUTS = {
     },
     **{"ax": "m/s^2", "ay": "m/s^2", "az": "m/s^2", "pdot": "rad/s^2", "qdot": "rad/s^2", "rdot": "rad/s^2"},
 }
-_MODELLED_FORCE = {"CD": "ax", "CY": "ay", "CL": "az"}
+#: What a force that is not modelled is called as an input: the specific force at the CG, m/s^2.
+AT_CG = ("ax_cg", "ay_cg", "az_cg")
 
 Signals = Mapping[str, jax.Array]
 
@@ -116,10 +116,9 @@ def _coefficients_needed(aircraft: Aircraft, states: Sequence[str]) -> tuple[str
 
 def _measured_forces(modelled: Sequence[str]) -> list[str]:
     """Specific forces that enter as inputs; lift and drag share two axes, so that both are needed for either."""
-    both = {"CL", "CD"} <= set(modelled)
-    return [force for coefficient, force in _MODELLED_FORCE.items() if not (both or coefficient == "CY")] + (
-        [] if "CY" in modelled else ["ay"]
-    )
+    ax_cg, ay_cg, az_cg = AT_CG
+    longitudinal = [] if {"CL", "CD"} <= set(modelled) else [ax_cg, az_cg]
+    return longitudinal + ([] if "CY" in modelled else [ay_cg])
 
 
 class _Motion:
@@ -142,7 +141,7 @@ class _Motion:
         """Derivatives of the states."""
         s = self._signals(x, u)
         coefficients = self.coefficients(s, theta)
-        rates = {**self._flow(s, self._specific_force(s, coefficients)), **self._attitude(s)}
+        rates = {**flow_rates(s, self._specific_force(s, coefficients)), **attitude_rates(s)}
         rates |= self._angular(s, coefficients)
         return tuple(rates[name] for name in self.states)
 
@@ -153,7 +152,7 @@ class _Motion:
         angular = self._angular(s, coefficients)
         values = {**s, **{f"{name}dot": value for name, value in angular.items()}}
         values |= self._at_imu(s, self._specific_force(s, coefficients), angular)
-        values |= self._at_probe(s)
+        values |= at_probe(self.aircraft.sensors.air_data, s)
         return tuple(values[name] for name in outputs)
 
     def _signals(self, x: Scalars, u: Scalars) -> dict[str, jax.Array]:
@@ -170,30 +169,10 @@ class _Motion:
         ca, sa = jnp.cos(s["alpha"]), jnp.sin(s["alpha"])
         line = s["alpha"] + (throttle.inclination if throttle else 0.0)
         push = s["thrust"] / a.mass
-        along = -per_coefficient * c["CD"] + push * jnp.cos(line) if "CD" in c else s["ax"] * ca + s["az"] * sa
-        down = -per_coefficient * c["CL"] - push * jnp.sin(line) if "CL" in c else s["az"] * ca - s["ax"] * sa
-        side = per_coefficient * c["CY"] if "CY" in c else s["ay"]
+        along = -per_coefficient * c["CD"] + push * jnp.cos(line) if "CD" in c else s["ax_cg"] * ca + s["az_cg"] * sa
+        down = -per_coefficient * c["CL"] - push * jnp.sin(line) if "CL" in c else s["az_cg"] * ca - s["ax_cg"] * sa
+        side = per_coefficient * c["CY"] if "CY" in c else s["ay_cg"]
         return along * ca - down * sa, side, along * sa + down * ca
-
-    def _flow(self, s: Signals, force: tuple[jax.Array, jax.Array, jax.Array]) -> dict[str, jax.Array]:
-        """V, alpha and beta derivatives from the accelerations of the CG."""
-        fx, fy, fz = force
-        ca, sa, cb, sb = jnp.cos(s["alpha"]), jnp.sin(s["alpha"]), jnp.cos(s["beta"]), jnp.sin(s["beta"])
-        st, ct, sp, cp = jnp.sin(s["theta"]), jnp.cos(s["theta"]), jnp.sin(s["phi"]), jnp.cos(s["phi"])
-        gx, gy, gz = fx - GRAVITY * st, fy + GRAVITY * ct * sp, fz + GRAVITY * ct * cp
-        along = gx * ca + gz * sa
-        return {
-            "V": along * cb + gy * sb,
-            "alpha": (gz * ca - gx * sa) / (s["V"] * cb) + s["q"] - (s["p"] * ca + s["r"] * sa) * sb / cb,
-            "beta": (gy * cb - along * sb) / s["V"] + s["p"] * sa - s["r"] * ca,
-        }
-
-    def _attitude(self, s: Signals) -> dict[str, jax.Array]:
-        sp, cp = jnp.sin(s["phi"]), jnp.cos(s["phi"])
-        return {
-            "phi": s["p"] + jnp.tan(s["theta"]) * (s["q"] * sp + s["r"] * cp),
-            "theta": s["q"] * cp - s["r"] * sp,
-        }
 
     def _angular(self, s: Signals, c: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
         """Angular accelerations of the axes whose moments are modelled."""
@@ -227,15 +206,3 @@ class _Motion:
             "ay": force[1] + (p * q + rd) * x - (p**2 + r**2) * y + (q * r - pd) * z,
             "az": force[2] + (p * r - qd) * x + (q * r + pd) * y - (p**2 + q**2) * z,
         }
-
-    def _at_probe(self, s: Signals) -> dict[str, jax.Array]:
-        """Air data where the probe sits: the rotation moves it through the air."""
-        position = self.aircraft.sensors.air_data
-        if not any(position):
-            return {}
-        x, y, z = position
-        u = s["V"] * jnp.cos(s["alpha"]) * jnp.cos(s["beta"]) + s["q"] * z - s["r"] * y
-        v = s["V"] * jnp.sin(s["beta"]) + s["r"] * x - s["p"] * z
-        w = s["V"] * jnp.sin(s["alpha"]) * jnp.cos(s["beta"]) + s["p"] * y - s["q"] * x
-        speed = jnp.sqrt(u**2 + v**2 + w**2)
-        return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}

@@ -1,0 +1,132 @@
+"""From flights to a fit, whichever the method: a model for what was measured, and held-out flights to check it on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.coefficients import equations
+from sysid_node.batch.compatibility import check_sensors, corrected
+from sysid_node.batch.equation_error import columns, equation_error
+from sysid_node.batch.frequency_equation_error import frequency_equation_error
+from sysid_node.batch.integrated import Integrated
+from sysid_node.batch.result import Answer, Fit
+from sysid_node.batch.settings import Settings
+from sysid_node.batch.signals import lowpass
+from sysid_node.batch.structure import Selection, supported
+from sysid_node.batch.validation import figures
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array, FlightRecord
+
+METHODS = ("equation_error", "frequency_equation_error", "output_error", "filter_error")
+
+#: Flight -> output or coefficient -> figure of merit -> value.
+Figures = dict[str, dict[str, dict[str, float]]]
+
+
+@dataclass(frozen=True)
+class Identification:
+    """A fit, its coefficients on the flights it was made from, and how it answers others.
+
+    ``selections`` holds the stepwise choice of each coefficient's regressors, where one was made.
+    """
+
+    fit: Fit
+    coefficients: Sequence[Answer]
+    holdout: Figures
+    selections: Mapping[str, Selection]
+
+
+def identify(
+    method: str,
+    aircraft: Aircraft,
+    records: Sequence[FlightRecord],
+    settings: Settings,
+    holdout: Sequence[FlightRecord] = (),
+) -> Identification:
+    """Estimates the aircraft file's derivatives from ``records`` and checks them on ``holdout``.
+
+    Raises InputError for an unknown method or no flight, and as the method does.
+    """
+    if method not in METHODS:
+        raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
+    if not records:
+        raise InputError("no flight to identify from; give at least one")
+    records, holdout = _named(records), _named(holdout)
+    remarks: list[str] = []
+    selections: dict[str, Selection] = {}
+    if settings.correct_sensors:
+        found = check_sensors(aircraft, records, settings.segment or 10.0)
+        records, holdout = found.corrected, [corrected(record, found.fit.values) for record in holdout]
+        remarks += found.remarks
+    if settings.stepwise:
+        before = aircraft.derivatives
+        aircraft, selections = supported(aircraft, records, settings.low_pass)
+        lost = [name for name in before if name not in aircraft.derivatives]
+        remarks.append(f"stepwise regression left out {', '.join(lost) or 'nothing'}")
+    integrated = None if method.endswith("equation_error") else Integrated.of(method, aircraft, records, settings)
+    fit = integrated.fit() if integrated else _equation_error(method, aircraft, records, settings)
+    answered: Figures = {}
+    for record in holdout:
+        answers = predicted_coefficients(aircraft, fit.values, [record], settings.low_pass)
+        answers += integrated.answers(fit, record) if integrated else []
+        answered[record.name] = _figures(aircraft, record, answers)
+    return Identification(
+        replace(fit, remarks=(*remarks, *fit.remarks)),
+        predicted_coefficients(aircraft, fit.values, records, settings.low_pass),
+        answered,
+        selections,
+    )
+
+
+def _named(records: Sequence[FlightRecord]) -> list[FlightRecord]:
+    """The records, each under a name of its own."""
+    names: list[str] = []
+    for record in records:
+        name = record.name or "flight"
+        names.append(name if name not in names else f"{name} ({names.count(name) + 1 + len(names)})")
+    return [replace(record, name=name) for record, name in zip(records, names, strict=True)]
+
+
+def _equation_error(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings) -> Fit:
+    if method == "equation_error":
+        return equation_error(aircraft, records, settings.low_pass)
+    return frequency_equation_error(aircraft, records, settings.frequencies)
+
+
+def predicted_coefficients(
+    aircraft: Aircraft, values: Mapping[str, float], records: Sequence[FlightRecord], low_pass: float
+) -> list[Answer]:
+    """Measured coefficients and what ``values`` make of them, below ``low_pass`` Hz, for each flight that allows it."""
+    answers = []
+    for record in records:
+        try:
+            flight = equations(aircraft, record)
+        except InputError:
+            continue  # a flight without, say, a sideslip vane can be integrated, but its coefficients cannot be formed
+        modelled: dict[str, Array] = {}
+        for coefficient, regressors in aircraft.structure.items():
+            names = [f"{coefficient}_{name}" for name in regressors]
+            if coefficient in flight.coefficients and all(name in values for name in names):
+                modelled[coefficient] = columns(flight, regressors) @ np.array([values[name] for name in names])
+        if modelled:
+            measured = np.column_stack([flight.coefficients[name] for name in modelled])
+            shown = [lowpass(flight.time, X, low_pass) for X in (measured, np.column_stack(list(modelled.values())))]
+            answers.append(Answer(flight.name, flight.time, tuple(modelled), *shown))
+    return answers
+
+
+def _figures(aircraft: Aircraft, record: FlightRecord, answers: Sequence[Answer]) -> dict[str, dict[str, float]]:
+    """Figures of merit of all answers to one flight."""
+    table: dict[str, dict[str, float]] = {}
+    for answer in answers:
+        inputs = {
+            symbol: np.interp(answer.time, record.time, record[symbol])
+            for symbol in aircraft.control_symbols
+            if np.isfinite(record[symbol]).all()
+        }
+        table |= figures(answer, inputs)
+    return table

@@ -1,0 +1,70 @@
+"""What can be set of the batch estimators: one table for ``--set``, ``summary.json`` and tests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, get_type_hints
+
+from sysid_node.batch.equation_error import DEFAULT_LOWPASS
+from sysid_node.batch.frequency_equation_error import DEFAULT_FREQUENCIES, Frequencies
+from sysid_node.errors import InputError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the batch estimators; raises InputError on impossible values."""
+
+    frequencies: Frequencies = DEFAULT_FREQUENCIES  # Hz: first line, step, last line (frequency_equation_error)
+    low_pass: float = DEFAULT_LOWPASS  # Hz: what is above is left out; 0 = nothing (equation_error)
+    rate: float = 100.0  # Hz: faster flights are averaged down to it; 0 = as recorded (output_error, filter_error)
+    segment: float = (
+        10.0  # s: flights are cut into pieces of at most this length, each with its own initial state; 0 = whole
+    )
+    states: tuple[str, ...] = ()  # to be integrated; the others count as measured. Empty: what the model allows
+    biases: tuple[str, ...] = ()  # outputs whose bias is estimated for each piece
+    use_prior: bool = False  # whether the aircraft file's tolerances count
+    stepwise: bool = False  # leave out regressors that the data do not support (both equation errors)
+    correct_sensors: bool = False  # estimate IMU and air-data errors from the kinematics first, and take them out
+    max_gap: float = 0.2  # s: the longest gap in a bag that is bridged by interpolation
+
+    def __post_init__(self) -> None:
+        start, step, stop = self.frequencies
+        if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
+            raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected 0 < start < stop and step > 0, in Hz")
+        for name in ("low_pass", "rate", "segment"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError(f"setting {name} = {value}: expected a number, zero or more")
+        if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):
+            raise InputError(f"setting max_gap = {self.max_gap}: expected seconds, more than zero")
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Settings:
+        """From ``--set key=value`` texts or plain values. Raises InputError naming the wrong key or value."""
+        kinds = get_type_hints(cls)
+        for key in values:
+            if key not in kinds:
+                raise InputError(f"setting {key!r} is not one of a batch method; those are {', '.join(kinds)}")
+        return cls(**{key: _parse(key, kinds[key], value) for key, value in values.items()})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values by name, for ``summary.json``."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+def _parse(key: str, kind: Any, value: Any) -> Any:
+    """One setting from a text or a plain value."""
+    try:
+        if key == "frequencies":
+            start, step, stop = (float(part) for part in (value.split(":") if isinstance(value, str) else value))
+            return start, step, stop
+        if key in ("states", "biases"):
+            return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
+        if kind is bool and isinstance(value, str):
+            return {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}[value.lower()]
+        return kind(value)
+    except (KeyError, TypeError, ValueError):
+        wanted = "START:STEP:STOP in Hz" if key == "frequencies" else f"a {kind.__name__}"
+        raise InputError(f"setting {key} = {value!r}: expected {wanted}") from None
