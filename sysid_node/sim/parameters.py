@@ -103,7 +103,7 @@ def _range(parameter: Parameter, key: str) -> str:
     if key == parameter.reciprocal:
         lower, upper = 1.0 / upper, (1.0 / lower if lower else math.inf)
         unit = "/".join(reversed(unit.split("/")))
-    return f"{lower:g} to {upper:g} {unit}".replace(" 1", "").strip()
+    return f"{lower:g} to {upper:g}" + (f" {unit}" if unit != "1" else "")
 
 
 def _does_nothing(effect: str, switches: Sequence[Parameter]) -> str:

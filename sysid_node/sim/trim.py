@@ -158,8 +158,9 @@ def _why_not(simulator: Simulator, speed: float, found: Array, lower: Array, upp
     names = (*_ANGLES, *simulator.commands)
     margin = 1e-3 * (upper - lower)
     at_limit = [n for n, x, a, b, m in zip(names, found, lower, upper, margin, strict=True) if x < a + m or x > b - m]
-    limits = ", ".join(n for n in at_limit if n not in ("beta", "gamma")) or "nothing"
+    limits = ", ".join(n for n in at_limit if n not in ("beta", "gamma"))
+    reason = f"{limits} at its limit" if limits else "the forces do not balance"
     return (
-        f"aircraft {simulator.aircraft.name!r}: no steady flight at {speed:g} m/s ({limits} at its limit); "
+        f"aircraft {simulator.aircraft.name!r}: no steady flight at {speed:g} m/s ({reason}); "
         "try another airspeed or smaller effects"
     )

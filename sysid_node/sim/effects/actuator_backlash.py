@@ -10,7 +10,7 @@ EFFECT = Effect(
     name="actuator_backlash",
     station="actuator",
     summary="Surfaces stay where they are until the actuator has taken up the free play.",
-    equation="x' = x + D(u - x), D the dead zone of +-width/2 with rounded corners",
+    equation="x' = x + D(u - x), D the dead zone of +-width/2, its corners rounded: d - w d / (1 + (d / w)^64)^(1/64)",
     source="Nordin & Gutman (2002), Automatica 38(10), sec. 2 (friction-driven hysteresis model)",
     parameters=per_control("rad", "width of the free play", 0.02, lower=0.0, upper=0.5),
 )
