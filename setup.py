@@ -1,10 +1,14 @@
-from glob import glob
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "sysid_node"
 SHARE = f"share/{NAME}"
+
+
+def files_of(folder):
+    return [str(path) for path in sorted(Path(folder).glob("*.*"))]
+
 
 setup(
     name=NAME,
@@ -14,7 +18,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
-        *((f"{SHARE}/{folder}", glob(f"{folder}/*.*")) for folder in ("config", "config/aircraft", "launch")),
+        *((f"{SHARE}/{folder}", files_of(folder)) for folder in ("config", "config/aircraft", "launch")),
     ],
     zip_safe=False,
     maintainer="sysid maintainers",

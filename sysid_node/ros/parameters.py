@@ -104,7 +104,7 @@ PARAMETERS = (
         _ESTIMATOR.method,
         "",
         "sls_rft: least squares. iv_rft: instrumental variables, unbiased by noise on the flow angles, less precise.",
-        "iv_rft where vanes are noisy beside the motion, or the air is turbulent.",
+        "iv_rft where vanes are noisy beside the motion or the air is turbulent; sls_rft where neither is.",
         choices=METHODS,
     ),
     Parameter(
