@@ -24,13 +24,16 @@ _STEPS = (
     "--manoeuvre 3211:rudder:amplitude=0.12:width=0.3:start=6:every=8:repeat=7"
 )
 
-_SMALL = "--rate 100 --air-data-rate 50 --actuator-rate 50"
+#: Servos that take their time, and whose positions are recorded as often as the motion that they make.
+_SERVOS = "--effect actuator_lag:time_constant=0.04 --surfaces measured"
+_FULL = f"--actuator-rate 200 {_SERVOS}"
+_SMALL = f"--rate 100 --air-data-rate 50 --actuator-rate 100 {_SERVOS}"
 
 #: name -> (what it is, the command's arguments but for --out)
 FLIGHTS = {
     "cdrw_multistep": (
         "3-2-1-1 on elevator, aileron and rudder in turn, seven times; still air. The demo's flight.",
-        f"--aircraft cdrw --seed 1 --duration 60 {_STEPS}",
+        f"--aircraft cdrw --seed 1 {_FULL} --duration 60 {_STEPS}",
     ),
     "cdrw_turbulence": (
         "The same manoeuvres in light turbulence.",

@@ -2,7 +2,8 @@
 
 The transforms of the last few seconds are kept in pieces. Each time a piece is complete, the equations over the last
 one to four seconds are tested against the estimates from before them: the score A'r of the residual r is zero-mean with
-covariance s^2 A'KA + G C G while nothing has changed (C: covariance of the earlier estimates, G = A'A), so Q = (A'r)'
+covariance s^2 A'KA + G C G while nothing has changed (C: covariance of the earlier estimates, G = A'A; with
+instruments Z'r and Z'KZ, G = Z'A, so that gusts are no change), so Q = (A'r)'
 Cov^-1 (A'r) is chi-square (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2, the generalised
 likelihood ratio over the time of change). Over spans much shorter than the period of the line spacing, A'KA is A'A over
 twice that spacing, whatever the span. A change is announced when Q cannot be chance and the changed derivatives explain
@@ -21,7 +22,7 @@ from scipy.special import gdtrix
 
 from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.information import clean_lines
-from sysid_node.online.regression import Plan, Solution, Uncertainty
+from sysid_node.online.regression import STRONG, Plan, Solution, Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ class Reference:
     time: float
     solution: Solution
     uncertainty: Uncertainty
+    strength: Array  # (P,) of the instruments that it rests on
 
 
 @dataclass
@@ -109,7 +111,8 @@ def _suspects(plan: Plan, reference: Reference, gram: Array) -> list[int]:
     v[plan.outputs, np.arange(C)] = 1.0
     np.add.at(v, (plan.columns[:, None], np.arange(C)), -reference.solution.theta)
     missed = ((gram @ v) * v).sum(axis=0) > MISFIT * gram.take(plan.square)
-    return np.flatnonzero(missed & (reference.uncertainty.freedom >= KNOWN)).tolist()
+    firm = (np.where(plan.mine > 0.0, reference.strength[:, None], np.inf) >= STRONG).all(axis=0)
+    return np.flatnonzero(missed & firm & (reference.uncertainty.freedom >= KNOWN)).tolist()
 
 
 def _misfit(plan: Plan, reference: Reference, gram: Array, c: int, density_per_gram: float, energy: float) -> _Misfit:
@@ -120,12 +123,15 @@ def _misfit(plan: Plan, reference: Reference, gram: Array, c: int, density_per_g
     v = np.zeros(plan.width)
     v[y], v[J] = 1.0, -reference.solution.theta[mine, c]
     misfit, motion = float(v @ gram @ v), float(gram[y, y])
-    G, score = gram[np.ix_(J, J)], (gram @ v)[J]
-    explained = float(score @ np.linalg.solve(G + np.diag(G.diagonal() * 1e-9 + 1e-300), score))
+    Z = plan.instruments[mine]
+    G, left_over = gram[np.ix_(Z, J)], gram @ v
+    score = left_over[Z]
+    mended = np.linalg.lstsq(G, score, rcond=1e-9)[0]
+    explained = float(2.0 * mended @ left_over[J] - mended @ gram[np.ix_(J, J)] @ mended)
     # nuisances and unknowns take up as much of the noise's energy as of independent lines
     left = (misfit - explained) / max(energy - (J.size + 3) * density_per_gram, 0.1 * energy)
     C = reference.uncertainty.covariance[c][np.ix_(mine, mine)]
-    spread = max(density, left) * density_per_gram * G + G @ C @ G
+    spread = max(density, left) * density_per_gram * gram[np.ix_(Z, Z)] + G @ C @ G.T
     Q = float(score @ np.linalg.solve(spread + np.diag(spread.diagonal() * 1e-9 + 1e-300), score))
     return _Misfit(
         per_derivative=Q / J.size,

@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 ENOUGH_FREEDOM = 6.0  # degrees of freedom under which an interval is not trusted
 HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apart at all
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
-STRONG = 15.0  # F statistic of an instrument under which an interval is not trusted: see ``regression``
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
@@ -57,7 +56,7 @@ def present(state: State) -> Present | None:
     growth = (energy + max(last - state.piece_start, 0.0)) / max(energy, 1e-9)
     noise = renewed.compensation
     bias = None if noise is None else (noise[0] * growth, noise[1] * growth)
-    solution = regression.solve(state.model.plan, gram, bias)
+    solution = regression.solve(state.plan, gram, bias)
     variance = renewed.factors * solution.residual
     variance *= np.abs(solution.inverse.diagonal())[:, None] / growth
     return Present(solution, variance, gram, part[-1])
@@ -102,7 +101,7 @@ def estimate(state: State, now: float | None = None) -> Estimates:
 
 def _count_beliefs(state: State, renewed: Renewed, current: Present) -> None:
     """Weigh the solution with the aircraft file's derivatives."""
-    plan = state.model.plan
+    plan = state.plan
     theta, covariance = weighed(
         plan, current.solution.theta, renewed.uncertainty.covariance, *beliefs(state.model.aircraft, plan)
     )
@@ -121,7 +120,7 @@ def _unknown(state: State, name: str) -> DerivativeEstimate:
 
 def _offsets(state: State, renewed: Renewed, current: Present) -> tuple[Array, Array]:
     """(C,) offsets and standard errors, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency."""
-    plan = state.model.plan
+    plan = state.plan
     past = renewed.total.integrals - (state.present.integrals if state.present is not None else 0.0)
     integrals = past + current.integrals
     weight = float(integrals[OFFSET])
@@ -136,7 +135,7 @@ def _offsets(state: State, renewed: Renewed, current: Present) -> tuple[Array, A
 
 def _fits(state: State, renewed: Renewed, current: Present) -> dict[str, FitQuality]:
     """Quality of the fit of each coefficient."""
-    plan = state.model.plan
+    plan = state.plan
     start, _, stop = state.model.settings.frequencies
     motion = current.gram.take(plan.square)
     explained = 1.0 - current.solution.residual / np.maximum(motion, 1e-300)
@@ -155,7 +154,7 @@ def _judge(
     state: State, renewed: Renewed, current: Present, values: Array, errors: Array, now: float | None
 ) -> list[str]:
     """(D,) why each estimate is not to be believed, or "ok"."""
-    table, plan = state.model.table, state.model.plan
+    table, plan = state.model.table, state.plan
     everywhere = _whole(state, current, now)
     if everywhere:
         return [everywhere] * len(table.names)
@@ -167,7 +166,7 @@ def _judge(
     trusted = renewed.uncertainty.freedom >= ENOUGH_FREEDOM
     good = small & (inflation <= HOPELESS)
     good &= (trusted & ~renewed.lost)[table.coefficient]
-    good &= table.offset | (renewed.uncertainty.strength >= STRONG)[table.unknown]
+    good &= table.offset | (renewed.strength >= regression.STRONG)[table.unknown]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
     good &= ~spoilt
     if not state.thrust_known:

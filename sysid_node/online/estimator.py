@@ -61,7 +61,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         memory=memory,
     )
     running = transform.start(grid, layout.transformed, memory)
-    return State(model, running, information.nothing(layout))
+    return State(model, running, plan, information.nothing(layout))
 
 
 def _lowest(controls: int) -> tuple[float, ...]:

@@ -28,7 +28,7 @@ def model_gap(state: State) -> list[CoefficientGap]:
     current, renewed = present(state), state.renewed
     if current is None or renewed is None or not current.solution.usable:
         return []
-    plan = state.model.plan
+    plan = state.plan
     values, precisions = beliefs(state.model.aircraft, plan)
     start, _, stop = state.model.settings.frequencies
     per_energy = 2.0 * (stop - start) / max(float(renewed.total.traces.sum()), 1e-12)

@@ -7,7 +7,7 @@ matrix, so that one call solves for all six coefficients.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ Index = NDArray[np.intp]
 
 #: Weight of the mean density, in degrees of freedom, when the residual's density in one band is estimated.
 BAND_PRIOR = 8.0
+#: F statistic of an instrument under which estimates that rest on it are not to be trusted.
+STRONG = 15.0
 #: Energy under which a regressor has not moved at all.
 TINY = 1e-18
 
@@ -86,6 +88,14 @@ def plan(structure: dict[str, tuple[str, ...]], layout: Layout) -> Plan:
     )
 
 
+def trusting(full: Plan, strength: Array) -> Plan:
+    """The plan with least squares in the blocks of which an instrument is weak: better biased a little than lost."""
+    weak = [block for block in range(int(full.group.max()) + 1) if (strength[full.group == block] < STRONG).any()]
+    if not weak:
+        return full
+    return replace(full, instruments=np.where(np.isin(full.group, weak), full.columns, full.instruments))
+
+
 @dataclass
 class Solution:
     """Solution of all coefficients' normal equations. ``usable`` is False where they are singular."""
@@ -140,7 +150,6 @@ class Uncertainty:
     density: Array  # (C,) of the residual over the whole band
     bands: Array  # (C, B) of the residual in each band
     freedom: Array  # (C,) degrees of freedom
-    strength: Array  # (P,) of the instruments: infinite in least squares
 
 
 def uncertainty(plan: Plan, solution: Solution, info: Information, scale_variance: Array) -> Uncertainty:
@@ -151,7 +160,7 @@ def uncertainty(plan: Plan, solution: Solution, info: Information, scale_varianc
     """
     C, P = len(plan.coefficients), plan.columns.size
     if not solution.usable or info.trace_square <= 0.0:
-        return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C), np.zeros(P))
+        return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
     v = np.zeros((plan.width, C))
     np.add.at(v, (plan.columns[:, None], np.arange(C)), -solution.theta)
     v[plan.outputs, np.arange(C)] = 1.0
@@ -168,25 +177,27 @@ def uncertainty(plan: Plan, solution: Solution, info: Information, scale_varianc
     covariance = solution.inverse @ middle @ solution.inverse.T
     covariance += scale_variance[:, None, None] * (solution.theta.T[:, :, None] * solution.theta.T[:, None, :])
     covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
-    return Uncertainty(covariance, density, bands, freedom, _strength(plan, solution, info, float(freedom.min())))
+    return Uncertainty(covariance, density, bands, freedom)
 
 
-def _strength(plan: Plan, solution: Solution, info: Information, freedom: float) -> Array:
+def strength(plan: Plan, solution: Solution, info: Information) -> Array:
     """(P,) the F statistic of each instrumented regressor: what instruments explain of it over what they do not.
 
     Under about 10 the estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
-    instruments in linear IV regression", 2005). ``freedom``: of the residuals.
+    instruments in linear IV regression", 2005). Infinite where every regressor is its own instrument.
     """
     if plan.least_squares:
         return np.full(plan.columns.size, np.inf)
+    if not solution.usable or info.trace_square <= 0.0:
+        return np.zeros(plan.columns.size)
     gram = info.grams.sum(axis=0)
-    normal = gram.take(plan.normal) * plan.same
     outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
-    best = np.linalg.pinv(normal, hermitian=True).diagonal()
+    best = np.linalg.pinv(gram.take(plan.normal) * plan.same, hermitian=True).diagonal()
     achieved = (solution.inverse @ outer @ solution.inverse.T).diagonal()
     efficiency = np.clip(best / np.maximum(achieved, TINY), 0.0, 1.0 - 1e-9)
-    strength: Array = freedom * efficiency / (1.0 - efficiency)
-    return strength
+    freedom = float(info.traces.sum()) ** 2 / info.trace_square
+    statistic: Array = freedom * efficiency / (1.0 - efficiency)
+    return statistic
 
 
 def student_95(freedom: Array) -> Array:

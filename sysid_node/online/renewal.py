@@ -106,14 +106,17 @@ def _past(state: State) -> Information:
 
 def _solve_all(state: State, segment: Information) -> Renewed:
     """Estimates, their covariance and the noise's part, from the finished segments and the present one."""
-    plan, last = state.model.plan, state.renewed
+    last = state.renewed
     past = _past(state)
     total = past + segment
+    gram = total.grams.sum(axis=0)
+    full = state.model.plan
+    strength = regression.strength(full, regression.solve(full, gram), total)
+    plan = state.plan = regression.trusting(full, strength)
     compensation = None
-    if plan.least_squares and last is not None and last.solution.usable:
+    if last is not None and last.solution.usable:
         share = noise.allowed(plan, last.solution, last.uncertainty.density, total.bias / _line_seconds(state, total))
         compensation = regression.bias_of(plan, total.bias * share[:, None] * share)
-    gram = total.grams.sum(axis=0)
     solution = regression.solve(plan, gram, compensation)
     if compensation is not None and not solution.usable:
         solution, compensation = regression.solve(plan, gram), None
@@ -123,9 +126,9 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     lost = np.zeros(len(plan.coefficients), dtype=bool)
     lags = timing.examine(plan, state.model.layout, solution, spread, gram)
-    renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lags, lost)
+    renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lags, strength, lost)
     state.renewed = renewed
-    state.watch.references.append(Reference(state.transform.last, solution, spread))
+    state.watch.references.append(Reference(state.transform.last, solution, spread, strength))
     return renewed
 
 
@@ -144,7 +147,7 @@ def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
     density_per_gram = 0.5 / state.model.settings.frequencies[1]
     model, now = state.model, state.transform.last
-    finding = change.examine(model.plan, model.auxiliary, state.watch, density_per_gram, now)
+    finding = change.examine(state.plan, model.auxiliary, state.watch, density_per_gram, now)
     renewed.lost = finding.lost
     if finding.changed_since is not None:
         _begin_anew(state, lines, finding.changed_since)

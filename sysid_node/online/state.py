@@ -52,6 +52,7 @@ class Renewed:
     base: Array  # (W, W) Gram matrix of the finished segments
     factors: Array  # (P, C) squared standard error over (P_jj residual)
     timing: Timing  # whether the controls are felt when they are measured
+    strength: Array  # (P,) of the instruments
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
 
 
@@ -61,6 +62,7 @@ class State:
 
     model: Model
     transform: Transform
+    plan: Plan  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
     past_time: float = math.nan
     inside: deque[tuple[float, Information]] = field(
