@@ -1,0 +1,118 @@
+"""``sysid simulate``: a bag and the truth beside it, again the same; and the bundled flights."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.main import main
+from sysid_node.flight.bag import read_streams
+from sysid_node.flight.logs import load_flight
+from sysid_node.flight.truth import read_truth
+
+ROOT = Path(__file__).resolve().parents[2]
+BAGS = ROOT / "bags"
+
+MANOEUVRE = [
+    "--manoeuvre",
+    "3211:elevator:amplitude=0.05:start=1",
+    "--manoeuvre",
+    "doublet:rudder:amplitude=0.1:start=4",
+]
+
+
+def bundled():
+    """``bags/make.py``: the list of flights and how they are made."""
+    spec = importlib.util.spec_from_file_location("make_bags", BAGS / "make.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def fly(tmp_path, name, *options):
+    out = tmp_path / name
+    assert main(["simulate", "--aircraft", "cdrw", "--out", str(out), *options]) == 0
+    return out
+
+
+def test_a_bag_and_its_truth(tmp_path, capsys):
+    options = [*MANOEUVRE, "--turbulence", "light", "--effect", "actuator_lag:time_constant=0.05", "--seed", "7"]
+    bag = fly(tmp_path, "flight", *options, "--effect", "derivative_error:Cm_alpha=-0.05")
+    assert "s, " in capsys.readouterr().out
+    aircraft = load_aircraft("cdrw")
+    record = load_flight(bag, aircraft)
+    assert record.duration == pytest.approx(8.0, abs=0.5)
+    assert np.ptp(record["de"]) > 0.09
+    assert np.ptp(record["alpha"]) > 0.02
+    assert record["az"].mean() == pytest.approx(-9.8, abs=1.0)
+    truth = json.loads((tmp_path / "flight.truth.json").read_text())
+    assert truth["effects"]["actuator_lag"] == {"time_constant": 0.05}
+    assert truth["effects"]["turbulence"]["intensity"] == pytest.approx(0.77, abs=0.01)
+    assert read_truth(bag)["Cm_alpha"] == pytest.approx(aircraft.derivatives["Cm_alpha"].value - 0.05)
+    assert str(tmp_path) not in truth["command"]
+
+
+def test_the_truths_command_flies_it_again(tmp_path):
+    bag = fly(tmp_path, "one", *MANOEUVRE, "--seed", "3", "--open-loop", "--rate", "100", "--quiet")
+    words = json.loads((tmp_path / "one.truth.json").read_text())["command"].split()[1:]
+    words[words.index("--out") + 1] = str(tmp_path / "again")
+    assert main([*words, "--quiet"]) == 0
+    for first, second in zip(*(read_streams(b).by_topic.values() for b in (bag, tmp_path / "again")), strict=True):
+        np.testing.assert_array_equal(first.arrival.stamp_ns, second.arrival.stamp_ns)
+        values = "positions" if hasattr(first, "positions") else "values"
+        np.testing.assert_array_equal(getattr(first, values), getattr(second, values))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--effect", "gremlins:size=3"], "'gremlins' is not known; known: command_delay"),
+        (["--effect", "actuator_lag:time_constant=9"], "time_constant=9 is impossible; expected 0 to 1 s"),
+        (["--manoeuvre", "3211:flaps:amplitude=0.05"], "flaps"),
+        (["--manoeuvre", "3211:elevator:amplitude=0.9"], "limit"),
+        (["--turbulence", "biblical"], "expected one of none, light"),
+        (["--airspeed", "2"], "no steady flight at 2 m/s"),
+        (["--rate", "0"], "expected"),
+        (["--duration", "-1"], "expected 0.1 to 36000 s"),
+        (["--aircraft", "nobody"], "nobody"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, capsys, options, said):
+    out = tmp_path / "bag"
+    assert main(["simulate", "--aircraft", "cdrw", "--out", str(out), *options]) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("\n") == 1
+    assert not out.exists()
+
+
+def test_an_existing_bag_is_kept(tmp_path, capsys):
+    (tmp_path / "bag").mkdir()
+    assert main(["simulate", "--aircraft", "cdrw", "--out", str(tmp_path / "bag")]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_bundled_flights_are_what_their_commands_make(tmp_path):
+    """One of them, flown again: equal but for what another processor rounds otherwise."""
+    name = "cdrw_slow"
+    assert main([*bundled().arguments(name, tmp_path), "--quiet"]) == 0
+    ours, theirs = read_streams(BAGS / name), read_streams(tmp_path / name)
+    np.testing.assert_array_equal(ours.imu.arrival.stamp_ns, theirs.imu.arrival.stamp_ns)
+    for first, second, steps in ((ours.imu, theirs.imu, 0.006), (ours.air_data, theirs.air_data, 0.011)):
+        difference = np.abs(first.values - second.values)
+        assert difference.max() < steps  # at most one step of quantisation
+        assert (difference > 1e-9).mean() < 1e-3
+    np.testing.assert_allclose(ours.actuators.positions, theirs.actuators.positions, atol=1e-6)
+    assert read_truth(BAGS / name) == pytest.approx(read_truth(tmp_path / name))
+
+
+def test_bundled_flights_are_listed_and_small():
+    make = bundled()
+    assert (BAGS / "README.md").read_text() == make.readme()
+    for name in make.FLIGHTS:
+        size = sum(f.stat().st_size for f in (BAGS / name).iterdir())
+        assert size < 2_500_000, name
+        assert read_truth(BAGS / name), name
