@@ -31,10 +31,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Quality:
-    """How well one output or coefficient is answered: R^2, and the standard deviation of the residual in its unit."""
+    """How well one output or coefficient is answered: R^2, the residual's root mean square in its unit, samples."""
 
     r_squared: float
     residual_std: float
+    samples: int
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,11 @@ class Answer:
     def residuals(self) -> Array:
         """Measured minus modelled (N, ny)."""
         return self.measured - self.modelled
+
+    def column(self, name: str) -> tuple[Array, Array]:
+        """One output as measured and as modelled, (N,) each."""
+        index = self.names.index(name)
+        return self.measured[:, index], self.modelled[:, index]
 
 
 @dataclass(frozen=True)
@@ -87,12 +93,6 @@ class Fit:
         """Correlation coefficients (P, P) of the estimates."""
         return correlation(self.covariance)
 
-    @property
-    def quality(self) -> dict[str, Quality]:
-        """R^2 and residual by output, over all manoeuvres together."""
-        names = self.answers[0].names
-        return {name: _quality(self.answers, column) for column, name in enumerate(names)}
-
 
 def correlation(covariance: Array) -> Array:
     """Correlation matrix of a covariance; zero where a variance is zero."""
@@ -110,12 +110,19 @@ def interval(value: float, standard_error: float, freedom: float) -> tuple[float
     return value - half, value + half
 
 
-def _quality(answers: Sequence[Answer], column: int) -> Quality:
-    measured = np.concatenate([answer.measured[:, column] for answer in answers])
-    residual = np.concatenate([answer.residuals[:, column] for answer in answers])
-    kept = np.isfinite(residual)
-    if kept.sum() < 2:
-        return Quality(float("nan"), float("nan"))
+def quality(answers: Sequence[Answer]) -> dict[str, Quality]:
+    """R^2 and residual by output, over all answers together."""
+    names = dict.fromkeys(name for answer in answers for name in answer.names)
+    return {name: _quality([a.column(name) for a in answers if name in a.names]) for name in names}
+
+
+def _quality(pairs: Sequence[tuple[Array, Array]]) -> Quality:
+    measured, modelled = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    kept = np.isfinite(measured - modelled)
+    samples = int(kept.sum())
+    if not samples:
+        return Quality(float("nan"), float("nan"), 0)
+    squares = float(np.sum((measured - modelled)[kept] ** 2))
     spread = float(np.sum((measured[kept] - measured[kept].mean()) ** 2))
-    squares = float(np.sum(residual[kept] ** 2))
-    return Quality(1.0 - squares / spread if spread > 0.0 else float("nan"), float(np.sqrt(squares / kept.sum())))
+    explained = 1.0 - squares / spread if spread > 0.0 else float("nan")
+    return Quality(explained, float(np.sqrt(squares / samples)), samples)
