@@ -16,7 +16,8 @@ def stamp(effects: dict[str, Values], outputs: Scalar, step: Scalar) -> Scalar:
     imu, air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
     late = jnp.concatenate([jnp.full(_IMU, imu), jnp.full(_AIR, air)])
     # most flights have no such delay: their slopes need not be moved about
-    return jax.lax.cond(jnp.all(late == 0.0), shift_near_zero, _shift_each, outputs, late)
+    stamped: Scalar = jax.lax.cond(jnp.all(late == 0.0), shift_near_zero, _shift_each, outputs, late)
+    return stamped
 
 
 def _shift_each(outputs: Scalar, late: Scalar) -> Scalar:
