@@ -1,7 +1,7 @@
 """A plain attitude-hold autopilot, so that simulated data look like flown data: surfaces answer to the motion.
 
 It holds trim attitude and airspeed with feedback that is limited to a share of each surface's travel, on top of the
-planned commands. Gains follow from the aircraft's steady responses (Stevens, Lewis & Johnson (2016), sec. 4.4: attitude
+planned commands. Gains follow from the aircraft's steady responses (Stevens, Lewis & Johnson (2016), ch. 4: attitude
 loops around rate damping); they are plain, not optimal.
 """
 

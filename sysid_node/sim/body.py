@@ -4,7 +4,7 @@ Attitude is a quaternion: it has no singular attitude, its rate is a product of 
 derivatives), and four numbers instead of three cost nothing. Its norm is kept by the kinematic equation and divided out
 where a direction is taken, so that a rounding drift of the norm turns nothing.
 
-Equations: Stevens, Lewis & Johnson (2016), "Aircraft Control and Simulation", table 1.5-1 and sec. 1.8.
+Equations: Stevens, Lewis & Johnson (2016), "Aircraft Control and Simulation", ch. 1.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Continuous turbulence of the Dryden form, as time series along body axes.
 
-Spectra, intensities and scale lengths: MIL-F-8785C (1980), sec. 3.7.1.2 and 3.7.2.1 (low altitude, under 2000 ft) and
-3.7.2.2 (medium and high altitude). The spectra are realised by white noise through the exact discrete form of their
+Spectra, intensities and scale lengths: MIL-F-8785C (1980), sec. 3.7.1.2 (Dryden form), 3.7.2 (medium and high altitude)
+and 3.7.3 (low altitude). The spectra are realised by white noise through the exact discrete form of their
 shaping filters, started in the stationary state.
 """
 

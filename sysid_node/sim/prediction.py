@@ -6,7 +6,7 @@ of accelerometers and the rates of the gyroscopes' readings. Sensor effects are 
 what comes out. What has a memory of its own (actuators, motor, separation, structure) is carried along the record.
 
 ``predict`` gives accelerations; ``coefficients`` reduces accelerations, predicted or measured, to the six coefficients
-by the aircraft file (Klein & Morelli (2006), "Aircraft System Identification", sec. 5.1).
+by the aircraft file (Klein & Morelli (2006), "Aircraft System Identification", ch. 5).
 """
 
 from __future__ import annotations

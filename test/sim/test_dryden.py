@@ -1,4 +1,4 @@
-"""Turbulence against the spectra of MIL-F-8785C (1980), sec. 3.7.1.2 and 3.7.2.1, and its table of intensities."""
+"""Turbulence against the spectra of MIL-F-8785C (1980), sec. 3.7: Dryden form, low altitude."""
 
 import numpy as np
 import pytest

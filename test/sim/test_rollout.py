@@ -77,7 +77,7 @@ def test_runge_kutta_is_of_fourth_order(aircraft):
 
 
 def test_neutral_flight_equals_a_simulator_written_apart(simulator, flown):
-    """Euler angles, dimensional equations, scipy's DOP853: Stevens, Lewis & Johnson (2016), eq. 1.7-18 ff."""
+    """Euler angles, dimensional equations, scipy's DOP853: Stevens, Lewis & Johnson (2016), ch. 1."""
     trim, inputs, flight = flown
     commands = np.asarray(inputs.commands)
     state = np.array([*trim.initial[3:6], 0, 0, 0, 0, trim.alpha, 0, trim.initial[2]])

@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="actuator",
     summary="Surfaces stay where they are until the actuator has taken up the free play.",
     equation="x' = x + D(u - x), D the dead zone of +-width/2, its corners rounded: d - w d / (1 + (d / w)^64)^(1/64)",
-    source="Nordin & Gutman (2002), Automatica 38(10), sec. 2 (friction-driven hysteresis model)",
+    source="Nordin & Gutman (2002), Automatica 38(10) (backlash as hysteresis driven by friction)",
     parameters=per_control("rad", "width of the free play", 0.02, lower=0.0, upper=0.5),
 )
 

@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="actuator",
     summary="Surfaces stand off what was commanded by a constant.",
     equation="x' = x + bias",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument and control biases)",
     parameters=per_control("rad", "offset", 0.01, lower=-0.5, upper=0.5),
 )
 

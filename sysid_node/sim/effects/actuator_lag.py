@@ -12,7 +12,7 @@ EFFECT = Effect(
     station="actuator",
     summary="Surfaces follow their commands with a first-order lag.",
     equation="time_constant dx/dt + x = u, solved exactly for u linear between samples",
-    source="Stevens, Lewis & Johnson (2016), Aircraft Control and Simulation, sec. 3.6",
+    source="Stevens, Lewis & Johnson (2016), Aircraft Control and Simulation (actuators of the F-16 model)",
     parameters=fixed(Parameter("time_constant", "s", "time constant", 0.05, lower=0.0, upper=1.0)),
 )
 

@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="actuator",
     summary="Surfaces move no faster than a rate.",
     equation="x' = x + clip(u - x, -+ rate step), the clip's corner rounded: d / (1 + (d / limit)^16)^(1/16)",
-    source="Klyde & Mitchell (1998), J. Guidance 21(6) (rate limiting elements)",
+    source="Klyde, McRuer & Myers (1997), J. Guidance 20(1) (rate-limited actuators)",
     parameters=fixed(
         Parameter("inverse_rate", "s/rad", "1 / largest rate", 0.5, lower=0.0, upper=50.0, reciprocal="rate")
     ),

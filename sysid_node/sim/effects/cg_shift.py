@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="mass",
     summary="Aerodynamic and thrust forces act about another point; sensors sit elsewhere from it.",
     equation="moment' = moment - shift x force; arm' = arm - shift of every sensor",
-    source="Klein & Morelli (2006), Aircraft System Identification, eq. 3.73 (transfer of moments)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (transfer of moments to another point)",
     parameters=fixed(
         Parameter("x", "m", "CG forward of the file's", 0.02, lower=-2.0, upper=2.0),
         Parameter("y", "m", "CG to the right of the file's", 0.005, lower=-2.0, upper=2.0),

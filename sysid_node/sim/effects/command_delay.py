@@ -9,6 +9,6 @@ EFFECT = Effect(
     station="command",
     summary="Commands reach the actuators late.",
     equation="u'(t) = u(t - delay); commands are linear between samples",
-    source="Hodgkinson (1999), Aircraft Handling Qualities, ch. 2 (equivalent time delay)",
+    source="Hodgkinson (1999), Aircraft Handling Qualities (equivalent time delay)",
     parameters=fixed(Parameter("delay", "s", "transport delay", 0.05, lower=0.0, upper=0.5)),
 )

@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="actuator",
     summary="From the onset on a surface does only part of what its deflection should do.",
     equation="x' = x (1 - fraction s(t)), s a logistic step of 0.05 s at the onset",
-    source="Ducard (2009), Fault-tolerant Flight Control and Guidance Systems, ch. 3",
+    source="Ducard (2009), Fault-tolerant Flight Control and Guidance Systems (actuator faults)",
     parameters=per_control("1", "fraction lost", 0.3, ONSET, lower=-1.0, upper=1.0),
 )
 

@@ -18,6 +18,6 @@ EFFECT = Effect(
     station="aerodynamics",
     summary="The derivatives are not what the aircraft file says. Its scales are the file's tolerances.",
     equation="C' = C + sum error_i regressor_i",
-    source="Klein & Morelli (2006), Aircraft System Identification, eq. 3.77 ff.",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (aerodynamic model equations)",
     parameters=_parameters,
 )

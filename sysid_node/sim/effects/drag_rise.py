@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="aerodynamics",
     summary="A parabola of lift on top of the drag polar.",
     equation="CD' = CD + parabola (CL - CL0)^2, CL0 at the reference condition",
-    source="Raymer (2018), Aircraft Design, sec. 12.6.1 (drag due to lift)",
+    source="Raymer (2018), Aircraft Design: A Conceptual Approach, ch. 12 (drag due to lift)",
     parameters=fixed(Parameter("parabola", "1", "quadratic term in CL", 0.05, lower=-2.0, upper=5.0)),
 )
 

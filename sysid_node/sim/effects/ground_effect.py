@@ -15,7 +15,7 @@ EFFECT = Effect(
         "g = 1 / (1 + (16 h/b)^2), h = height + climb since the start; CL' = CL (1 + lift g), "
         "CD' = CD - drag g CL^2, Cm' = Cm - moment g CL"
     ),
-    source="McCormick (1995), Aerodynamics, Aeronautics and Flight Mechanics, eq. 7.13 (factor of induced drag)",
+    source="McCormick (1995), Aerodynamics, Aeronautics and Flight Mechanics (factor of induced drag)",
     parameters=fixed(
         Parameter("lift", "1", "lift gained at the ground, share", 0.2, lower=-1.0, upper=2.0),
         Parameter("drag", "1", "induced drag lost at the ground, per CL^2", 0.05, lower=-1.0, upper=1.0),

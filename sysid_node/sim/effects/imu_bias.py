@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="sensors",
     summary="Accelerometers and gyroscopes read off by a constant.",
     equation="a' = a + (ax, ay, az), w' = w + (p, q, r)",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (instrument errors)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(
         *(Parameter(n, "m/s^2", f"offset of {n}", 0.1, lower=-20.0, upper=20.0) for n in ("ax", "ay", "az")),
         *(Parameter(n, "rad/s", f"offset of {n}", 0.01, lower=-2.0, upper=2.0) for n in ("p", "q", "r")),

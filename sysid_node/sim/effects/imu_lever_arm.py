@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="sensors",
     summary="Accelerometers off their stated place feel rotation otherwise.",
     equation="a' = a + dw/dt x arm + w x (w x arm), arm' = arm + (x, y, z)",
-    source="Klein & Morelli (2006), Aircraft System Identification, eq. 3.80 ff. (accelerometer position)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (position of the accelerometers)",
     parameters=fixed(
         *(Parameter(n, "m", f"IMU off its stated place along body {n}", 0.1, lower=-5.0, upper=5.0) for n in "xyz")
     ),

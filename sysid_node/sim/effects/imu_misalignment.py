@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="sensors",
     summary="The IMU is turned against the body by small angles.",
     equation="a' = a - e x a, w' = w - e x w, e the small rotation (roll, pitch, yaw)",
-    source="Titterton & Weston (2004), Strapdown Inertial Navigation Technology, sec. 12.3 (small misalignments)",
+    source="Titterton & Weston (2004), Strapdown Inertial Navigation Technology (small misalignments)",
     parameters=fixed(
         *(
             Parameter(n, "rad", f"rotation about body {axis}", 0.02, lower=-0.5, upper=0.5)

@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="sensors",
     summary="Accelerometers and gyroscopes read too much or too little by a factor.",
     equation="a' = a (1 + error), w' = w (1 + error), each axis its own",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (instrument errors)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(
         *(Parameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("ax", "ay", "az")),
         *(Parameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("p", "q", "r")),

@@ -14,7 +14,7 @@ EFFECT = Effect(
     station="mass",
     summary="The moments of inertia differ from the file's.",
     equation="Ixx' = Ixx (1 + Ixx error), likewise Iyy, Izz; Ixz' = Ixz + (Ixz error) sqrt(Ixx Izz)",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 9.4 (mass properties)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (equations of motion)",
     parameters=fixed(
         *(Parameter(axis, "1", f"share of {axis}", 0.1, lower=-0.8, upper=5.0) for axis in _AXES),
         Parameter("Ixz", "1", "share of sqrt(Ixx Izz) added to Ixz", 0.02, lower=-0.5, upper=0.5),

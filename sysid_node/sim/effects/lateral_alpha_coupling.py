@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="aerodynamics",
     summary="Dihedral effect, weathercock stability and roll due to yaw rate change with the angle of attack.",
     equation="Cl' = Cl + (Cl_beta_alpha beta + Cl_r_alpha r) a, Cn' = Cn + Cn_beta_alpha beta a, a = alpha - alpha0",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 3.4.2; McCormick (1995), ch. 9",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (polynomial terms)",
     parameters=fixed(
         Parameter("Cl_beta_alpha", "1/rad^2", "slope of Cl_beta with alpha", 0.4),
         Parameter("Cn_beta_alpha", "1/rad^2", "slope of Cn_beta with alpha", 0.2),

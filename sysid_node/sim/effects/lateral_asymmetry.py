@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="aerodynamics",
     summary="A warped wing or a canted fin: side force, roll and yaw without sideslip.",
     equation="CY' = CY + CY_0, Cl' = Cl + Cl_0, Cn' = Cn + Cn_0",
-    source="Etkin & Reid (1996), Dynamics of Flight, sec. 3.9 (lateral trim)",
+    source="Etkin & Reid (1996), Dynamics of Flight, ch. 3 (lateral control and trim)",
     parameters=fixed(
         Parameter("CY_0", "1", "side force", 0.005, lower=-0.5, upper=0.5),
         Parameter("Cl_0", "1", "rolling moment", 0.002, lower=-0.2, upper=0.2),

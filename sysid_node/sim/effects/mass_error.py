@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="mass",
     summary="The mass differs from the file's; the inertia does not.",
     equation="m' = m (1 + error)",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 9.4 (mass properties)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (equations of motion)",
     parameters=fixed(Parameter("error", "1", "share of the mass", 0.05, lower=-0.8, upper=3.0)),
 )
 

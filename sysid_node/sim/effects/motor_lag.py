@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="propulsion",
     summary="Thrust follows its command with a first-order lag.",
     equation="time_constant dT/dt + T = command, solved exactly for commands linear between samples",
-    source="Stevens, Lewis & Johnson (2016), Aircraft Control and Simulation, sec. 3.6 (engine lag)",
+    source="Stevens, Lewis & Johnson (2016), Aircraft Control and Simulation (engine of the F-16 model)",
     parameters=fixed(Parameter("time_constant", "s", "time constant", 0.2, lower=0.0, upper=10.0)),
 )
 

@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="aerodynamics",
     summary="Static stability changes with the angle of attack.",
     equation="Cm' = Cm + quadratic (alpha - alpha0)^2 + cubic (alpha - alpha0)^3, alpha0 at the reference condition",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 3.4.2 (polynomial models)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (polynomial terms)",
     parameters=fixed(
         Parameter("quadratic", "1/rad^2", "quadratic term", 1.0),
         Parameter("cubic", "1/rad^3", "cubic term", 10.0),

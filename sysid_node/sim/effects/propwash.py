@@ -13,7 +13,7 @@ EFFECT = Effect(
     station="propulsion",
     summary="Elevator and rudder do more the more the propeller pulls.",
     equation="delta' = delta (1 + gain T / (qbar S)), of elevator and rudder",
-    source="Stinton (2001), The Design of the Airplane, ch. 8; actuator disc: q_slip = q (1 + T / (q A))",
+    source="Stinton (2001), The Design of the Aeroplane; actuator disc: q_slip = q (1 + T / (q A))",
     parameters=fixed(
         Parameter("gain", "1", "S over disc area, times the share of the tail in the slipstream", 1.0, 0.0, -5.0, 50.0)
     ),

@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="sensors",
     summary="Every reading carries white noise, in multiples of the aircraft file's.",
     equation="y' = y + scale sigma n, n a given realisation of unit variance",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (random instrument errors)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(Parameter("scale", "1", "of the file's sigmas", 1.0, lower=0.0, upper=100.0)),
 )
 

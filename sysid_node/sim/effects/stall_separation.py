@@ -15,7 +15,7 @@ EFFECT = Effect(
         "tau1 cbar/V dX/dt + X = (1 - tanh(a1 (alpha - tau2 cbar/V dalpha/dt - alpha_star))) / 2; "
         "CL' = CL (1 - depth (1 - ((1 + sqrt X) / 2)^2)), CD' = CD + depth CD_X (1 - X), Cm' = Cm + depth Cm_X (1 - X)"
     ),
-    source="Fischenberg & Jategaonkar (1999), RTO-MP-11 paper 5; Jategaonkar (2015), sec. 12.4 (Kirchhoff's theory)",
+    source="Fischenberg & Jategaonkar (1999), RTO-MP-11; Jategaonkar (2015), ch. 12 (Kirchhoff's theory of stall)",
     parameters=fixed(
         Parameter("depth", "1", "how much of it: 0 none, 1 as the theory has it", 1.0, lower=0.0, upper=1.5),
         Parameter("alpha_star", "rad", "angle at which half the flow is separated", 0.04, 0.26, 0.05, 1.0, False),

@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="airflow",
     summary="The air moves over the ground. Nothing on board feels it; the path over the ground does.",
     equation="d(position)/dt = R (u, v, w) + wind; the state's velocity is relative to the steadily moving air",
-    source="Etkin (1972), Dynamics of Atmospheric Flight, sec. 5.3 (Galilean change of frame)",
+    source="Etkin (1972), Dynamics of Atmospheric Flight (Galilean change of frame)",
     parameters=fixed(
         Parameter("north", "m/s", "air's velocity to the north", 3.0, lower=-60.0, upper=60.0),
         Parameter("east", "m/s", "air's velocity to the east", 3.0, lower=-60.0, upper=60.0),

@@ -26,7 +26,7 @@ EFFECT = Effect(
     station="actuator",
     summary="From the onset on a surface stands at a fixed position, whatever is commanded.",
     equation="x' = x + amount s(t) (position - x), s a logistic step of 0.05 s at the onset",
-    source="Ducard (2009), Fault-tolerant Flight Control and Guidance Systems, ch. 3",
+    source="Ducard (2009), Fault-tolerant Flight Control and Guidance Systems (actuator faults)",
     parameters=_parameters,
 )
 

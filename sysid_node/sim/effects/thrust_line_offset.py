@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="propulsion",
     summary="The thrust line passes below (nose up) or above (nose down) where the file has it.",
     equation="M' = M + T arm",
-    source="Etkin & Reid (1996), Dynamics of Flight, sec. 2.5 (influence of the propulsive system)",
+    source="Etkin & Reid (1996), Dynamics of Flight, ch. 2 (influence of the propulsive system)",
     parameters=fixed(Parameter("arm", "m", "thrust line below the nominal", 0.02, lower=-2.0, upper=2.0)),
 )
 

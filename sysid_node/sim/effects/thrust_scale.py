@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="propulsion",
     summary="Thrust differs from the commanded by a factor.",
     equation="T' = T (1 + error)",
-    source="Jategaonkar (2015), Flight Vehicle System Identification, sec. 6.4 (thrust as a source of model error)",
+    source="Jategaonkar (2015), Flight Vehicle System Identification (thrust as a source of model error)",
     parameters=fixed(Parameter("error", "1", "share of the thrust", 0.15, lower=-1.0, upper=3.0)),
 )
 

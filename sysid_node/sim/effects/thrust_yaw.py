@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="propulsion",
     summary="Asymmetric thrust, the propeller's P-factor and its torque.",
     equation="N' = N + T (arm + p_factor alpha), L' = L + T torque_arm",
-    source="McCormick (1995), Aerodynamics, Aeronautics and Flight Mechanics, ch. 10 (propeller normal force and yaw)",
+    source="McCormick (1995), Aerodynamics, Aeronautics and Flight Mechanics (propeller in inclined flow)",
     parameters=fixed(
         Parameter("arm", "m", "thrust line to the left of the CG", 0.01, lower=-2.0, upper=2.0),
         Parameter("p_factor", "m/rad", "arm gained with the angle of attack", 0.1, lower=-5.0, upper=5.0),

@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="airflow",
     summary="Continuous random gusts of the Dryden spectra.",
     equation="gust' = gust + intensity * (a realisation of intensity 1 m/s, sim.dryden)",
-    source="MIL-F-8785C (1980), sec. 3.7.1.2 and 3.7.2 (Dryden form)",
+    source="MIL-F-8785C (1980), sec. 3.7.1.2 (Dryden form)",
     parameters=fixed(Parameter("intensity", "m/s", "rms of the vertical gusts", 0.8, lower=0.0, upper=15.0)),
 )
 

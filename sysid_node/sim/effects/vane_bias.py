@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="sensors",
     summary="The vanes read off by a constant.",
     equation="alpha' = alpha + bias, beta' = beta + bias",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (instrument errors)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(
         Parameter("alpha", "rad", "offset of alpha", 0.01, lower=-0.5, upper=0.5),
         Parameter("beta", "rad", "offset of beta", 0.01, lower=-0.5, upper=0.5),

@@ -11,7 +11,7 @@ EFFECT = Effect(
     station="sensors",
     summary="Vanes off their stated place see the rotation otherwise.",
     equation="(u, v, w)' = (u, v, w) + w x arm, arm' = arm + (x, y, z)",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (vane position)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (position of the vanes)",
     parameters=fixed(
         *(Parameter(n, "m", f"probe off its stated place along body {n}", 0.1, lower=-10.0, upper=10.0) for n in "xyz")
     ),

@@ -10,7 +10,7 @@ EFFECT = Effect(
     station="sensors",
     summary="The vanes read too much or too little (upwash ahead of wing and fuselage).",
     equation="alpha' = alpha (1 + error), beta' = beta (1 + error)",
-    source="Klein & Morelli (2006), Aircraft System Identification, sec. 10.2 (upwash at the vanes)",
+    source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (upwash at the vanes)",
     parameters=fixed(
         Parameter("alpha", "1", "scale error of alpha", 0.1, lower=-0.9, upper=2.0),
         Parameter("beta", "1", "scale error of beta", 0.1, lower=-0.9, upper=2.0),
