@@ -1,0 +1,73 @@
+"""How far the gap shrinks: the simulator's error on flight not fitted, before and after, beside what noise leaves.
+
+The error of a coefficient is the root of its residual's power over its own power, between the first line and 4 Hz, in
+windows of ``spectra.LENGTH`` seconds whose mean is left out; all coefficients that were moved count alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.evidence import Evidence, groups_of
+from sysid_node.gap.spectra import Complex
+from sysid_node.gap.structure import Structure
+from sysid_node.gap.view import COEFFICIENTS, View
+
+#: A coefficient counts where its own power is so many times the sensors' noise.
+_MOVED = 4.0
+
+_DRAWS = 2000
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Root-mean-square errors as shares of what was measured, overall and by coefficient."""
+
+    before: float
+    tolerances: float  # with derivatives and biases fitted within their tolerances, no effect
+    after: float
+    noise_floor: float
+    shrink_percent: float
+    ci95: tuple[float, float]
+    per_channel: dict[str, dict[str, float]]
+
+
+def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, after: Evidence, left: Structure) -> Gap:
+    """The gap on flights not fitted, from their residuals (W, L, 6) as the file has it, then as fitted."""
+    groups = [(i, group) for i, view in enumerate(views) for group in groups_of(view)]
+    measured = _powers([v.measured for v in views], groups)
+    noise = np.array([len(g) * views[i].noise[1:].sum(axis=0) for i, g in groups])
+    stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
+    floor = np.maximum(noise, stages[2] * (1.0 - np.clip(left.share, 0.0, 1.0)))
+    counted = views[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
+    table = np.stack([*stages, np.minimum(floor, stages[1])])  # (4, groups, 6)
+
+    def errors(weight: Array) -> Array:
+        """Overall errors (4,) at weights (G,) of the groups."""
+        shares = (table * weight[:, None]).sum(axis=1) / np.maximum((measured * weight[:, None]).sum(axis=0), 1e-300)
+        return np.asarray(np.sqrt(shares[:, counted].mean(axis=1))) if counted.any() else np.zeros(4)
+
+    all_equal = np.ones(len(groups))
+    overall = errors(all_equal)
+    draws = np.random.default_rng(0).multinomial(len(groups), all_equal / len(groups), _DRAWS)
+    shrinks = [_shrink(errors(d.astype(float))) for d in draws]
+    own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
+    names = ("before", "tolerances", "after", "noise_floor")
+    channels = {c: dict(zip(names, own[:, k].tolist(), strict=True)) for k, c in enumerate(COEFFICIENTS) if counted[k]}
+    low, high = np.percentile(shrinks, [2.5, 97.5]).tolist()
+    return Gap(*overall.tolist(), _shrink(overall), (low, high), channels)
+
+
+def _shrink(errors: Array) -> float:
+    """Percent of what could be closed that is; nothing could where the gap is not above the floor."""
+    before, _, after, floor = errors.tolist()
+    return 100.0 * (before - after) / (before - floor) if before > floor * (1.0 + 1e-9) else 0.0
+
+
+def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, Array]]) -> Array:
+    """Power (G, 6) by group, above the mean."""
+    return np.array([(np.abs(amplitudes[i][g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])

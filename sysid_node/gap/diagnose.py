@@ -1,0 +1,230 @@
+"""The whole diagnosis of a gap, and what ``gap.json`` holds of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+from sysid_node.gap import close, localise
+from sysid_node.gap.attribute import Attribution, Cause, Progress, Trial, attribute
+from sysid_node.gap.close import Gap
+from sysid_node.gap.evidence import Evidence, held_out
+from sysid_node.gap.fit import Fit
+from sysid_node.gap.flights import RATE, Flight
+from sysid_node.gap.localise import Shape
+from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.view import View, view_of
+from sysid_node.sim import Simulator
+
+#: Probability from which an effect counts as told apart from its rivals.
+_TOLD_APART = 0.8
+
+#: Share of the remainder on some axis that must be structure for it to matter, and its standard deviations above chance.
+_STRUCTURED, _DEVIATIONS = 0.35, 6.0
+
+#: Share of the structure that the effects must remove for them to be the explanation.
+_EXPLAINED = 0.5
+
+#: A rival with this probability is named.
+_NAMED = 0.03
+
+#: Power over the sensors' noise below which a flight tells nothing, and below which nothing moves at all.
+_TELLING = 6.0
+
+#: Ratio of measured to expected mean lift beyond which a flight is another aircraft's.
+_LIFT = 2.5
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found. ``views`` are the flights on which the gap is measured, with the evidence there."""
+
+    aircraft: Aircraft
+    verdict: str
+    gap: Gap
+    where: list[dict[str, Any]]
+    attribution: Attribution
+    shape: Shape | None
+    views: tuple[View, ...]
+    base: Evidence
+    final: Evidence
+    next_flight: str
+    held_out: bool
+
+
+def diagnose(
+    aircraft: Aircraft, flights: Sequence[Flight], holdouts: Sequence[Flight], progress: Progress = lambda s, t: None
+) -> Diagnosis:
+    """Diagnoses flights, and measures the gap on flights held out; without these, by parts of the same flights.
+
+    Raises InputError: an aircraft file without tolerances or of another aircraft, a held-out flight that is also
+    fitted, a flight in which nothing moves.
+    """
+    _require_others(flights, holdouts)
+    progress(0.0, "reading the flights as forces and moments")
+    simulator = Simulator(aircraft, RATE)
+    views = [_checked(view_of(simulator, flight)) for flight in flights]
+    nuisances = nuisances_of(aircraft, views[0])
+    attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t))
+    progress(0.92, "the gap on flight not fitted")
+    if holdouts:
+        unseen = [_checked(view_of(simulator, flight)) for flight in holdouts]
+        own = [nuisances_of(aircraft, view) for view in unseen]
+        base, final = (held_out(t.fit, unseen, own) for t in (attribution.base, attribution.chosen))
+    else:
+        unseen, base, final = views, attribution.base.evidence, attribution.chosen.evidence
+    neutral = simulator.neutral()
+    gap = close.gap_of(unseen, [v.residual(neutral) for v in unseen], base, final, attribution.left)
+    verdict = _verdict(views, attribution, base, final)
+    found = localise.where(attribution, [v.residual(neutral) for v in views])
+    return Diagnosis(
+        aircraft, verdict, gap, found, attribution, localise.missing(attribution), tuple(unseen), base, final,
+        _next_flight(verdict, attribution), bool(holdouts),
+    )  # fmt: skip
+
+
+def _require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
+    """Raises InputError where a held-out flight is one of those that are fitted."""
+    for held in holdouts:
+        for flight in flights:
+            a, b = held.record, flight.record
+            same = a.start_ns == b.start_ns and len(a) == len(b) and np.array_equal(a["az"], b["az"])
+            if same or held.source == flight.source:
+                raise InputError(
+                    f"--holdout {held.source}: is the same flight as {flight.source}; hold out a flight that is not "
+                    "fitted, or leave --holdout away to check on parts of the flight"
+                )
+
+
+def _checked(view: View) -> View:
+    """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
+    commands = np.asarray(view.signals.commands)[: len(view.record), :-1]
+    if (np.ptp(commands, axis=0) < 1e-6).all():
+        raise InputError(f"{view.flight.source}: no control surface moves; fly a manoeuvre (sysid excite designs one)")
+    if _excitation(view).max() < 1.5:
+        raise InputError(
+            f"{view.flight.source}: nothing moves above the sensors' noise; fly a manoeuvre (sysid excite designs one)"
+        )
+    lift, expected = view.series[:, 0].mean(), view.predicted_series(view.simulator.neutral())[:, 0].mean()
+    if not 1.0 / _LIFT < lift / expected < _LIFT:
+        raise InputError(
+            f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
+            f"{view.simulator.aircraft.name!r}, whose derivatives expect {expected:.2f}; is it another aircraft's flight?"
+        )
+    return view
+
+
+def _excitation(view: View) -> Array:
+    """Power over the sensors' noise, by coefficient that was measured."""
+    power = (np.abs(view.measured[:, 1:]) ** 2).mean(axis=0).sum(axis=0)
+    return np.asarray((power / view.noise[1:].sum(axis=0))[view.axes])
+
+
+def _verdict(views: Sequence[View], attribution: Attribution, base: Evidence, final: Evidence) -> str:
+    if max(_excitation(view).max() for view in views) < _TELLING:
+        return "unsupported"
+    if not attribution.causes:
+        return "unknown_effect" if structured(attribution) else "no_gap"
+    if final.total <= base.total or explained(attribution) < _EXPLAINED:
+        return "unknown_effect"
+    return "explained" if all(c.probability >= _TOLD_APART for c in attribution.causes) else "ambiguous"
+
+
+def structured(attribution: Attribution) -> bool:
+    """Whether what is left holds structure that matters."""
+    left = attribution.left
+    return bool(np.any((left.share > _STRUCTURED) & (left.deviations > _DEVIATIONS)))
+
+
+def explained(attribution: Attribution) -> float:
+    """Share of the structure, above what derivatives and biases explain, that the effects remove."""
+    before, left = attribution.before, attribution.left
+    whole = float(before.coherent.sum())
+    return float(np.clip(1.0 - left.coherent.sum() / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+
+
+def probability(attribution: Attribution, cause: Cause) -> float:
+    """Of a cause, less where much structure is left that no listed effect explains."""
+    return cause.probability * (explained(attribution) if structured(attribution) else 1.0)
+
+
+def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:
+    """Value and standard error of each of a cause's parameters, in the simulator's units."""
+    simulator, places = fit.views[0].simulator, {index: place for place, index in enumerate(fit.indices)}
+    errors = np.sqrt(np.diag(fit.covariance))
+    if cause.candidate.indices:
+        return {
+            simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])]
+            for i in cause.candidate.indices
+        }
+    ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    ordered += [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if not s]
+    places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
+    own = [i for i in ordered if simulator.parameters[i][0] == cause.candidate.effect]
+    return {simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])] for i in own}
+
+
+def document(found: Diagnosis) -> dict[str, Any]:
+    """The content of gap.json."""
+    gap, attribution = found.gap, found.attribution
+    left = attribution.left
+    return {
+        "verdict": found.verdict,
+        "aircraft": found.aircraft.name,
+        "gap": {
+            "before": gap.before,
+            "tolerances": gap.tolerances,
+            "after": gap.after,
+            "noise_floor": gap.noise_floor,
+            "shrink_percent": gap.shrink_percent,
+            "ci95": list(gap.ci95),
+            "per_channel": gap.per_channel,
+            "window_s": found.views[0].windows.length,
+            "held_out": found.held_out,
+        },
+        "where": found.where,
+        "causes": [_cause(found, cause) for cause in attribution.causes],
+        "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],
+        "unexplained": {
+            "share": 1.0 - explained(attribution) if structured(attribution) else 0.0,
+            "where": [w for w in found.where if w["station"] == "unexplained"][:3],
+            "coherent_share": {c: float(s) for c, s in zip(gap_axes(), left.share, strict=True)},
+        },
+        "next_flight": found.next_flight,
+    }
+
+
+def gap_axes() -> tuple[str, ...]:
+    """The coefficients in their order."""
+    return close.COEFFICIENTS
+
+
+def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
+    return {
+        "effect": cause.candidate.effect,
+        "label": cause.candidate.label,
+        "station": cause.candidate.station,
+        "parameters": parameters(found.attribution.chosen.fit, cause),
+        "probability": probability(found.attribution, cause),
+        "gap_after": found.gap.after,
+        "indistinguishable_from": [effect for effect, p in cause.alternatives if p > _NAMED],
+    }
+
+
+def _next_flight(verdict: str, attribution: Attribution) -> str:
+    """What to fly, by what is in doubt."""
+    if verdict in {"unsupported", "no_gap", "unknown_effect"} or not attribution.causes:
+        return "" if verdict == "no_gap" else "3-2-1-1 on each surface in turn, at two airspeeds, in still air"
+    rivals = {e for c in attribution.causes for e, p in c.alternatives if p > _NAMED}
+    if not rivals:
+        return ""
+    return f"the same manoeuvres at twice and half the amplitude and rate, to part {', '.join(sorted(rivals))}"
+
+
+__all__ = ["Diagnosis", "Trial", "diagnose", "document"]

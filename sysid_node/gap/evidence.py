@@ -1,0 +1,177 @@
+"""Evidence: how probable flight is that a fit has not seen, and the probabilities of explanations that follow.
+
+Each group of windows is predicted from the others (or from the training flights), with the uncertainty of everything
+that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12 and 5.10-5.12 for the leave-out
+form). Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities
+mean no more than so many independent observations can say (Yao, Vehtari, Simpson & Gelman (2018), Bayesian Analysis
+13(3), "pseudo-BMA+").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.fit import Fit, real_rows, residual_power, solve, weights
+from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.spectra import SHARE, Complex
+from sysid_node.gap.view import View
+
+#: Draws of the Bayesian bootstrap.
+_DRAWS = 2000
+
+#: Groups of windows that a flight is parted into, at most.
+_GROUPS = 8
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Scores (G,) of groups of windows not seen, and their residuals (W, L, 6) by flight."""
+
+    scores: Array
+    residuals: tuple[Complex, ...]
+    views: tuple[View, ...]
+
+    @property
+    def total(self) -> float:
+        """Sum of the scores, in nats."""
+        return float(self.scores.sum())
+
+
+def groups_of(view: View) -> list[Array]:
+    """Indices of the windows of each group, neighbours together."""
+    return [g for g in np.array_split(np.arange(view.windows.count), min(_GROUPS, max(view.windows.count // 2, 1)))]
+
+
+def cross_validated(fit: Fit) -> Evidence:
+    """Each group of windows predicted from the others of the same flights; windows that overlap it stand aside."""
+    assert fit.information is not None
+    scores: list[float] = []
+    residuals: list[Complex] = []
+    for view, power, rows, full in zip(fit.views, fit.power, fit.rows, fit.slopes, strict=True):
+        slopes = full * fit.loose
+        residual = amplitudes(rows, weights(view.windows, power))
+        unseen = residual.copy()
+        for group in groups_of(view):
+            aside = np.arange(max(group[0] - 1, 0), min(group[-1] + 2, view.windows.count))
+            J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
+            information = _without_shapes(fit) - J.T @ J
+            information = information + 1e-9 * np.diag(np.diag(fit.information))
+            step = -solve(information, J.T @ r)
+            others = np.setdiff1d(np.arange(view.windows.count), aside)
+            own_power = residual_power(view, residual[others]) if others.size > 2 else power
+            score, part = _predictive(view, power, own_power, rows[group], slopes[group], step, information)
+            scores.append(score)
+            unseen[group] = part
+        residuals.append(unseen)
+    return Evidence(np.array(scores), tuple(residuals), fit.views)
+
+
+def _without_shapes(fit: Fit) -> Array:
+    """The information with what only shapes an effect (an onset, an angle) held where the fit put it.
+
+    The data of a few windows may say nothing about such a parameter, and a linear step would then lead anywhere.
+    """
+    assert fit.information is not None
+    held = ~fit.loose
+    information = fit.information * np.outer(fit.loose, fit.loose)
+    information[held, held] = 1.0
+    return np.asarray(information)
+
+
+def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) -> Evidence:
+    """Flights that the fit has not seen: its parameters and shared nuisances hold, biases and clocks are their own."""
+    chosen, shared, own = fit.sizes
+    known = np.linalg.inv(_without_shapes(fit))[: chosen + shared, : chosen + shared]
+    scores: list[float] = []
+    residuals: list[Complex] = []
+    for view, theirs in zip(views, nuisances, strict=True):
+        kept = theirs.without(fit.effects, view.simulator.names)
+        point = _carried(fit, view)
+        power = np.maximum(_train_power(fit, view), view.noise)
+        power = np.where(view.axes, power, 1.0)
+        weight = weights(view.windows, power)
+        order = [*fit.indices, *_ordered(kept)]
+        rows = real_rows(view.residual(point), weight)
+        slopes = real_rows(view.slopes(point, order), weight)
+        slopes[..., :chosen] *= fit.loose[:chosen]
+        sigma = np.concatenate([kept.sigma[~kept.shared]])
+        information = np.zeros((len(order), len(order)))
+        information[: chosen + shared, : chosen + shared] = np.linalg.inv(known)
+        information[chosen + shared :, chosen + shared :] = np.diag(sigma**-2.0)
+        for group in groups_of(view):
+            score, _ = _predictive(view, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
+            scores.append(score)
+        residuals.append(view.residual(point))
+    return Evidence(np.array(scores), tuple(residuals), tuple(views))
+
+
+def _ordered(nuisances: Nuisances) -> list[int]:
+    """Indices of the shared ones, then of the flight's own."""
+    indices = np.array(nuisances.indices)
+    return [*indices[nuisances.shared].tolist(), *indices[~nuisances.shared].tolist()]
+
+
+def _carried(fit: Fit, view: View) -> Array:
+    """The parameters of a flight not seen: what is shared from the fit, its own nuisances neutral."""
+    point = view.simulator.neutral()
+    shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    carried = [*fit.indices, *shared]
+    point[carried] = fit.points[0][carried]
+    return np.asarray(point)
+
+
+def _train_power(fit: Fit, view: View) -> Array:
+    """Mean residual power of the flights fitted, at the lines of another."""
+    lines = view.windows.frequencies
+    total = np.zeros((lines.size, 6))
+    for known, power in zip(fit.views, fit.power, strict=True):
+        own = known.windows.frequencies
+        total += np.column_stack([np.interp(lines, own, power[:, axis]) for axis in range(6)])
+    return np.asarray(total / len(fit.views))
+
+
+def _predictive(
+    view: View, power: Array, own_power: Array, rows: Array, slopes: Array, step: Array, information: Array
+) -> tuple[float, Complex]:
+    """Log probability of a group's rows, and its residual (w, L, 6), after a step of the unknowns.
+
+    The rows are weighted by ``power``; the probability is that of ``own_power``.
+    """
+    change = rows - slopes @ step
+    parts = change.reshape(rows.shape[0], 2, -1, 6)
+    scale = np.sqrt(power / own_power)
+    scaled = (parts * scale).ravel()
+    J = (slopes.reshape(rows.shape[0], 2, -1, 6, slopes.shape[2]) * scale[..., None]).reshape(-1, slopes.shape[2])
+    gained, right = information + J.T @ J, J.T @ scaled
+    _, before = np.linalg.slogdet(information)
+    _, after = np.linalg.slogdet(gained)
+    lines = np.ones(power.shape[0])
+    lines[0] = 0.5
+    spread = SHARE * rows.shape[0] * float(np.sum(lines[:, None] * np.log(own_power) * view.axes))
+    score = -spread - 0.5 * float(scaled @ scaled) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
+    return score, amplitudes(change, weights(view.windows, power))
+
+
+def amplitudes(rows: Array, weight: Array) -> Complex:
+    """Weighted real rows (w, R) as amplitudes (w, L, 6) again."""
+    parts = rows.reshape(rows.shape[0], 2, -1, 6)
+    weight = weight.reshape(2, -1, 6)
+    raw = np.where(weight > 0, parts / np.where(weight > 0, weight, 1.0), 0.0)
+    return np.asarray(raw[:, 0] + 1j * raw[:, 1])
+
+
+def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:
+    """Probability of each explanation from its scores (G,) of the same groups: pseudo-BMA+."""
+    table = np.array(scores)
+    count = table.shape[1]
+    draws = np.random.default_rng(seed).dirichlet(np.ones(count), _DRAWS) * count
+    totals = draws @ table.T
+    totals -= totals.max(axis=1, keepdims=True)
+    share = np.exp(totals)
+    share /= share.sum(axis=1, keepdims=True)
+    mean: Array = share.mean(axis=0)
+    return mean

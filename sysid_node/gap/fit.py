@@ -1,0 +1,272 @@
+"""Fits: the parameters of a set of candidates by least squares, the nuisances eliminated by linear algebra.
+
+Variable projection (Golub & Pereyra (1973), SIAM J. Numer. Anal. 10(2); Kaufman's (1975) Jacobian): at given weights the
+nuisances enter linearly about where they are, with their priors as further rows; what is left of residual and slopes
+after projecting them out is a small nonlinear problem. Weights are the residual's own spectrum, never below the noise
+of the sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, qr
+from scipy.optimize import least_squares
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.candidates import Candidate, bounds, prior
+from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.spectra import SHARE, Complex, Windows
+from sysid_node.gap.view import View
+
+#: Rounds of linearising the nuisances anew; the third changes nothing that matters.
+_ROUNDS = 2
+
+#: Evaluations of the small nonlinear problem in each round.
+_EVALUATIONS = 12
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Candidates fitted to flights. Unknowns: their parameters, shared nuisances, then each flight's own."""
+
+    views: tuple[View, ...]
+    candidates: tuple[Candidate, ...]
+    nuisances: Nuisances
+    points: tuple[Array, ...]  # (P,) all parameters by flight, nuisances included
+    power: tuple[Array, ...]  # (L, 6) of the residual, by flight
+    rows: tuple[Array, ...] = ()  # weighted residual (W, R) by flight
+    slopes: tuple[Array, ...] = ()  # weighted slopes (W, R, unknowns) by flight
+    information: Array | None = None  # (unknowns, unknowns)
+    cost: float = np.inf
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Entries of the vector that the candidates fit."""
+        return tuple(dict.fromkeys(i for c in self.candidates for i in c.indices))
+
+    @property
+    def loose(self) -> NDArray[np.bool_]:
+        """Of all unknowns, those that evidence takes as uncertain: all but parameters that only shape an effect."""
+        assert self.information is not None
+        loose = np.ones(self.information.shape[0], bool)
+        for place, index in enumerate(self.indices):
+            loose[place] = self.views[0].simulator.parameters[index][1].switch
+        return loose
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """Effects that are blamed."""
+        return frozenset(c.effect for c in self.candidates)
+
+    @property
+    def values(self) -> Array:
+        """The candidates' parameters."""
+        return np.asarray(self.points[0][list(self.indices)])
+
+    @property
+    def covariance(self) -> Array:
+        """Of all unknowns."""
+        assert self.information is not None
+        return np.asarray(np.linalg.inv(self.information))
+
+    @property
+    def stacked(self) -> tuple[Array, Array]:
+        """Values (about neutral, which is zero for all) and 1-sigma of all flights' nuisances."""
+        _, shared, own = self.sizes
+        now, sigma = np.zeros(shared + len(self.views) * own), np.ones(shared + len(self.views) * own)
+        for i, point in enumerate(self.points):
+            places = _places(self.nuisances, i)
+            now[places], sigma[places] = point[list(self.nuisances.indices)], self.nuisances.sigma
+        return now, sigma
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """How many unknowns: the candidates', shared, each flight's own."""
+        shared = int(self.nuisances.shared.sum())
+        return len(self.indices), shared, len(self.nuisances.indices) - shared
+
+
+def weights(windows: Windows, power: Array) -> Array:
+    """Weights (2 L, 6) of real and imaginary parts; the mean has no imaginary part."""
+    w = np.sqrt(2.0 * SHARE / power)
+    w[0] *= np.sqrt(0.5)
+    imaginary = w.copy()
+    imaginary[0] = 0.0
+    return np.concatenate([w, imaginary])
+
+
+def real_rows(amplitudes: Complex, weight: Array) -> Array:
+    """Amplitudes (W, L, 6, ...) as weighted real rows (W, R, ...)."""
+    parts = np.concatenate([amplitudes.real, amplitudes.imag], axis=1)
+    parts = parts * weight.reshape(1, *weight.shape, *(1,) * (parts.ndim - 3))
+    return np.asarray(parts.reshape(parts.shape[0], -1, *parts.shape[3:]))
+
+
+def residual_power(view: View, residual: Complex) -> Array:
+    """Power (L, 6) of a residual (W, L, 6), smoothed by band, at least the sensors' noise."""
+    power = view.windows.smoothed((np.abs(residual) ** 2).mean(axis=0))
+    return np.where(view.axes, np.maximum(power, view.noise), 1.0)
+
+
+def blank(views: Sequence[View], nuisances: Nuisances) -> Fit:
+    """Nothing blamed, nothing fitted yet."""
+    points = tuple(view.simulator.neutral() for view in views)
+    power = tuple(residual_power(v, v.residual(p)) for v, p in zip(views, points, strict=True))
+    return Fit(tuple(views), (), nuisances, points, power)
+
+
+def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisances, start: Sequence[float]) -> Fit:
+    """Another set of candidates about where this fit stands; those it did not have at ``start``, others neutral."""
+    view = fit.views[0]
+    names, neutral = view.simulator.names, view.simulator.neutral()
+    kept = nuisances.without(frozenset(c.effect for c in candidates), names)
+    old, chosen = set(fit.indices), {i for c in candidates for i in c.indices}
+    points = []
+    for point in fit.points:
+        fresh = point.copy()
+        gone = (old | set(fit.nuisances.indices)) - chosen - set(kept.indices)
+        fresh[list(gone)] = neutral[list(gone)]
+        new = [i for c in candidates for i in c.indices if i not in old]
+        fresh[new] = list(start)
+        points.append(fresh)
+    return replace(fit, candidates=tuple(candidates), nuisances=kept, points=tuple(points), rows=(), slopes=(),
+                   information=None, cost=np.inf)  # fmt: skip
+
+
+def polish(fit: Fit, rounds: int = _ROUNDS, reweigh: bool = True) -> Fit:
+    """The fit with everything it can move moved, and its weights those of its own residual."""
+    for _ in range(rounds):
+        fit = _one_round(fit)
+        if reweigh:
+            residuals = (v.residual(p) for v, p in zip(fit.views, fit.points, strict=True))
+            fit = replace(fit, power=tuple(residual_power(v, r) for v, r in zip(fit.views, residuals, strict=True)))
+    return linearised(fit)
+
+
+def _one_round(fit: Fit) -> Fit:
+    problem = Projected(fit)
+    values = fit.values
+    if values.size:
+        low, high = bounds(fit.views[0].simulator, fit.indices)
+        start = np.clip(values, low + 1e-9, high - 1e-9)
+        scale = fit.views[0].simulator.scales[list(fit.indices)]
+        solution = least_squares(
+            problem.residual, start, problem.jacobian, bounds=(low, high), x_scale=scale, max_nfev=_EVALUATIONS,
+            ftol=1e-4, xtol=1e-4, gtol=1e-6,
+        )  # fmt: skip
+        values = solution.x
+    return replace(fit, points=problem.points(values))
+
+
+class Projected:
+    """What is left of the residual at the candidates' parameters when the nuisances do their best."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit, self.weights = fit, [weights(v.windows, p) for v, p in zip(fit.views, fit.power, strict=True)]
+        own = list(fit.nuisances.indices)
+        blocks = []
+        for i, (view, point, weight) in enumerate(zip(fit.views, fit.points, self.weights, strict=True)):
+            slopes = real_rows(view.slopes(point, own), weight)
+            blocks.append(_placed(slopes.reshape(-1, len(own)), fit.nuisances, i, len(fit.views)))
+        self.now, spread = fit.stacked
+        self.prior = np.diag(1.0 / spread)
+        matrix = np.vstack([*blocks, self.prior])
+        self.Q, self.R = qr(matrix, mode="economic")
+        self.indices = list(fit.indices)
+        self.centre, self.sigma = prior(fit.views[0].simulator, fit.indices)
+
+    def looking(self, indices: Sequence[int]) -> Projected:
+        """The same nuisances, but another set of parameters to move."""
+        other = copy(self)
+        other.indices = list(indices)
+        other.centre, other.sigma = prior(self.fit.views[0].simulator, indices)
+        return other
+
+    def _rows(self, values: Array) -> Array:
+        """Weighted residuals of all flights at these values, nuisances where they are, then the nuisances' priors."""
+        rows = []
+        for view, point, weight in zip(self.fit.views, self.fit.points, self.weights, strict=True):
+            there = point.copy()
+            there[self.indices] = values
+            rows.append(real_rows(view.residual(there), weight).ravel())
+        return np.concatenate([*rows, -self.prior @ self.now])
+
+    def residual(self, values: Array) -> Array:
+        """Rows to be made small, the parameters' own priors last."""
+        rows = self._rows(values)
+        return np.concatenate([rows - self.Q @ (self.Q.T @ rows), (values - self.centre) / self.sigma])
+
+    def jacobian(self, values: Array) -> Array:
+        """Slopes of ``residual``, Kaufman's."""
+        blocks = []
+        for view, point, weight in zip(self.fit.views, self.fit.points, self.weights, strict=True):
+            there = point.copy()
+            there[self.indices] = values
+            slopes = real_rows(view.slopes(there, self.indices), weight)
+            blocks.append(-slopes.reshape(-1, values.size))
+        blocks.append(np.zeros((self.now.size, values.size)))
+        matrix = np.vstack(blocks)
+        return np.vstack([matrix - self.Q @ (self.Q.T @ matrix), np.diag(1.0 / self.sigma)])
+
+    def points(self, values: Array) -> tuple[Array, ...]:
+        """All parameters by flight, with the nuisances' best at these values."""
+        step = np.linalg.solve(self.R, self.Q.T @ self._rows(values))
+        moved = self.now + step
+        points = []
+        for i, point in enumerate(self.fit.points):
+            fresh = point.copy()
+            fresh[self.indices] = values
+            fresh[list(self.fit.nuisances.indices)] = moved[_places(self.fit.nuisances, i)]
+            points.append(fresh)
+        return tuple(points)
+
+
+def _places(nuisances: Nuisances, flight: int) -> Array:
+    """Where a flight's nuisances stand among all flights': the shared ones first."""
+    shared = int(nuisances.shared.sum())
+    own = len(nuisances.indices) - shared
+    places = np.empty(len(nuisances.indices), int)
+    places[nuisances.shared] = np.arange(shared)
+    places[~nuisances.shared] = shared + flight * own + np.arange(own)
+    return places
+
+
+def _placed(slopes: Array, nuisances: Nuisances, flight: int, flights: int) -> Array:
+    """A flight's slopes (n, K) among the columns of all flights."""
+    shared = int(nuisances.shared.sum())
+    wide = np.zeros((slopes.shape[0], shared + flights * (len(nuisances.indices) - shared)))
+    wide[:, _places(nuisances, flight)] = slopes
+    return wide
+
+
+def linearised(fit: Fit) -> Fit:
+    """The fit with its residual, slopes and information where it stands, for evidence and errors."""
+    own, chosen = list(fit.nuisances.indices), list(fit.indices)
+    _, spread = fit.stacked
+    centre, sigma = prior(fit.views[0].simulator, fit.indices)
+    rows, slopes = [], []
+    for i, (view, point, power) in enumerate(zip(fit.views, fit.points, fit.power, strict=True)):
+        weight = weights(view.windows, power)
+        rows.append(real_rows(view.residual(point), weight))
+        raw = real_rows(view.slopes(point, [*chosen, *own]), weight)
+        wide = _placed(raw[..., len(chosen) :].reshape(-1, len(own)), fit.nuisances, i, len(fit.views))
+        slopes.append(np.concatenate([raw[..., : len(chosen)], wide.reshape(*raw.shape[:2], -1)], axis=2))
+    information = np.diag(np.concatenate([sigma, spread]) ** -2.0)
+    for block in slopes:
+        flat = block.reshape(-1, block.shape[2])
+        information += flat.T @ flat
+    now, _ = fit.stacked
+    cost = sum(float(np.sum(r**2)) for r in rows) + float(np.sum((now / spread) ** 2))
+    cost += float(np.sum(((fit.values - centre) / sigma) ** 2))
+    return replace(fit, rows=tuple(rows), slopes=tuple(slopes), information=information, cost=cost)
+
+
+def solve(information: Array, right: Array) -> Array:
+    """information^-1 right, of a symmetric positive definite matrix."""
+    solved: Array = cho_solve(cho_factor(information), right)
+    return solved

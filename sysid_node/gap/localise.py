@@ -1,0 +1,158 @@
+"""Where the gap lies: by station and axis, by band, by time and by flight regime; and the shape of what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.attribute import Attribution
+from sysid_node.gap.spectra import EDGES, Complex
+from sysid_node.gap.view import COEFFICIENTS, View
+
+#: Share of the power that a band, a time or a regime holds when it is named.
+_MOST = 0.8
+
+#: Bins of the missing coefficient's shape.
+_BINS = 12
+
+#: Signals that a missing coefficient may depend on, and their units.
+REGIMES = {"alpha": "rad", "beta": "rad", "V": "m/s", "thrust": "N", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The missing coefficient, in bins of the signal that it depends on most."""
+
+    axis: str
+    signal: str
+    unit: str
+    centres: Array
+    means: Array
+    errors: Array  # standard errors of the means
+    explained: float  # share of its variance that the bins explain
+
+
+def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str, Any]]:
+    """Shares of the gap by station and axis, adding up to one; the largest first."""
+    views = attribution.base.fit.views
+    scale = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in views)
+    powers = [_power(before), *(_power(r) for r in _steps(attribution))]
+    stations = ["aerodynamics", *(c.station for c in attribution.chosen.fit.candidates)]
+    parts: dict[tuple[str, int], float] = {}
+    for station, high, low in zip(stations, powers, powers[1:], strict=False):
+        for axis, gone in enumerate(np.maximum(high - low, 0.0) / np.maximum(scale, 1e-300)):
+            parts[station, axis] = parts.get((station, axis), 0.0) + float(gone)
+    remainder = powers[-1] / np.maximum(scale, 1e-300)
+    for axis in range(6):
+        parts["unexplained", axis] = float(remainder[axis] * attribution.left.share[axis])
+        parts["noise", axis] = float(remainder[axis] * (1.0 - attribution.left.share[axis]))
+    total = sum(parts.values()) or 1.0
+    kept = sorted(((k, p / total) for k, p in parts.items() if p > 0.0), key=lambda pair: -pair[1])
+    return [
+        {"station": s, "axis": COEFFICIENTS[a], "share": share, **_when(views, before, a)} for (s, a), share in kept
+    ]
+
+
+def _steps(attribution: Attribution) -> list[Sequence[Complex]]:
+    """Residuals with nuisances, then with each effect in the order in which they were found (ends as chosen)."""
+    count = len(attribution.chosen.fit.candidates)
+    if count == 0:
+        return [attribution.base.evidence.residuals]
+    first = attribution.chosen.fit.candidates[0].label
+    single = next((t for t in attribution.trials if t.added is not None and t.added.label == first), None)
+    between = [single.evidence.residuals] * (count - 1) if single is not None else []
+    missing = [attribution.base.evidence.residuals] * (count - 1 - len(between))
+    return [attribution.base.evidence.residuals, *missing, *between, attribution.chosen.evidence.residuals]
+
+
+def _power(residuals: Sequence[Complex]) -> Array:
+    return np.asarray(sum((np.abs(r[:, 1:]) ** 2).sum(axis=(0, 1)) for r in residuals))
+
+
+def _when(views: Sequence[View], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
+    """Band, time and regime that hold most of an axis's gap."""
+    longest = int(np.argmax([v.windows.count for v in views]))
+    view, power = views[longest], np.abs(residuals[longest][:, 1:, axis]) ** 2
+    by_line, by_window = power.sum(axis=0), power.sum(axis=1)
+    low, high = _smallest(np.bincount(view.windows.bands[1:], by_line, len(EDGES) - 1))
+    first, last = _smallest(by_window)
+    starts = view.windows.starts
+    return {
+        "band_hz": [float(EDGES[low]), float(min(EDGES[high + 1], view.windows.frequencies[-1]))],
+        "regime": _regime(view, by_window),
+        "window_s": [float(starts[first]), float(starts[last] + view.windows.length)],
+    }
+
+
+def _smallest(power: Array) -> tuple[int, int]:
+    """First and last of the shortest run of bins that holds most of the power."""
+    total, sums = power.sum(), np.concatenate([[0.0], np.cumsum(power)])
+    for size in range(1, power.size + 1):
+        held = sums[size:] - sums[:-size]
+        if held.max() >= _MOST * total:
+            return int(held.argmax()), int(held.argmax()) + size - 1
+    return 0, power.size - 1
+
+
+def _regime(view: View, by_window: Array) -> dict[str, list[float]]:
+    """Range of the signal whose departures go with the gap by window, where one does."""
+    hop, size = view.windows.size // 2, view.windows.size
+    best, found = 0.5, {}
+    for name in REGIMES:
+        if name not in view.record.columns:
+            continue
+        values = view.record[name]
+        pieces = [values[i * hop : i * hop + size] for i in range(view.windows.count)]
+        spread = np.array([np.abs(p - values.mean()).max() for p in pieces])
+        if view.windows.count < 4 or spread.std() < 1e-12 or by_window.std() < 1e-300:
+            continue
+        together = float(np.corrcoef(spread, np.sqrt(by_window))[0, 1])
+        if together > best:
+            piece = pieces[int(by_window.argmax())]
+            best, found = together, {name: [float(piece.min()), float(piece.max())]}
+    return found
+
+
+def missing(attribution: Attribution) -> Shape | None:
+    """The remainder that derivatives and biases leave, of the coefficient with most structure, against what it depends
+    on most; none without structure."""  # fmt: skip
+    before = attribution.before
+    if not (before.deviations > 3.0).any():
+        return None
+    axis = int(np.argmax(np.where(before.deviations > 3.0, before.coherent, 0.0)))
+    fit = attribution.base.fit
+    view, point = fit.views[0], fit.points[0]
+    remainder = view.series[:, axis] - view.predicted_series(point)[:, axis]
+    shapes = [_binned(view, name, unit, axis, remainder) for name, unit in _signals(view).items()]
+    return max(shapes, key=lambda shape: shape.explained)
+
+
+def _signals(view: View) -> dict[str, str]:
+    controls = {c: "rad" for c in view.simulator.aircraft.control_symbols}
+    return {n: u for n, u in {**REGIMES, **controls}.items() if n in view.record.columns and view.record[n].std() > 0}
+
+
+def _binned(view: View, name: str, unit: str, axis: int, remainder: Array) -> Shape:
+    values = view.record[name]
+    edges = np.linspace(*np.percentile(values, [0.5, 99.5]), _BINS + 1)
+    inside = (values >= edges[0]) & (values <= edges[-1])
+    place = np.clip(np.searchsorted(edges, values[inside], side="right") - 1, 0, _BINS - 1)
+    kept = remainder[inside]
+    counts = np.bincount(place, minlength=_BINS)
+    full = counts > 20
+    means = np.bincount(place, kept, _BINS) / np.maximum(counts, 1)
+    spread = np.sqrt(np.maximum(np.bincount(place, kept**2, _BINS) / np.maximum(counts, 1) - means**2, 0.0))
+    between = float(
+        np.sum(counts[full] * (means[full] - kept.mean()) ** 2) / max(float(np.sum((kept - kept.mean()) ** 2)), 1e-300)
+    )
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    independent = np.maximum(
+        counts * 4.0 / view.simulator.rate, 1.0
+    )  # the remainder keeps its sign for a quarter second
+    return Shape(
+        COEFFICIENTS[axis], name, unit, centres[full], means[full], (spread / np.sqrt(independent))[full], between
+    )

@@ -1,0 +1,80 @@
+"""Windows and lines: a time series as complex amplitudes by window and frequency.
+
+Sine-tapered windows that overlap by half: the squares of neighbouring tapers add up to one, so that every sample counts
+once; the coefficients, twice as many as there are independent ones, each count by half (``SHARE``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.flight.record import Array
+
+Complex = NDArray[np.complex128]
+
+#: Length of a window, s: two periods of the lowest band's middle, short enough that drift stays in its mean.
+LENGTH = 8.0
+
+#: Highest line, Hz: beyond it, vanes and rigid-body dynamics have little to say.
+HIGHEST = 4.0
+
+#: What each coefficient counts of an independent one.
+SHARE = 0.5
+
+#: Edges of the bands in which the residual's power is smoothed, Hz; the mean is a band of its own.
+EDGES = (0.0, 0.06, 0.3, 0.6, 1.0, 1.6, 2.4, HIGHEST + 0.1)
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of ``size`` samples at ``rate`` Hz, ``count`` of them, half a window apart."""
+
+    rate: float
+    size: int
+    count: int
+
+    @classmethod
+    def over(cls, samples: int, rate: float, length: float = LENGTH) -> Windows:
+        """As many as fit into so many samples."""
+        size = 2 * round(0.5 * min(length * rate, samples / 1.5))
+        return cls(rate, size, max(1, (samples - size) // (size // 2) + 1))
+
+    @property
+    def frequencies(self) -> Array:
+        """Lines (L,), Hz, from zero."""
+        step = self.rate / self.size
+        return np.arange(int(HIGHEST / step + 1e-9) + 1) * step
+
+    @property
+    def starts(self) -> Array:
+        """When each window begins (W,), s."""
+        return np.arange(self.count) * (self.size // 2) / self.rate
+
+    @property
+    def length(self) -> float:
+        """Length of a window, s."""
+        return self.size / self.rate
+
+    @property
+    def bands(self) -> NDArray[np.intp]:
+        """Band of each line (L,)."""
+        return np.searchsorted(np.array(EDGES), self.frequencies, side="right") - 1
+
+    def transform(self, series: Array) -> Complex:
+        """Amplitudes (W, L, ...) of a series (N, ...); the variance of white noise passes as it is per sample."""
+        hop = self.size // 2
+        taper = np.sin(np.pi * (np.arange(self.size) + 0.5) / self.size)
+        pieces = np.stack([series[i * hop : i * hop + self.size] for i in range(self.count)])
+        shape = (1, self.size) + (1,) * (series.ndim - 1)
+        lines = np.fft.rfft(pieces * taper.reshape(shape), axis=1)[:, : self.frequencies.size]
+        scaled: Complex = lines / np.sqrt(0.5 * self.size)
+        return scaled
+
+    def smoothed(self, power: Array) -> Array:
+        """Power (L, A) averaged within each band."""
+        bands = self.bands
+        means = np.stack([power[bands == b].mean(axis=0) for b in range(bands.max() + 1)])
+        return np.asarray(means[bands])
