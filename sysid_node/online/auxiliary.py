@@ -33,7 +33,7 @@ class Auxiliary:
     """Frequency response of the instruments to the controls."""
 
     gains: NDArray[np.complex128]  # (F, I, m)
-    controls: NDArray[np.intp]  # (m,) columns of the controls
+    controls: slice  # columns of the m controls
 
 
 def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxiliary | None:
@@ -43,17 +43,19 @@ def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxilia
     A, B, rows, scales = _linear(aircraft, layout)
     resolvent = np.linalg.inv(1j * omega[:, None, None] * np.eye(_STATES) - A)
     gains = scales[:, None] * (resolvent[:, rows] @ B)
-    return Auxiliary(gains, np.array([layout.column(name) for name in layout.timed], dtype=np.intp))
+    return Auxiliary(gains, layout.deflections)
 
 
-def with_instruments(model: Auxiliary | None, lines: Array) -> Array:
-    """(2F, W) lines with those of the instruments behind the transformed ones."""
-    if model is None:
-        return lines
-    F = model.gains.shape[0]
+def with_instruments(model: Auxiliary, lines: Array) -> Array:
+    """(2F, W) the transformed lines (2F, T), and behind them the instruments'."""
+    F, T = model.gains.shape[0], lines.shape[1]
     deflections = lines[:F, model.controls] + 1j * lines[F:, model.controls]
     made = (model.gains @ deflections[:, :, None])[:, :, 0]
-    return np.hstack([lines, np.vstack([made.real, made.imag])])
+    every = np.empty((2 * F, T + made.shape[1]))
+    every[:, :T] = lines
+    every[:F, T:] = made.real
+    every[F:, T:] = made.imag
+    return every
 
 
 def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[np.intp], Array]:

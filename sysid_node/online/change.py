@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import gdtrix
 
 from sysid_node.online.auxiliary import Auxiliary
-from sysid_node.online.information import clean_lines
+from sysid_node.online.information import products
 from sysid_node.online.regression import STRONG, Plan, Solution, Uncertainty
 
 Array = NDArray[np.float64]
@@ -33,6 +33,7 @@ MARGIN = 3.0  # and Q must exceed what chance allows by this factor: no model is
 EXPLAINED = 0.6  # share of the misfit that changed derivatives must explain
 MISFIT = 0.05  # share of the motion's energy that the misfit must reach to matter
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
+NOISY = 3.0  # times the noise's usual energy that the misfit must reach to be looked into
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
 USUAL = 4  # pieces in the span by which the usual size of Q is judged
@@ -89,10 +90,10 @@ def examine(plan: Plan, model: Auxiliary | None, watch: Watch, density_per_gram:
         reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
         if reference is None:
             break
-        lines = clean_lines(np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0), model)
-        gram = lines.T @ lines
-        energy = 0.5 * lines.shape[0] * (now - start)
-        for c in _suspects(plan, reference, gram):
+        part = np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0)
+        gram = products(part, model)
+        energy = 0.5 * (len(part) - 1) * (now - start)
+        for c in _suspects(plan, reference, gram, energy):
             misfit = _misfit(plan, reference, gram, c, density_per_gram, energy)
             usual = max(watch.usual.get(c, 1.0), 1.0)
             if misfit.explained and misfit.over_chance > best * usual:
@@ -104,13 +105,14 @@ def examine(plan: Plan, model: Auxiliary | None, watch: Watch, density_per_gram:
     return Finding(since, lost)
 
 
-def _suspects(plan: Plan, reference: Reference, gram: Array) -> list[int]:
-    """Coefficients whose earlier estimates are trusted and miss a share of the motion that matters."""
+def _suspects(plan: Plan, reference: Reference, gram: Array, energy: float) -> list[int]:
+    """Coefficients whose earlier estimates are trusted and miss more than noise, a share of the motion that matters."""
     C = len(plan.coefficients)
     v = np.zeros((plan.width, C))
     v[plan.outputs, np.arange(C)] = 1.0
     np.add.at(v, (plan.columns[:, None], np.arange(C)), -reference.solution.theta)
-    missed = ((gram @ v) * v).sum(axis=0) > MISFIT * gram.take(plan.square)
+    misfit = ((gram @ v) * v).sum(axis=0)
+    missed = (misfit > MISFIT * gram.take(plan.square)) & (misfit > NOISY * energy * reference.uncertainty.density)
     firm = (np.where(plan.mine > 0.0, reference.strength[:, None], np.inf) >= STRONG).all(axis=0)
     return np.flatnonzero(missed & firm & (reference.uncertainty.freedom >= KNOWN)).tolist()
 

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import regression, signals, transform
-from sysid_node.online.auxiliary import Auxiliary
-from sysid_node.online.information import about_mean, clean_lines, inverse2
+from sysid_node.online.information import products
 from sysid_node.online.prior import beliefs, weighed
 from sysid_node.online.regression import Solution, student_95
 from sysid_node.online.signals import OFFSET
@@ -28,7 +27,6 @@ COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a w
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
-_NUISANCES = slice(OFFSET + 1, OFFSET + 3)
 
 
 @dataclass
@@ -49,29 +47,16 @@ def present(state: State) -> Present | None:
     part = transform.current(state.transform)
     rate = state.model.spectrum.rate
     part -= state.segment * math.exp(0.5 * rate * (state.segment_start - last)) if rate else state.segment
-    gram = _gram(part, state.model.auxiliary)
+    gram = products(part, state.model.auxiliary)
     gram += renewed.base
     # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
     energy = renewed.total.energy
     growth = (energy + max(last - state.piece_start, 0.0)) / max(energy, 1e-9)
     noise = renewed.compensation
-    bias = None if noise is None else (noise[0] * growth, noise[1] * growth)
-    solution = regression.solve(state.plan, gram, bias)
+    solution = regression.solve(state.plan, gram, None if noise is None else noise * growth)
     variance = renewed.factors * solution.residual
     variance *= np.abs(solution.inverse.diagonal())[:, None] / growth
     return Present(solution, variance, gram, part[-1])
-
-
-def _gram(part: Array, model: Auxiliary | None) -> Array:
-    """(W, W) of the clean lines; without instruments, constant and drift are projected out of the products instead."""
-    if model is not None:
-        lines = clean_lines(part, model)
-        return lines.T @ lines
-    lines = about_mean(part)
-    gram = lines.T @ lines
-    border = gram[:, _NUISANCES]
-    gram -= border @ inverse2(border[_NUISANCES]) @ border.T
-    return gram
 
 
 def estimate(state: State, now: float | None = None) -> Estimates:

@@ -96,15 +96,15 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
     return Spectrum(omega, bands, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
 
 
-def about_mean(transform: Array) -> Array:
-    """(2F, T) lines of a transform (2F + 1, T) whose signals are taken about their means; nuisances are kept.
+def about_mean(transform: Array, model: Auxiliary | None) -> Array:
+    """(2F, W) lines of a transform (2F + 1, T) whose signals are taken about their means, and of instruments made so.
 
-    The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
+    Nuisances are kept. The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
     """
     share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
     share[OFFSET : OFFSET + 3] = 0.0
-    lines: Array = transform[:-1] - transform[:-1, OFFSET, None] * share
-    return lines
+    lines: Array = transform[:-1] - np.dot(transform[:-1, OFFSET, None], share[None])
+    return lines if model is None else with_instruments(model, lines)
 
 
 def project(lines: Array) -> Array:
@@ -150,7 +150,16 @@ def window_energy(duration: float, rate: float) -> float:
 
 def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
     """(2F, W) lines of a transform (2F + 1, T) without offset, constant and drift, and the instruments made of them."""
-    return project(with_instruments(model, about_mean(transform)))
+    return project(about_mean(transform, model))
+
+
+def products(transform: Array, model: Auxiliary | None) -> Array:
+    """(W, W) Gram matrix of the clean lines of a transform (2F + 1, T), constant and drift projected out of it."""
+    lines = about_mean(transform, model)
+    gram: Array = lines.T @ lines
+    border = gram[:, _N]
+    gram -= border @ inverse2(border[_N]) @ border.T
+    return gram
 
 
 def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:

@@ -42,25 +42,22 @@ class Plan:
     same: Array  # (P, P) 1 where two unknowns belong to one block
     mine: Array  # (P, C) 1 where the unknown belongs to the coefficient
     width: int  # W
-    normal: Index = field(init=False)  # (P, P) flat indices of A'A
-    right: Index = field(init=False)  # (P, C) of A'y
-    cross: Index = field(init=False)  # (P, P) of Z'A
-    sides: Index = field(init=False)  # (P, C) of Z'y
+    # flat indices into the Gram matrix; transposed, so that LAPACK takes what is gathered as it lies
+    entries: Index = field(init=False)  # (2, P + C, P) of A'A above A'y, and of Z'A above Z'y; (1, ...) where Z is A
     square: Index = field(init=False)  # (C,) of y'y
+    counted: Array = field(init=False)  # (P + C, P) 1 where the entry lies in a block
     unit: Array = field(init=False)  # (P, P)
     least_squares: bool = field(init=False)  # whether every regressor is its own instrument
 
     def __post_init__(self) -> None:
-        def entries(rows: Index, columns: Index) -> Index:
-            return rows[:, None] * self.width + columns
-
-        object.__setattr__(self, "normal", entries(self.columns, self.columns))
-        object.__setattr__(self, "right", entries(self.columns, self.outputs))
-        object.__setattr__(self, "cross", entries(self.instruments, self.columns))
-        object.__setattr__(self, "sides", entries(self.instruments, self.outputs))
+        both = np.concatenate([self.columns, self.outputs])[:, None]
+        plain = bool((self.columns == self.instruments).all())
+        sources = [self.columns] if plain else [self.columns, self.instruments]
+        object.__setattr__(self, "entries", np.stack([both + rows * self.width for rows in sources]))
         object.__setattr__(self, "square", self.outputs * (self.width + 1))
+        object.__setattr__(self, "counted", np.vstack([self.same, self.mine.T]))
         object.__setattr__(self, "unit", np.eye(self.columns.size))
-        object.__setattr__(self, "least_squares", bool((self.columns == self.instruments).all()))
+        object.__setattr__(self, "least_squares", plain)
 
     def unknowns(self, coefficient: int) -> Index:
         """Indices of a coefficient's unknowns."""
@@ -106,40 +103,39 @@ class Solution:
     usable: bool
 
 
-def solve(plan: Plan, gram: Array, bias: tuple[Array, Array] | None = None) -> Solution:
+def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     """Solve (Z'A - bias) theta = Z'y - bias from a summed Gram matrix (W, W); ``bias`` is from ``bias_of``.
 
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
     """
-    normal, right = gram.take(plan.normal), gram.take(plan.right)
-    normal *= plan.same
-    right *= plan.mine
-    matrix, sides = normal, right
-    if not plan.least_squares:
-        matrix, sides = gram.take(plan.cross) * plan.same, gram.take(plan.sides) * plan.mine
-    if bias is not None:
-        matrix, sides = matrix - bias[0], sides - bias[1]
     P = plan.columns.size
-    known = np.empty((P, P + sides.shape[1]), order="F")
-    known[:, :P] = plan.unit
-    known[:, P:] = sides
+    gathered = gram.take(plan.entries)
+    gathered *= plan.counted
+    normal, cross = gathered[0], gathered[-1]
+    if bias is not None:
+        cross = cross - bias
+    known = np.empty_like(cross)
+    known[:P] = plan.unit
+    known[P:] = cross[P:]
     solver = dposv if plan.least_squares else dgesv
-    *_, solved, fault = solver(matrix, known, overwrite_b=True)
+    *_, solved, fault = solver(cross[:P].T, known.T, overwrite_b=True)
     squares = gram.take(plan.square)
     if fault or not math.isfinite(solved[0, 0]):
-        return Solution(np.zeros_like(right), np.zeros((P, P)), squares, False)
+        return Solution(np.zeros_like(plan.mine), np.zeros((P, P)), squares, False)
     theta = solved[:, P:]
     # |y - A theta|^2, with the noise in it
-    right *= -2.0
-    right += normal @ theta
-    right *= theta
-    squares += right.sum(axis=0)
+    misfit = theta.T @ normal[:P]
+    misfit -= normal[P:]
+    misfit -= normal[P:]
+    misfit *= theta.T
+    squares += misfit.sum(axis=1)
     return Solution(theta, solved[:, :P], np.maximum(squares, 0.0), True)
 
 
-def bias_of(plan: Plan, bias: Array) -> tuple[Array, Array]:
-    """The entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts, (P, P) and (P, C)."""
-    return bias.take(plan.cross) * plan.same, bias.take(plan.sides) * plan.mine
+def bias_of(plan: Plan, bias: Array) -> Array:
+    """(P + C, P) the entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts."""
+    entries: Array = bias.take(plan.entries[-1])
+    return entries * plan.counted
 
 
 @dataclass
@@ -192,7 +188,7 @@ def strength(plan: Plan, solution: Solution, info: Information) -> Array:
         return np.zeros(plan.columns.size)
     gram = info.grams.sum(axis=0)
     outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
-    best = np.linalg.pinv(gram.take(plan.normal) * plan.same, hermitian=True).diagonal()
+    best = np.linalg.pinv(gram[plan.columns[:, None], plan.columns] * plan.same, hermitian=True).diagonal()
     achieved = (solution.inverse @ outer @ solution.inverse.T).diagonal()
     efficiency = np.clip(best / np.maximum(achieved, TINY), 0.0, 1.0 - 1e-9)
     freedom = float(info.traces.sum()) ** 2 / info.trace_square

@@ -48,7 +48,7 @@ class Renewed:
     total: Information
     solution: Solution
     uncertainty: Uncertainty
-    compensation: tuple[Array, Array] | None  # noise's part of the normal equations, see ``regression.bias_of``
+    compensation: Array | None  # noise's part of the normal equations, see ``regression.bias_of``
     base: Array  # (W, W) Gram matrix of the finished segments
     factors: Array  # (P, C) squared standard error over (P_jj residual)
     timing: Timing  # whether the controls are felt when they are measured
@@ -85,4 +85,5 @@ class State:
     present: Information | None = None  # the present segment's, at the last renewal
     renewed: Renewed | None = None
     watch: Watch = field(default_factory=Watch)
+    renewals: int = 0
     changed_at: float = -math.inf
