@@ -14,6 +14,7 @@ from sysid_node.online.state import Renewed, State
 
 Array = NDArray[np.float64]
 RENEWAL = PIECE  # s of data between renewals
+TIMING_EVERY = 4  # renewals between looks at the controls' timing, which changes slowly
 
 
 def renew(state: State) -> None:
@@ -125,7 +126,11 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     variance = spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     lost = np.zeros(len(plan.coefficients), dtype=bool)
-    lags = timing.examine(plan, state.model.layout, solution, spread, gram)
+    state.renewals += 1
+    if last is None or state.renewals % TIMING_EVERY == 0:
+        lags = timing.examine(plan, state.model.layout, solution, spread, gram)
+    else:
+        lags = last.timing
     renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lags, strength, lost)
     state.renewed = renewed
     state.watch.references.append(Reference(state.transform.last, solution, spread, strength))
