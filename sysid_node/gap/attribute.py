@@ -75,7 +75,7 @@ def attribute(views: Sequence[View], nuisances: Nuisances, progress: Progress) -
     chosen, stages = base, []
     for count in range(MOST):
         rest = [c for c in candidates if c.effect not in chosen.fit.effects]
-        trials = stage(chosen, rest, nuisances, lambda s, t, n=count: progress((n + s) / (MOST + 1.0), t))
+        trials = stage(chosen, rest, nuisances, _share_of(progress, count))
         stages.append(trials)
         better = [t for t in trials if accepted(base, chosen, t)]
         if not better:
@@ -86,6 +86,11 @@ def attribute(views: Sequence[View], nuisances: Nuisances, progress: Progress) -
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
     causes = _causes(base, chosen, stages, candidates, nuisances, progress)
     return Attribution(base, chosen, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
+
+
+def _share_of(progress: Progress, count: int) -> Progress:
+    """Progress of one of the stages as that of all."""
+    return lambda share, text: progress((count + share) / (MOST + 1.0), text)
 
 
 def stage(current: Trial, candidates: Sequence[Candidate], nuisances: Nuisances, progress: Progress) -> list[Trial]:

@@ -1,7 +1,7 @@
 """Candidates: every effect of the chain with the values from which its fit may start.
 
-An effect with a corner, a state or an onset shows nothing at its neutral value, or at the wrong onset; so it starts from
-several plausible values, and the best start is polished.
+An effect with a corner, a state or an onset shows nothing at its neutral value, or at the wrong onset; so it starts
+from several plausible values, and the best start is polished.
 """
 
 from __future__ import annotations

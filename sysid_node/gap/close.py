@@ -10,12 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.spectra import Complex
 from sysid_node.gap.structure import Structure
-from sysid_node.gap.view import COEFFICIENTS, View
+from sysid_node.gap.view import View
+from sysid_node.sim.prediction import COEFFICIENTS
 
 #: A coefficient counts where its own power is so many times the sensors' noise.
 _MOVED = 4.0
@@ -59,7 +61,8 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
     names = ("before", "tolerances", "after", "noise_floor")
     channels = {c: dict(zip(names, own[:, k].tolist(), strict=True)) for k, c in enumerate(COEFFICIENTS) if counted[k]}
     low, high = np.percentile(shrinks, [2.5, 97.5]).tolist()
-    return Gap(*overall.tolist(), _shrink(overall), (low, high), channels)
+    before_, fitted, after_, floor_ = overall.tolist()
+    return Gap(before_, fitted, after_, floor_, _shrink(overall), (low, high), channels)
 
 
 def _shrink(errors: Array) -> float:
@@ -68,6 +71,6 @@ def _shrink(errors: Array) -> float:
     return 100.0 * (before - after) / (before - floor) if before > floor * (1.0 + 1e-9) else 0.0
 
 
-def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, Array]]) -> Array:
+def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:
     """Power (G, 6) by group, above the mean."""
     return np.array([(np.abs(amplitudes[i][g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])

@@ -21,11 +21,12 @@ from sysid_node.gap.localise import Shape
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.view import View, view_of
 from sysid_node.sim import Simulator
+from sysid_node.sim.prediction import COEFFICIENTS
 
 #: Probability from which an effect counts as told apart from its rivals.
 _TOLD_APART = 0.8
 
-#: Share of the remainder on some axis that must be structure for it to matter, and its standard deviations above chance.
+#: Share of the remainder on some axis that must be structure to matter, and its standard deviations above chance.
 _STRUCTURED, _DEVIATIONS = 0.35, 6.0
 
 #: Share of the structure that the effects must remove for them to be the explanation.
@@ -115,7 +116,7 @@ def _checked(view: View) -> View:
     if not 1.0 / _LIFT < lift / expected < _LIFT:
         raise InputError(
             f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
-            f"{view.simulator.aircraft.name!r}, whose derivatives expect {expected:.2f}; is it another aircraft's flight?"
+            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as its derivatives have it; another aircraft's flight?"
         )
     return view
 
@@ -194,15 +195,10 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "unexplained": {
             "share": 1.0 - explained(attribution) if structured(attribution) else 0.0,
             "where": [w for w in found.where if w["station"] == "unexplained"][:3],
-            "coherent_share": {c: float(s) for c, s in zip(gap_axes(), left.share, strict=True)},
+            "coherent_share": {c: float(s) for c, s in zip(COEFFICIENTS, left.share, strict=True)},
         },
         "next_flight": found.next_flight,
     }
-
-
-def gap_axes() -> tuple[str, ...]:
-    """The coefficients in their order."""
-    return close.COEFFICIENTS
 
 
 def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:

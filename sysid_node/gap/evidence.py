@@ -1,8 +1,7 @@
 """Evidence: how probable flight is that a fit has not seen, and the probabilities of explanations that follow.
 
 Each group of windows is predicted from the others (or from the training flights), with the uncertainty of everything
-that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12 and 5.10-5.12 for the leave-out
-form). Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities
+that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12; 5.10-5.12 leave out). Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities
 mean no more than so many independent observations can say (Yao, Vehtari, Simpson & Gelman (2018), Bayesian Analysis
 13(3), "pseudo-BMA+").
 """
@@ -13,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.fit import Fit, real_rows, residual_power, solve, weights
@@ -41,9 +41,9 @@ class Evidence:
         return float(self.scores.sum())
 
 
-def groups_of(view: View) -> list[Array]:
+def groups_of(view: View) -> list[NDArray[np.intp]]:
     """Indices of the windows of each group, neighbours together."""
-    return [g for g in np.array_split(np.arange(view.windows.count), min(_GROUPS, max(view.windows.count // 2, 1)))]
+    return list(np.array_split(np.arange(view.windows.count), min(_GROUPS, max(view.windows.count // 2, 1))))
 
 
 def cross_validated(fit: Fit) -> Evidence:
@@ -84,7 +84,7 @@ def _without_shapes(fit: Fit) -> Array:
 
 def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) -> Evidence:
     """Flights that the fit has not seen: its parameters and shared nuisances hold, biases and clocks are their own."""
-    chosen, shared, own = fit.sizes
+    chosen, shared, _ = fit.sizes
     known = np.linalg.inv(_without_shapes(fit))[: chosen + shared, : chosen + shared]
     scores: list[float] = []
     residuals: list[Complex] = []

@@ -1,7 +1,7 @@
 """Fits: the parameters of a set of candidates by least squares, the nuisances eliminated by linear algebra.
 
-Variable projection (Golub & Pereyra (1973), SIAM J. Numer. Anal. 10(2); Kaufman's (1975) Jacobian): at given weights the
-nuisances enter linearly about where they are, with their priors as further rows; what is left of residual and slopes
+Variable projection (Golub & Pereyra (1973), SIAM J. Numer. Anal. 10(2); Kaufman's (1975) Jacobian): at given weights
+the nuisances enter linearly about where they are, with their priors as further rows; what is left of residual and slopes
 after projecting them out is a small nonlinear problem. Weights are the residual's own spectrum, never below the noise
 of the sensors.
 """
@@ -226,11 +226,11 @@ class Projected:
         return tuple(points)
 
 
-def _places(nuisances: Nuisances, flight: int) -> Array:
+def _places(nuisances: Nuisances, flight: int) -> NDArray[np.intp]:
     """Where a flight's nuisances stand among all flights': the shared ones first."""
     shared = int(nuisances.shared.sum())
     own = len(nuisances.indices) - shared
-    places = np.empty(len(nuisances.indices), int)
+    places = np.empty(len(nuisances.indices), np.intp)
     places[nuisances.shared] = np.arange(shared)
     places[~nuisances.shared] = shared + flight * own + np.arange(own)
     return places
@@ -242,6 +242,19 @@ def _placed(slopes: Array, nuisances: Nuisances, flight: int, flights: int) -> A
     wide = np.zeros((slopes.shape[0], shared + flights * (len(nuisances.indices) - shared)))
     wide[:, _places(nuisances, flight)] = slopes
     return wide
+
+
+def moved(fit: Fit, step: Array) -> Fit:
+    """The fit with all unknowns a step (unknowns,) on, the candidates' within their bounds."""
+    chosen = list(fit.indices)
+    low, high = bounds(fit.views[0].simulator, chosen)
+    points = []
+    for i, point in enumerate(fit.points):
+        fresh = point.copy()
+        fresh[chosen] = np.clip(point[chosen] + step[: len(chosen)], low, high)
+        fresh[list(fit.nuisances.indices)] += step[len(chosen) + _places(fit.nuisances, i)]
+        points.append(fresh)
+    return replace(fit, points=tuple(points))
 
 
 def linearised(fit: Fit) -> Fit:

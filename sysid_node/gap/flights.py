@@ -55,7 +55,7 @@ def load_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     record = flight_record(aircraft, streams, 0.2)
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
-    return complete(aircraft, Flight(record, *rates, source=str(path)))
+    return complete(aircraft, Flight(record, rates[0], rates[1], rates[2], source=str(path)))
 
 
 def complete(aircraft: Aircraft, flight: Flight) -> Flight:

@@ -10,8 +10,10 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.attribute import Attribution
+from sysid_node.gap.fit import Fit
 from sysid_node.gap.spectra import EDGES, Complex
-from sysid_node.gap.view import COEFFICIENTS, View
+from sysid_node.gap.view import View
+from sysid_node.sim.prediction import COEFFICIENTS
 
 #: Share of the power that a band, a time or a regime holds when it is named.
 _MOST = 0.8
@@ -40,8 +42,8 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
     """Shares of the gap by station and axis, adding up to one; the largest first."""
     views = attribution.base.fit.views
     scale = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in views)
-    powers = [_power(before), *(_power(r) for r in _steps(attribution))]
-    stations = ["aerodynamics", *(c.station for c in attribution.chosen.fit.candidates)]
+    powers = [_power(before), *(_power(r) for r in _steps(attribution.chosen.fit))]
+    stations = [*(c.station for c in attribution.chosen.fit.candidates), "aerodynamics"]
     parts: dict[tuple[str, int], float] = {}
     for station, high, low in zip(stations, powers, powers[1:], strict=False):
         for axis, gone in enumerate(np.maximum(high - low, 0.0) / np.maximum(scale, 1e-300)):
@@ -57,16 +59,21 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
     ]
 
 
-def _steps(attribution: Attribution) -> list[Sequence[Complex]]:
-    """Residuals with nuisances, then with each effect in the order in which they were found (ends as chosen)."""
-    count = len(attribution.chosen.fit.candidates)
-    if count == 0:
-        return [attribution.base.evidence.residuals]
-    first = attribution.chosen.fit.candidates[0].label
-    single = next((t for t in attribution.trials if t.added is not None and t.added.label == first), None)
-    between = [single.evidence.residuals] * (count - 1) if single is not None else []
-    missing = [attribution.base.evidence.residuals] * (count - 1 - len(between))
-    return [attribution.base.evidence.residuals, *missing, *between, attribution.chosen.evidence.residuals]
+def _steps(fit: Fit) -> list[list[Complex]]:
+    """Residuals with the effects added to the file's model in turn, then with the nuisances too."""
+    neutral = fit.views[0].simulator.neutral()
+    points, steps = [neutral.copy() for _ in fit.views], []
+    for candidate in fit.candidates:
+        for point, fitted in zip(points, fit.points, strict=True):
+            own = [*candidate.indices] or _entries(fit, candidate.effect)
+            point[own] = fitted[own]
+        steps.append([v.residual(p) for v, p in zip(fit.views, points, strict=True)])
+    return [*steps, [v.residual(p) for v, p in zip(fit.views, fit.points, strict=True)]]
+
+
+def _entries(fit: Fit, effect: str) -> list[int]:
+    """Entries of the vector that belong to an effect."""
+    return [i for i, (e, _) in enumerate(fit.views[0].simulator.parameters) if e == effect]
 
 
 def _power(residuals: Sequence[Complex]) -> Array:
@@ -78,7 +85,7 @@ def _when(views: Sequence[View], residuals: Sequence[Complex], axis: int) -> dic
     longest = int(np.argmax([v.windows.count for v in views]))
     view, power = views[longest], np.abs(residuals[longest][:, 1:, axis]) ** 2
     by_line, by_window = power.sum(axis=0), power.sum(axis=1)
-    low, high = _smallest(np.bincount(view.windows.bands[1:], by_line, len(EDGES) - 1))
+    low, high = _smallest(np.bincount(view.windows.bands[1:], by_line, len(EDGES) - 1).astype(float))
     first, last = _smallest(by_window)
     starts = view.windows.starts
     return {
@@ -132,13 +139,13 @@ def missing(attribution: Attribution) -> Shape | None:
 
 
 def _signals(view: View) -> dict[str, str]:
-    controls = {c: "rad" for c in view.simulator.aircraft.control_symbols}
+    controls = dict.fromkeys(view.simulator.aircraft.control_symbols, "rad")
     return {n: u for n, u in {**REGIMES, **controls}.items() if n in view.record.columns and view.record[n].std() > 0}
 
 
 def _binned(view: View, name: str, unit: str, axis: int, remainder: Array) -> Shape:
     values = view.record[name]
-    edges = np.linspace(*np.percentile(values, [0.5, 99.5]), _BINS + 1)
+    edges = np.linspace(float(np.percentile(values, 0.5)), float(np.percentile(values, 99.5)), _BINS + 1)
     inside = (values >= edges[0]) & (values <= edges[-1])
     place = np.clip(np.searchsorted(edges, values[inside], side="right") - 1, 0, _BINS - 1)
     kept = remainder[inside]

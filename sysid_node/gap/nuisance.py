@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
@@ -36,7 +37,7 @@ class Nuisances:
 
     indices: tuple[int, ...]
     sigma: Array
-    shared: Array  # bool
+    shared: NDArray[np.bool_]
 
     def without(self, effects: frozenset[str], names: tuple[str, ...]) -> Nuisances:
         """Those that do not belong to these effects, unless only their prior widens."""

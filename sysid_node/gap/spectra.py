@@ -46,7 +46,8 @@ class Windows:
     def frequencies(self) -> Array:
         """Lines (L,), Hz, from zero."""
         step = self.rate / self.size
-        return np.arange(int(HIGHEST / step + 1e-9) + 1) * step
+        lines: Array = np.arange(int(HIGHEST / step + 1e-9) + 1) * step
+        return lines
 
     @property
     def starts(self) -> Array:

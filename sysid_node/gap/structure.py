@@ -1,21 +1,22 @@
 """What the remainder owes to the controls and the flow, whatever the cause: a test that knows no physics.
 
-Rotating gusts, which no vane sees, are in every remainder, and the aircraft answers them: so least squares passes part of
-them off as derivatives. But no pilot's command foretells a gust. The steps in the commands, through lags, and even
-products of flow angles and airspeed therefore serve as instruments: the unknowns are fitted anew to what of the remainder
-is coherent with these, and what then stays coherent is structure (Hansen's test of over-identifying restrictions: Hansen
-(1982), Econometrica 50(4)). The rest is noise, which no model of the aircraft beats.
+Rotating gusts, which no vane sees, are in every remainder, and the aircraft answers them: so least squares passes part
+of them off as derivatives. But no pilot's command foretells a gust. The steps in the commands, through lags, and even
+products of flow angles and airspeed therefore serve as instruments: the unknowns are fitted anew to what of the
+remainder is coherent with these, and what then stays coherent is structure (the test of over-identifying restrictions:
+Hansen (1982), Econometrica 50(4)). The rest is noise, which no model of the aircraft beats.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.fit import Fit, prior, real_rows, solve, weights
+from sysid_node.gap.candidates import prior
+from sysid_node.gap.fit import Fit, linearised, moved, real_rows, solve, weights
 from sysid_node.gap.view import View
 
 #: Time constants through which commands act, s; zero is directly.
@@ -47,17 +48,8 @@ class Structure:
 
 def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
     """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare."""
-    powers = (like or fit).power
-    basis, rows, slopes = [], [], []
-    for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
-        weight = weights(view.windows, power)
-        weight[[0, view.windows.frequencies.size]] = 0.0
-        own = weights(view.windows, own_power)
-        ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
-        rows.append((r * ratio).reshape(r.shape[0], -1, 6))
-        slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, 6, J.shape[2]))
-        basis.append(_basis(view, weight))
-    step = _instrumented(fit, basis, rows, slopes)
+    basis, rows, slopes = _equations(fit, (like or fit).power)
+    step, _ = _solution(fit, basis, rows, slopes)
     left = [r - J @ step for r, J in zip(rows, slopes, strict=True)]
     coherent, total, size = np.zeros(6), np.zeros(6), np.zeros(6)
     for U, r in zip(basis, left, strict=True):
@@ -70,8 +62,31 @@ def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
     return Structure(np.maximum(beyond, 0.0), total, beyond / np.sqrt(2.0 * np.maximum(size, 1.0)))
 
 
-def _instrumented(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], slopes: list[Array]) -> Array:
-    """The step of all unknowns that leaves least of what is coherent, their priors included."""
+def instrumented(fit: Fit) -> Fit:
+    """The fit with its unknowns as the instruments have them, which gusts do not bias; its errors are theirs too.
+
+    One Gauss-Newton step from where the fit stands, and everything linearised there.
+    """
+    step, information = _solution(fit, *_equations(fit, fit.power))
+    return replace(linearised(moved(fit, step)), information=information)
+
+
+def _equations(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
+    """By flight: the instruments' directions, residuals (W, 2 L, 6) and slopes (W, 2 L, 6, unknowns), without means."""
+    basis, rows, slopes = [], [], []
+    for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
+        weight = weights(view.windows, power)
+        weight[[0, view.windows.frequencies.size]] = 0.0
+        own = weights(view.windows, own_power)
+        ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
+        rows.append((r * ratio).reshape(r.shape[0], -1, 6))
+        slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, 6, J.shape[2]))
+        basis.append(_basis(view, weight))
+    return basis, rows, slopes
+
+
+def _solution(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], slopes: list[Array]) -> tuple[Array, Array]:
+    """The step of all unknowns that leaves least of what is coherent, their priors included; its information."""
     precision, pull = _priors(fit)
     information, right = np.diag(precision), -precision * pull
     for U, r, J in zip(basis, rows, slopes, strict=True):
@@ -79,7 +94,7 @@ def _instrumented(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], sl
             seen = directions.T @ J[:, :, axis].reshape(-1, J.shape[3])
             information += seen.T @ seen
             right += seen.T @ (directions.T @ r[:, :, axis].ravel())
-    return solve(information, right)
+    return solve(information, right), information
 
 
 def _priors(fit: Fit) -> tuple[Array, Array]:
@@ -104,18 +119,18 @@ def _basis(view: View, weight: Array) -> dict[int, Array]:
 
 def instruments(view: View) -> Array:
     """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread."""
-    moved, record = _moved(view), view.record
-    columns = [_lagged(moved[:, i], lag, view.simulator.step) for i in range(moved.shape[1]) for lag in _LAGS]
+    given, record = _deliberate(view), view.record
+    columns = [_lagged(given[:, i], lag, view.simulator.step) for i in range(given.shape[1]) for lag in _LAGS]
     alpha, beta, speed = (record[n] - record[n].mean() for n in ("alpha", "beta", "V"))
     columns += [alpha**2, np.abs(beta), speed * alpha, alpha * np.abs(alpha) * (alpha > 0)]
-    columns += [series for i in range(moved.shape[1]) for series in (moved[:, i] ** 2, moved[:, i] ** 3)]
+    columns += [series for i in range(given.shape[1]) for series in (given[:, i] ** 2, given[:, i] ** 3)]
     table = np.column_stack(columns)
     table = table - table.mean(axis=0)
     spread = table.std(axis=0)
     return np.asarray(table[:, spread > 1e-12] / spread[spread > 1e-12])
 
 
-def _moved(view: View) -> Array:
+def _deliberate(view: View) -> Array:
     """What a pilot or a test program does with the commands (N, m).
 
     Where a command steps, its steps, forgotten after some seconds: between them it moves with the autopilot, hence with

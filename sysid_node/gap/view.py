@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.flights import RATE, Flight, thinned
+from sysid_node.gap.flights import Flight, thinned
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import Simulator
 from sysid_node.sim.layout import Layout, Model, Scalar
@@ -37,7 +37,7 @@ _NOISE = {
 
 @partial(jax.jit, static_argnums=0)
 def _expected(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: float) -> Scalar:
-    return coefficients(model, signals, predict(layout, model, theta, signals, step))
+    return coefficients(model, signals, predict(layout, model, theta, signals, jnp.asarray(step)))
 
 
 @partial(jax.jit, static_argnums=0)
@@ -45,7 +45,8 @@ def _changes(layout: Layout, model: Model, theta: Scalar, directions: Scalar, si
     """d expected along each of the directions (K, P): (K, N, 6)."""
 
     def along(direction: Scalar) -> Scalar:
-        return jax.jvp(lambda t: _expected(layout, model, t, signals, step), (theta,), (direction,))[1]
+        slope: Scalar = jax.jvp(lambda t: _expected(layout, model, t, signals, step), (theta,), (direction,))[1]
+        return slope
 
     return jax.vmap(along)(directions)
 
@@ -106,11 +107,6 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     return View(simulator, flight, record, signals, windows, series, measured, noise, axes)
 
 
-def simulator_of(aircraft: object, rate: float = RATE) -> Simulator:
-    """The simulator at the analysis rate."""
-    return Simulator(aircraft, rate)  # type: ignore[arg-type]
-
-
 def _signals(simulator: Simulator, record: FlightRecord) -> tuple[Signals, Array]:
     """Signals, padded, and the measured coefficients (N, 6)."""
     signals = signals_of(simulator, record)
@@ -164,4 +160,4 @@ def _jittered(view: View, random: np.random.Generator) -> dict[str, Array]:
     return {s: np.interp(record.time + off, record.time, record[s]) for s in moved}
 
 
-__all__ = ["COEFFICIENTS", "View", "simulator_of", "view_of"]
+__all__ = ["COEFFICIENTS", "View", "view_of"]

@@ -1,0 +1,111 @@
+"""``sysid gap``: where the simulator and the flight differ, which effect causes it, and how far the gap shrinks."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.cli.show import progress_bar
+from sysid_node.errors import InputError
+from sysid_node.flight.frames import BODY_FRAMES
+from sysid_node.flight.topics import topic_names
+
+if TYPE_CHECKING:
+    from sysid_node.gap.diagnose import Diagnosis
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser(
+        "gap", help="find why the simulator does not fly like the aircraft", description=__doc__
+    )
+    add = parser.add_argument
+    add("bags", metavar="BAG", type=Path, nargs="+", help="rosbag2 folder, .mcap, .db3 or .csv file")
+    add("--aircraft", required=True, metavar="FILE|NAME", help="aircraft file, or name as in cdrw: the belief")
+    add("--holdout", action="append", default=[], metavar="BAG", type=Path, help="a flight to check on, not to fit")
+    add("--out", required=True, metavar="DIR", type=Path, help="folder for the results")
+    add("--topic", action="append", default=[], metavar="OURS:=THEIRS", help="a topic's name in the bags")
+    add("--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu)")
+    add("--quiet", action="store_true", help="print nothing")
+    return parser
+
+
+def run(args: argparse.Namespace) -> None:
+    """Diagnoses and writes."""
+    from sysid_node.gap.diagnose import diagnose  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.gap.flights import load_flight  # noqa: PLC0415
+    from sysid_node.report.gap import opening_text  # noqa: PLC0415
+
+    aircraft, topics = load_aircraft(args.aircraft), topic_names(args.topic)
+    flights, holdouts = (
+        [load_flight(path, aircraft, topics, args.body_frame) for path in paths] for paths in (args.bags, args.holdout)
+    )
+    with progress_bar("gap", quiet=args.quiet) as progress:
+        found = diagnose(aircraft, flights, holdouts, lambda share, _: progress(share))
+    write_gap(args.out, found)
+    if not args.quiet:
+        print(opening_text(found))
+        print(args.out / "report.html")
+
+
+def write_gap(folder: Path, found: Diagnosis) -> None:
+    """Writes gap.json, where.csv, candidates.csv, corrected.yaml, effects.txt and report.html. Raises InputError."""
+    from sysid_node.gap.diagnose import document  # noqa: PLC0415
+    from sysid_node.report.gap import write_gap_report  # noqa: PLC0415
+
+    content = document(found)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
+        _write_csv(folder / "where.csv", ["station", "axis", "share"],
+                   [[w["station"], w["axis"], w["share"]] for w in found.where])  # fmt: skip
+        _write_csv(folder / "candidates.csv", ["effect", "probability"], [list(row) for row in found.attribution.table])
+        (folder / "corrected.yaml").write_text(dump_aircraft(corrected(found)), encoding="utf-8")
+        (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
+        write_gap_report(folder / "report.html", found)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder as --out") from None
+
+
+def corrected(found: Diagnosis) -> Aircraft:
+    """The aircraft file with the derivatives as the flights have them, within their tolerances."""
+    from dataclasses import replace  # noqa: PLC0415
+
+    fit = found.attribution.chosen.fit
+    names, point = fit.views[0].simulator.names, fit.points[0]
+    derivatives = {
+        n: replace(d, value=float(d.value + point[names.index(f"derivative_error.{n}")]))
+        for n, d in found.aircraft.derivatives.items()
+    }
+    return replace(found.aircraft, derivatives=derivatives)
+
+
+def effect_options(found: Diagnosis) -> list[str]:
+    """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
+    fit = found.attribution.chosen.fit
+    simulator = fit.views[0].simulator
+    options = []
+    for cause in found.attribution.causes:
+        indices = cause.candidate.indices or tuple(
+            i for i, (e, _) in enumerate(simulator.parameters) if e == cause.candidate.effect
+        )
+        pairs = [f"{simulator.parameters[i][1].name}={fit.points[0][i]:.6g}" for i in indices]
+        if cause.candidate.effect != "derivative_error":
+            options.append(":".join([cause.candidate.effect, *pairs]))
+    return options
+
+
+def _write_csv(path: Path, header: list[str], rows: list[list[object]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
