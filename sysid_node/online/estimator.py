@@ -96,7 +96,8 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     gain = state.model.momentum(previous[2], now[2])
     area, slant = over_interval(state.model.layout, time - previous[0], previous[1], now[1], gain)
     transform.add(state.transform, previous[0], time, area, slant)
-    count(state, sample[INTERVAL])
+    state.samples += 1
+    state.intervals += sample[INTERVAL]
     if time >= state.renew_at:
         renew(state)
 
@@ -135,12 +136,6 @@ def over_interval(layout: Layout, step: Any, before: Array, after: Array, gain: 
     area[..., layout.rates] = slant[..., layout.deflections]
     slant *= 0.5 * step * step
     return area, slant
-
-
-def count(state: State, interval: float) -> None:
-    """Count a sample and the air data's interval (s) into the present segment."""
-    state.samples += 1
-    state.intervals += interval
 
 
 def interrupt(state: State, time: float) -> None:

@@ -17,7 +17,7 @@ from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
-CHUNK = 4096  # samples whose weights are held at once
+CHUNK = 512  # samples whose weights are held at once
 
 
 def run(
@@ -133,8 +133,9 @@ def _integrate(state: State, chunk: _Chunk, begin: int, end: int) -> None:
         part = slice(begin, stop)
         intervals = chunk.begins[part], chunk.time[part]
         transform.add_many(state.transform, chunk.kernels[part], *intervals, chunk.areas[part], chunk.slants[part])
-        for interval in chunk.intervals[part].tolist():
-            estimator.count(state, interval)
+        state.samples += stop - begin
+        # one after the other, as ``update`` adds them
+        state.intervals = float(np.cumsum(np.append(state.intervals, chunk.intervals[part]))[-1])
         if state.transform.last >= state.renew_at:
             renew(state)
         begin = stop

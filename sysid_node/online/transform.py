@@ -34,36 +34,37 @@ _SMALL = 0.15  # phi up to which the power series of sinc and s are right to 1e-
 
 @dataclass
 class Lines:
-    """The frequency lines and what the weights need of them. Rows of areas' and of slants' weights, P padded lines."""
+    """The frequency lines, padded to P, and what the weights need of them.
+
+    Areas are weighed with cos and -sin, times sinc(phi), slants with -sin and -cos, times s(phi) / h.
+    """
 
     omega: Array  # (F,) rad/s
-    padded: int  # F rounded up to whole registers
-    phase: Array = field(init=False)  # (2, 2P) rad/s
-    shift: Array = field(init=False)  # (2, 2P) rad: cosines become cos and -sin for areas, -sin and -cos for slants
-    series: tuple[Array, Array, Array] = field(init=False)  # (2, 2P): sinc(phi) and s(phi) / h in powers of h^2
+    padded: Array = field(init=False)  # (P,) rad/s: padded to whole registers
+    sign: Array = field(init=False)  # (2, 2P) of the waves
+    series: tuple[Array, Array, Array] = field(init=False)  # (2, 2P): signed gains in powers of h^2
     longest: float = field(init=False)  # s: step up to which the series hold
     padding: NDArray[np.intp] = field(init=False)  # rows that are only there to fill registers
 
     def __post_init__(self) -> None:
-        spare = np.arange(self.omega.size, self.padded)
-        self.padding = np.concatenate([spare, self.padded + spare])
-        w = np.ones(self.padded)
-        w[: self.omega.size] = self.omega
-        self.phase = np.tile(w, (2, 2))
-        self.shift = np.repeat([[0.0, 0.5 * math.pi], [0.5 * math.pi, math.pi]], self.padded, axis=1)
+        F, P = self.omega.size, -(-self.omega.size // _LANES) * _LANES
+        self.padding = np.concatenate([np.arange(F, P), np.arange(P + F, 2 * P)])
+        self.padded = np.ones(P)
+        self.padded[:F] = self.omega
+        self.sign = np.repeat([[1.0, -1.0], [-1.0, -1.0]], P, axis=1)
         # sinc(phi) = 1 - phi^2/6 + phi^4/120 - ..., s(phi) = phi/3 - phi^3/30 + phi^5/840 - ...
-        halved = np.tile(0.5 * w, 2)
+        half = np.tile(0.5 * self.padded, 2)
         self.series = (
-            np.stack([np.ones(2 * self.padded), halved / 3.0]),
-            np.stack([-(halved**2) / 6.0, -(halved**3) / 30.0]),
-            np.stack([halved**4 / 120.0, halved**5 / 840.0]),
+            np.stack([np.ones(2 * P), half / 3.0]) * self.sign,
+            np.stack([-(half**2) / 6.0, -(half**3) / 30.0]) * self.sign,
+            np.stack([half**4 / 120.0, half**5 / 840.0]) * self.sign,
         )
         self.longest = 2.0 * _SMALL / float(self.omega[-1])
 
     @property
     def rows(self) -> int:
         """Rows that are accumulated: real parts, imaginary parts (both padded), and the integral (zero frequency)."""
-        return 2 * self.padded + 1
+        return 2 * self.padded.size + 1
 
     @property
     def count(self) -> int:
@@ -75,15 +76,16 @@ def lines(start_hz: float, step_hz: float, stop_hz: float) -> Lines:
     """Lines from start to stop (Hz), both included where the step meets them."""
     count = math.floor((stop_hz - start_hz) / step_hz + 1e-9) + 1
     omega = 2.0 * math.pi * (start_hz + step_hz * np.arange(count, dtype=np.float64))
-    return Lines(omega, -(-count // _LANES) * _LANES)
+    return Lines(omega)
 
 
 def weights(grid: Lines, middle: float, step: float, out: Array) -> None:
     """Weights of an interval's area and slant into ``out`` (2, rows); ``middle`` and ``step`` in s."""
-    square = step * step
-    wave = grid.phase * middle
-    wave += grid.shift
-    np.cos(wave, out=wave)
+    square, P = step * step, grid.padded.size
+    phase = grid.padded * middle
+    wave = np.empty((2, 2 * P))
+    wave[0, :P] = wave[1, P:] = np.cos(phase)
+    wave[0, P:] = wave[1, :P] = np.sin(phase)
     gains = grid.series[2] * square
     gains += grid.series[1]
     gains *= square
@@ -95,12 +97,18 @@ def weights(grid: Lines, middle: float, step: float, out: Array) -> None:
 
 def weights_of_many(grid: Lines, middles: Array, steps: Array) -> Array:
     """(N, 2, rows) weights of N intervals, to the last bit those of ``weights``; middles and steps (N,) s."""
+    kernels, P = blank_kernels(grid, steps.size), grid.padded.size
+    phase = grid.padded * middles[:, None]
+    kernels[:, 0, :P] = kernels[:, 1, P:-1] = np.cos(phase)
+    kernels[:, 0, P:-1] = kernels[:, 1, :P] = np.sin(phase)
     squares = (steps * steps)[:, None, None]
-    gains = (grid.series[2] * squares + grid.series[1]) * squares + grid.series[0]
+    gains = grid.series[2] * squares
+    gains += grid.series[1]
+    gains *= squares
+    gains += grid.series[0]
     for i in np.flatnonzero(steps > grid.longest).tolist():
         gains[i] = _exact_gains(grid, float(steps[i]))
-    kernels = blank_kernels(grid, steps.size)
-    np.multiply(np.cos(grid.phase * middles[:, None, None] + grid.shift), gains, out=kernels[:, :, :-1])
+    kernels[:, :, :-1] *= gains
     return kernels
 
 
@@ -112,10 +120,11 @@ def blank_kernels(grid: Lines, count: int) -> Array:
 
 
 def _exact_gains(grid: Lines, step: float) -> Array:
-    """(2, 2P) sinc(phi) and s(phi) / h."""
-    phi = 0.5 * step * grid.phase[0]
+    """(2, 2P) sinc(phi) and s(phi) / h, signed."""
+    phi = np.tile(0.5 * step * grid.padded, 2)
     sine = np.sin(phi)
-    return np.stack([sine / phi, (sine - phi * np.cos(phi)) / (phi * phi * step)])
+    gains: Array = np.stack([sine / phi, (sine - phi * np.cos(phi)) / (phi * phi * step)]) * grid.sign
+    return gains
 
 
 @dataclass
@@ -222,9 +231,7 @@ def current(state: Transform) -> Array:
         total = state.done.copy()
     if math.isfinite(state.memory):
         total *= math.exp((state.base - state.last) / (2.0 * state.memory))
-    if state.grid.padded == state.grid.count:
-        return total
-    return np.delete(total, state.grid.padding, axis=0)
+    return np.delete(total, state.grid.padding, axis=0) if state.grid.padding.size else total
 
 
 def energy(state: Transform) -> Array:
