@@ -22,7 +22,7 @@ from scipy.special import gdtrix
 
 from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.information import products
-from sysid_node.online.regression import STRONG, Plan, Solution, Uncertainty
+from sysid_node.online.regression import STRONG, Plan, Solution, Uncertainty, misfits
 
 Array = NDArray[np.float64]
 
@@ -107,10 +107,7 @@ def examine(plan: Plan, model: Auxiliary | None, watch: Watch, density_per_gram:
 
 def _suspects(plan: Plan, reference: Reference, gram: Array, energy: float) -> list[int]:
     """Coefficients whose earlier estimates are trusted and miss more than noise, a share of the motion that matters."""
-    C = len(plan.coefficients)
-    v = np.zeros((plan.width, C))
-    v[plan.outputs, np.arange(C)] = 1.0
-    np.add.at(v, (plan.columns[:, None], np.arange(C)), -reference.solution.theta)
+    v = misfits(plan, reference.solution.theta)
     misfit = ((gram @ v) * v).sum(axis=0)
     missed = (misfit > MISFIT * gram.take(plan.square)) & (misfit > NOISY * energy * reference.uncertainty.density)
     firm = (np.where(plan.mine > 0.0, reference.strength[:, None], np.inf) >= STRONG).all(axis=0)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.online import regression
 from sysid_node.online.regression import Plan, Solution
 from sysid_node.online.signals import OFFSET, Layout
 
@@ -60,12 +61,10 @@ def allowed(plan: Plan, solution: Solution, density: Array, bias: Array) -> Arra
     ``bias`` (W, W) is per line and second. The residual of a coefficient holds v' bias v of the noise, v = (1, -theta);
     where that is more than the whole residual, the file's noise is too large, and the excess is not subtracted.
     """
+    v = regression.misfits(plan, solution.theta)
+    noise = ((bias @ v) * v).sum(axis=0)
     share = np.ones(plan.width)
-    for c in range(plan.outputs.size):
-        mine = plan.unknowns(c)
-        members = np.append(plan.columns[mine], plan.outputs[c])
-        v = np.append(-solution.theta[mine, c], 1.0)
-        noise = float(v @ bias[members[:, None], members] @ v)
-        if noise > DOUBT * density[c]:
-            share[members] = np.minimum(share[members], density[c] / noise)
+    for c in np.flatnonzero(noise > DOUBT * density).tolist():
+        members = np.flatnonzero(v[:, c])
+        share[members] = np.minimum(share[members], density[c] / noise[c])
     return np.sqrt(share)

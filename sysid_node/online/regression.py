@@ -138,6 +138,15 @@ def bias_of(plan: Plan, bias: Array) -> Array:
     return entries * plan.counted
 
 
+def misfits(plan: Plan, theta: Array) -> Array:
+    """(W, C) the combinations of signals y - sum theta_j x_j that ``theta`` (P, C) leaves of each coefficient."""
+    C = plan.outputs.size
+    v = np.zeros((plan.width, C))
+    np.add.at(v, (plan.columns[:, None], np.arange(C)), -theta)
+    v[plan.outputs, np.arange(C)] = 1.0
+    return v
+
+
 @dataclass
 class Uncertainty:
     """What the residuals of all coefficients say of the estimates' covariance."""
@@ -157,9 +166,7 @@ def uncertainty(plan: Plan, solution: Solution, info: Information, scale_varianc
     C, P = len(plan.coefficients), plan.columns.size
     if not solution.usable or info.trace_square <= 0.0:
         return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
-    v = np.zeros((plan.width, C))
-    np.add.at(v, (plan.columns[:, None], np.arange(C)), -solution.theta)
-    v[plan.outputs, np.arange(C)] = 1.0
+    v = misfits(plan, solution.theta)
     squares = np.maximum(((info.grams @ v) * v).sum(axis=1), 0.0).T  # (C, B)
     scores = info.scores[:, plan.instruments[:, None], plan.instruments] * plan.same
     used = ((scores * solution.inverse.T).sum(axis=2) @ plan.mine).T  # (C, B): taken up by the unknowns
@@ -188,7 +195,10 @@ def strength(plan: Plan, solution: Solution, info: Information) -> Array:
         return np.zeros(plan.columns.size)
     gram = info.grams.sum(axis=0)
     outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
-    best = np.linalg.pinv(gram[plan.columns[:, None], plan.columns] * plan.same, hermitian=True).diagonal()
+    plain = solve(replace(plan, instruments=plan.columns), gram)
+    if not plain.usable:
+        return np.zeros(plan.columns.size)
+    best = plain.inverse.diagonal()
     achieved = (solution.inverse @ outer @ solution.inverse.T).diagonal()
     efficiency = np.clip(best / np.maximum(achieved, TINY), 0.0, 1.0 - 1e-9)
     freedom = float(info.traces.sum()) ** 2 / info.trace_square
