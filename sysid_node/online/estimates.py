@@ -16,7 +16,7 @@ from sysid_node.online.information import products
 from sysid_node.online.prior import beliefs, weighed
 from sysid_node.online.regression import Solution, student_95
 from sysid_node.online.signals import OFFSET
-from sysid_node.online.state import Renewed, State
+from sysid_node.online.state import Grounds, Renewed, State
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 
 Array = NDArray[np.float64]
@@ -61,27 +61,49 @@ def present(state: State) -> Present | None:
 
 def estimate(state: State, now: float | None = None) -> Estimates:
     """All derivatives of the aircraft's model with their intervals; ``now`` (s) tells how old the last sample is."""
-    current = present(state)
-    if current is None or state.renewed is None:
+    current, renewed = present(state), state.renewed
+    if current is None or renewed is None:
         names = (f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors)
         return Estimates(state.transform.last, {name: _unknown(state, name) for name in names}, {})
     table = state.model.table
+    grounds = renewed.grounds = renewed.grounds or _grounds(state, renewed)
     if state.model.settings.use_prior:
-        _count_beliefs(state, state.renewed, current)
-    slopes, errors = current.solution.theta, np.sqrt(np.maximum(current.variance, 0.0))
-    offsets, offset_errors = _offsets(state, state.renewed, current)
-    quantiles = student_95(state.renewed.uncertainty.freedom)
-    values = np.where(table.offset, offsets[table.coefficient], slopes[table.unknown, table.coefficient]).tolist()
-    spreads = np.where(table.offset, offset_errors[table.coefficient], errors[table.unknown, table.coefficient])
-    halves = (quantiles[table.coefficient] * spreads).tolist()
-    judged = _judge(state, state.renewed, current, np.asarray(values), spreads, now)
-    derivatives = {
-        name: DerivativeEstimate(name, value, error, value - half, value + half, status == "ok", status)
-        for name, value, error, half, status in zip(table.names, values, spreads.tolist(), halves, judged, strict=True)
-    }
+        _count_beliefs(state, renewed, current)
+    offsets, offset_variances = _offsets(state, renewed, current)
+    values = np.concatenate([current.solution.theta.ravel(), offsets]).take(table.place)
+    errors = np.concatenate([current.variance.ravel(), offset_variances]).take(table.place)
+    errors = np.sqrt(np.maximum(errors, 0.0))
+    halves = grounds.quantiles * errors
+    statuses = _judge(state, renewed, grounds, current, values, errors, now)
+    columns = (values, errors, values - halves, values + halves)
+    valid = [status == "ok" for status in statuses]
+    rows = map(DerivativeEstimate, table.names, *(column.tolist() for column in columns), valid, statuses)
+    derivatives = dict(zip(table.names, rows, strict=True))
     for name in table.unformed:
         derivatives[name] = _unknown(state, name)
-    return Estimates(state.transform.last, derivatives, _fits(state, state.renewed, current))
+    return Estimates(state.transform.last, derivatives, _fits(state, grounds, current))
+
+
+def _grounds(state: State, renewed: Renewed) -> Grounds:
+    """What the judgement of all estimates rests on until the next renewal."""
+    table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
+    start, _, stop = state.model.settings.frequencies
+    sound = ((freedom >= ENOUGH_FREEDOM) & ~renewed.lost)[table.coefficient]
+    firm = (renewed.strength >= regression.STRONG)[table.unknown]
+    spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
+    return Grounds(
+        sound=sound & (firm | table.offset) & ~spoilt,
+        spoilt=spoilt,
+        quantiles=student_95(freedom)[table.coefficient],
+        fits=list(
+            zip(
+                np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density).tolist(),
+                freedom.tolist(),
+                [round(renewed.total.samples)] * len(plan.coefficients),
+                strict=True,
+            )
+        ),
+    )
 
 
 def _count_beliefs(state: State, renewed: Renewed, current: Present) -> None:
@@ -104,7 +126,7 @@ def _unknown(state: State, name: str) -> DerivativeEstimate:
 
 
 def _offsets(state: State, renewed: Renewed, current: Present) -> tuple[Array, Array]:
-    """(C,) offsets and standard errors, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency."""
+    """(C,) offsets and their variances, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency."""
     plan = state.plan
     past = renewed.total.integrals - (state.present.integrals if state.present is not None else 0.0)
     integrals = past + current.integrals
@@ -115,65 +137,58 @@ def _offsets(state: State, renewed: Renewed, current: Present) -> tuple[Array, A
     values = integrals[plan.outputs] / weight - x @ current.solution.theta
     variance = renewed.uncertainty.bands[:, 0] * (renewed.total.energy / weight**2)
     variance += renewed.uncertainty.covariance @ x @ x
-    return values, np.sqrt(np.maximum(variance, 0.0))
+    return values, variance
 
 
-def _fits(state: State, renewed: Renewed, current: Present) -> dict[str, FitQuality]:
+def _fits(state: State, grounds: Grounds, current: Present) -> dict[str, FitQuality]:
     """Quality of the fit of each coefficient."""
     plan = state.plan
-    start, _, stop = state.model.settings.frequencies
-    motion = current.gram.take(plan.square)
-    explained = 1.0 - current.solution.residual / np.maximum(motion, 1e-300)
-    deviations = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density)
-    rows = zip(
-        plan.coefficients,
-        np.clip(explained, 0.0, 1.0).tolist(),
-        deviations.tolist(),
-        renewed.uncertainty.freedom.tolist(),
-        strict=True,
-    )
-    return {row[0]: FitQuality(*row, round(renewed.total.samples)) for row in rows}
+    explained = 1.0 - current.solution.residual / np.maximum(current.gram.take(plan.square), 1e-300)
+    shares = np.minimum(np.maximum(explained, 0.0), 1.0).tolist()
+    rows = zip(plan.coefficients, shares, grounds.fits, strict=True)
+    return {coefficient: FitQuality(coefficient, share, *fit) for coefficient, share, fit in rows}
 
 
 def _judge(
-    state: State, renewed: Renewed, current: Present, values: Array, errors: Array, now: float | None
+    state: State, renewed: Renewed, grounds: Grounds, current: Present, values: Array, errors: Array, now: float | None
 ) -> list[str]:
     """(D,) why each estimate is not to be believed, or "ok"."""
-    table, plan = state.model.table, state.plan
+    table = state.model.table
     everywhere = _whole(state, current, now)
     if everywhere:
         return [everywhere] * len(table.names)
-    columns = plan.columns[table.unknown]
-    motion = current.gram[columns, columns]
-    inflation = np.where(table.offset, 1.0, current.solution.inverse[table.unknown, table.unknown] * motion)
-    sizes = np.where(table.size > 0.0, table.size, np.abs(values))
-    small = errors <= state.model.settings.valid_fraction * sizes
-    trusted = renewed.uncertainty.freedom >= ENOUGH_FREEDOM
-    good = small & (inflation <= HOPELESS)
-    good &= (trusted & ~renewed.lost)[table.coefficient]
-    good &= table.offset | (renewed.strength >= regression.STRONG)[table.unknown]
-    spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
-    good &= ~spoilt
+    motion = current.gram.take(table.motion)
+    inflation = current.solution.inverse.diagonal().take(table.unknown) * motion
+    sizes = np.maximum(table.size, np.where(table.size > 0.0, 0.0, np.abs(values)))
+    good = (errors <= state.model.settings.valid_fraction * sizes) & (table.offset | (inflation <= HOPELESS))
+    good &= grounds.sound
     if not state.thrust_known:
         good &= ~table.needs_thrust
     statuses = ["ok"] * len(table.names)
     for i in np.flatnonzero(~good).tolist():
-        c, unknown = int(table.coefficient[i]), int(table.unknown[i])
-        if renewed.lost[c]:
-            statuses[i] = "outside model"
-        elif not state.thrust_known and table.needs_thrust[i]:
-            statuses[i] = "thrust not measured"
-        elif not trusted[c]:
-            statuses[i] = "converging"
-        elif spoilt[i]:
-            statuses[i] = f"{renewed.timing.blamed[c]} not on time"
-        elif inflation[i] > COLLINEAR:
-            statuses[i] = f"collinear with {regression.collinear_with(plan, current.solution, unknown)}"
-        elif not table.offset[i] and motion[i] < BURIED * renewed.total.bias[columns[i], columns[i]]:
-            statuses[i] = "not excited"
-        else:
-            statuses[i] = "converging"
+        statuses[i] = _reason(state, renewed, grounds, current, i, float(inflation[i]), float(motion[i]))
     return statuses
+
+
+def _reason(
+    state: State, renewed: Renewed, grounds: Grounds, current: Present, i: int, inflation: float, motion: float
+) -> str:
+    """Why estimate i is not believed; ``inflation`` of its variance by the others, ``motion`` of its regressor."""
+    table, plan = state.model.table, state.plan
+    c, unknown, slope = int(table.coefficient[i]), int(table.unknown[i]), not table.offset[i]
+    column = plan.columns[unknown]
+    reasons = (
+        (renewed.lost[c], "outside model"),
+        (not state.thrust_known and table.needs_thrust[i], "thrust not measured"),
+        (renewed.uncertainty.freedom[c] < ENOUGH_FREEDOM, "converging"),
+        (grounds.spoilt[i], f"{renewed.timing.blamed.get(c)} not on time"),
+        (slope and inflation > COLLINEAR, "collinear"),
+        (slope and motion < BURIED * renewed.total.bias[column, column], "not excited"),
+    )
+    reason = next((text for holds, text in reasons if holds), "converging")
+    if reason == "collinear":
+        return f"collinear with {regression.collinear_with(plan, current.solution, unknown)}"
+    return reason
 
 
 def _whole(state: State, current: Present, now: float | None) -> str:

@@ -41,6 +41,16 @@ class Model:
     memory: float  # s, inf = nothing is forgotten
 
 
+@dataclass(frozen=True)
+class Grounds:
+    """What the judgement of the D estimates rests on between renewals."""
+
+    sound: NDArray[np.bool_]  # (D,) nothing speaks against it but its own error
+    spoilt: NDArray[np.bool_]  # (D,) by a control that is not on time
+    quantiles: Array  # (D,) half an interval over a standard error
+    fits: list[tuple[float, float, int]]  # by coefficient: what ``FitQuality`` says besides R squared
+
+
 @dataclass
 class Renewed:
     """What ``renew`` last found; per-sample estimates lean on it until the next time."""
@@ -54,6 +64,7 @@ class Renewed:
     timing: Timing  # whether the controls are felt when they are measured
     strength: Array  # (P,) of the instruments
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
+    grounds: Grounds | None = None  # made when first wanted
 
 
 @dataclass

@@ -19,6 +19,8 @@ class Table:
     coefficient: NDArray[np.intp]  # (D,) index into the plan's coefficients
     unknown: NDArray[np.intp]  # (D,) index into the plan's unknowns; 0 for an offset
     offset: NDArray[np.bool_]  # (D,) whether it is a C_0
+    place: NDArray[np.intp]  # (D,) index among the slopes (P x C) and, behind them, the offsets (C,)
+    motion: NDArray[np.intp]  # (D,) index of its regressor's energy in the Gram matrix (W x W)
     size: NDArray[np.float64]  # (D,) what a standard error is measured against; 0 = the estimate itself
     needs_thrust: NDArray[np.bool_]  # (D,) meaningless without a measured thrust
     unformed: tuple[str, ...]  # derivatives whose equation cannot be formed
@@ -32,21 +34,25 @@ def table(aircraft: Aircraft, plan: Plan) -> Table:
     """
     names, coefficients, unknowns, offsets, sizes, unformed = [], [], [], [], [], []
     for name, belief in aircraft.derivatives.items():
-        coefficient, _, regressor = name.partition("_")
-        if coefficient not in plan.coefficients:
+        of, _, regressor = name.partition("_")
+        if of not in plan.coefficients:
             unformed.append(name)
             continue
-        c = plan.coefficients.index(coefficient)
+        c = plan.coefficients.index(of)
         names.append(name)
         coefficients.append(c)
         offsets.append(regressor == "0")
         unknowns.append(next((int(i) for i in plan.unknowns(c) if plan.regressors[i] == regressor), 0))
         sizes.append(max(abs(belief.value), 2.0 * (belief.tolerance or 0.0)))
+    coefficient, unknown, offset = np.array(coefficients, np.intp), np.array(unknowns, np.intp), np.array(offsets)
+    P, C = plan.mine.shape
     return Table(
         names=tuple(names),
-        coefficient=np.array(coefficients, dtype=np.intp),
-        unknown=np.array(unknowns, dtype=np.intp),
-        offset=np.array(offsets),
+        coefficient=coefficient,
+        unknown=unknown,
+        offset=offset,
+        place=np.where(offset, P * C, unknown * C) + coefficient,
+        motion=plan.columns[unknown] * (plan.width + 1),
         size=np.array(sizes),
         needs_thrust=np.array([name in ("CL_0", "CD_0") for name in names]),
         unformed=tuple(unformed),
