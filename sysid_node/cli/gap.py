@@ -80,7 +80,7 @@ def corrected(found: Diagnosis) -> Aircraft:
     """The aircraft file with the derivatives as the flights have them, within their tolerances."""
     from dataclasses import replace  # noqa: PLC0415
 
-    fit = found.attribution.chosen.fit
+    fit = found.attribution.corrected
     names, point = fit.views[0].simulator.names, fit.points[0]
     derivatives = {
         n: replace(d, value=float(d.value + point[names.index(f"derivative_error.{n}")]))
@@ -91,7 +91,7 @@ def corrected(found: Diagnosis) -> Aircraft:
 
 def effect_options(found: Diagnosis) -> list[str]:
     """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
-    fit = found.attribution.chosen.fit
+    fit = found.attribution.corrected
     simulator = fit.views[0].simulator
     options = []
     for cause in found.attribution.causes:

@@ -16,7 +16,7 @@ from sysid_node.gap.candidates import Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
-from sysid_node.gap.structure import Structure, structure_of
+from sysid_node.gap.structure import Structure, instrumented, structure_of
 from sysid_node.gap.view import View
 
 #: Effects at once, at most.
@@ -59,6 +59,7 @@ class Attribution:
 
     base: Trial  # nuisances only
     chosen: Trial
+    corrected: Fit  # chosen, its unknowns as gusts do not bias them
     before: Structure  # of what the nuisances leave
     left: Structure  # of what the chosen effects leave
     causes: tuple[Cause, ...]
@@ -85,7 +86,8 @@ def attribute(views: Sequence[View], nuisances: Nuisances, progress: Progress) -
     chosen = _backward(base, chosen, nuisances)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
     causes = _causes(base, chosen, stages, candidates, nuisances, progress)
-    return Attribution(base, chosen, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
+    corrected = instrumented(instrumented(chosen.fit))
+    return Attribution(base, chosen, corrected, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
 
 
 def _share_of(progress: Progress, count: int) -> Progress:

@@ -19,6 +19,7 @@ from sysid_node.gap.fit import Fit
 from sysid_node.gap.flights import RATE, Flight
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.structure import instrumented
 from sysid_node.gap.view import View, view_of
 from sysid_node.sim import Simulator
 from sysid_node.sim.prediction import COEFFICIENTS
@@ -37,6 +38,9 @@ _NAMED = 0.03
 
 #: Power over the sensors' noise below which a flight tells nothing, and below which nothing moves at all.
 _TELLING = 6.0
+
+#: Travel below which no surface counts as moved, rad.
+_TRAVEL = 0.015
 
 #: Ratio of measured to expected mean lift beyond which a flight is another aircraft's.
 _LIFT = 2.5
@@ -77,7 +81,7 @@ def diagnose(
     if holdouts:
         unseen = [_checked(view_of(simulator, flight)) for flight in holdouts]
         own = [nuisances_of(aircraft, view) for view in unseen]
-        base, final = (held_out(t.fit, unseen, own) for t in (attribution.base, attribution.chosen))
+        base, final = (held_out(f, unseen, own) for f in (instrumented(attribution.base.fit), attribution.corrected))
     else:
         unseen, base, final = views, attribution.base.evidence, attribution.chosen.evidence
     neutral = simulator.neutral()
@@ -106,11 +110,11 @@ def _require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> No
 def _checked(view: View) -> View:
     """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
     commands = np.asarray(view.signals.commands)[: len(view.record), :-1]
-    if (np.ptp(commands, axis=0) < 1e-6).all():
-        raise InputError(f"{view.flight.source}: no control surface moves; fly a manoeuvre (sysid excite designs one)")
-    if _excitation(view).max() < 1.5:
+    travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
+    if (travel < _TRAVEL).all():
         raise InputError(
-            f"{view.flight.source}: nothing moves above the sensors' noise; fly a manoeuvre (sysid excite designs one)"
+            f"{view.flight.source}: no control surface moves by more than {travel.max():.2g} rad; fly a manoeuvre "
+            "(sysid excite designs one)"
         )
     lift, expected = view.series[:, 0].mean(), view.predicted_series(view.simulator.neutral())[:, 0].mean()
     if not 1.0 / _LIFT < lift / expected < _LIFT:
@@ -206,7 +210,7 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
         "station": cause.candidate.station,
-        "parameters": parameters(found.attribution.chosen.fit, cause),
+        "parameters": parameters(found.attribution.corrected, cause),
         "probability": probability(found.attribution, cause),
         "gap_after": found.gap.after,
         "indistinguishable_from": [effect for effect, p in cause.alternatives if p > _NAMED],

@@ -42,7 +42,7 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
     """Shares of the gap by station and axis, adding up to one; the largest first."""
     views = attribution.base.fit.views
     scale = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in views)
-    powers = [_power(before), *(_power(r) for r in _steps(attribution.chosen.fit))]
+    powers = [_power(before), *(_power(r) for r in _steps(attribution.corrected))]
     stations = [*(c.station for c in attribution.chosen.fit.candidates), "aerodynamics"]
     parts: dict[tuple[str, int], float] = {}
     for station, high, low in zip(stations, powers, powers[1:], strict=False):

@@ -94,6 +94,10 @@ def _solution(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], slopes
             seen = directions.T @ J[:, :, axis].reshape(-1, J.shape[3])
             information += seen.T @ seen
             right += seen.T @ (directions.T @ r[:, :, axis].ravel())
+    for r, J in zip(fit.rows, fit.slopes, strict=True):  # means, from which gusts average out
+        mean = J.reshape(J.shape[0], -1, 6, J.shape[2])[:, 0].reshape(-1, J.shape[2])
+        information += mean.T @ mean
+        right += mean.T @ r.reshape(r.shape[0], -1, 6)[:, 0].ravel()
     return solve(information, right), information
 
 
@@ -122,7 +126,7 @@ def instruments(view: View) -> Array:
     given, record = _deliberate(view), view.record
     columns = [_lagged(given[:, i], lag, view.simulator.step) for i in range(given.shape[1]) for lag in _LAGS]
     alpha, beta, speed = (record[n] - record[n].mean() for n in ("alpha", "beta", "V"))
-    columns += [alpha**2, np.abs(beta), speed * alpha, alpha * np.abs(alpha) * (alpha > 0)]
+    columns += [alpha**2, np.abs(beta), speed * alpha]
     columns += [series for i in range(given.shape[1]) for series in (given[:, i] ** 2, given[:, i] ** 3)]
     table = np.column_stack(columns)
     table = table - table.mean(axis=0)

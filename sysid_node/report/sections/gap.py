@@ -121,7 +121,7 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
 def flight(found: Diagnosis) -> Mapping[str, Any]:
     """The coefficients as measured, as the file has them, and as corrected."""
     view = found.views[0]
-    fit = found.attribution.chosen.fit
+    fit = found.attribution.corrected
     neutral = view.simulator.neutral()
     point = neutral.copy()
     shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]

@@ -1,0 +1,40 @@
+"""What the tests of the gap share: flights of known effects, flown once."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from gap_flights import fly
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.gap.flights import Flight
+from sysid_node.gap.view import View, view_of
+from sysid_node.sim import Simulator
+
+Effects = Mapping[str, Mapping[str, float]]
+
+
+@pytest.fixture(scope="session")
+def aircraft() -> Aircraft:
+    return load_aircraft("cdrw")
+
+
+@pytest.fixture(scope="session")
+def make_flight(aircraft: Aircraft) -> Callable[..., Flight]:
+    return lambda effects, **conditions: fly(aircraft, effects, **conditions)
+
+
+@pytest.fixture(scope="session")
+def plain(aircraft: Aircraft) -> Flight:
+    return fly(aircraft, {}, seed=1)
+
+
+@pytest.fixture(scope="session")
+def plain_view(aircraft: Aircraft, plain: Flight) -> View:
+    return view_of(Simulator(aircraft, 50.0), plain)
+
+
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(3)

@@ -1,0 +1,39 @@
+"""Flights of known effects for the tests: recorded as a bag would be, and aligned again."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.flight.align import flight_record
+from sysid_node.gap.flights import Flight, complete
+from sysid_node.sim import Simulator
+from sysid_node.sim.recording import Recorder
+from sysid_node.sim.sortie import Conditions, fly_sortie
+
+RATE = 100.0
+STEPS = [
+    "3211:elevator:amplitude=0.06:width=0.3:start=1:every=8:repeat=3",
+    "3211:aileron:amplitude=0.06:width=0.25:start=4:every=8:repeat=3",
+    "3211:rudder:amplitude=0.12:width=0.3:start=6:every=8:repeat=3",
+]
+
+
+def fly(
+    aircraft: Aircraft,
+    effects: Mapping[str, Mapping[str, float]],
+    seed: int = 1,
+    turbulence: str = "none",
+    manoeuvre: list[str] | None = None,
+    duration: float = 26.0,
+) -> Flight:
+    """A flight of these effects at the hands of the autopilot, 3-2-1-1 on each surface in turn."""
+    simulator = Simulator(aircraft, RATE)
+    deflections = np.zeros((round(duration * RATE) + 1, 4))
+    if manoeuvre != []:
+        plan = parse_manoeuvre(STEPS if manoeuvre is None else manoeuvre, aircraft, RATE, duration)
+        deflections[:, :3] = plan.surfaces()
+    sortie = fly_sortie(simulator, deflections, Conditions(effects, turbulence=turbulence, seed=seed))
+    record = flight_record(aircraft, Recorder(100.0, 100.0, 100.0).record(sortie), 0.2)
+    return complete(aircraft, Flight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))

@@ -1,0 +1,52 @@
+"""What is put in is found again, by name and size, through derivatives that are wrong; truth: the effects flown."""
+
+import json
+
+import pytest
+from gap_flights import fly
+
+from sysid_node.errors import InputError
+from sysid_node.gap.diagnose import diagnose, document
+
+WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
+
+
+@pytest.fixture(scope="module")
+def lagging(aircraft):
+    effects = {"actuator_lag": {"time_constant": 0.08}, "derivative_error": WRONG}
+    return diagnose(aircraft, [fly(aircraft, effects, seed=5)], [fly(aircraft, effects, seed=6)])
+
+
+def test_a_lag_is_named_with_its_size(lagging) -> None:
+    assert lagging.verdict == "explained"
+    (cause,) = document(lagging)["causes"]
+    assert cause["effect"] == "actuator_lag" and cause["station"] == "actuator"
+    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.08, rel=0.15)
+
+
+def test_the_gap_closes_on_flight_held_out(lagging) -> None:
+    gap = lagging.gap
+    assert gap.after < 0.5 * gap.tolerances < 0.5 * gap.before
+    assert gap.after < 1.5 * gap.noise_floor
+    assert gap.ci95[0] <= gap.shrink_percent <= gap.ci95[1]
+
+
+def test_the_document_is_json_and_its_shares_add_up(lagging) -> None:
+    found = json.loads(json.dumps(document(lagging), allow_nan=False))
+    assert sum(w["share"] for w in found["where"]) == pytest.approx(1.0)
+    assert {"verdict", "gap", "where", "causes", "unexplained", "next_flight"} <= found.keys()
+
+
+def test_tolerances_are_no_gap(aircraft) -> None:
+    flight = fly(aircraft, {"derivative_error": WRONG}, seed=7)
+    assert diagnose(aircraft, [flight], []).verdict == "no_gap"
+
+
+def test_a_held_out_flight_must_be_another(aircraft, plain) -> None:
+    with pytest.raises(InputError, match="is the same flight"):
+        diagnose(aircraft, [plain], [plain])
+
+
+def test_a_flight_in_which_nothing_moves_is_said(aircraft) -> None:
+    with pytest.raises(InputError, match="moves"):
+        diagnose(aircraft, [fly(aircraft, {}, seed=8, manoeuvre=[])], [])
