@@ -120,7 +120,7 @@ def _checked(view: View) -> View:
     if not 1.0 / _LIFT < lift / expected < _LIFT:
         raise InputError(
             f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
-            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as its derivatives have it; another aircraft's flight?"
+            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; another aircraft's flight?"
         )
     return view
 

@@ -1,9 +1,10 @@
 """Evidence: how probable flight is that a fit has not seen, and the probabilities of explanations that follow.
 
 Each group of windows is predicted from the others (or from the training flights), with the uncertainty of everything
-that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12; 5.10-5.12 leave out). Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities
-mean no more than so many independent observations can say (Yao, Vehtari, Simpson & Gelman (2018), Bayesian Analysis
-13(3), "pseudo-BMA+").
+that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12; 5.10-5.12 leave out).
+Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities mean no
+more than so many independent observations can say (Yao, Vehtari, Simpson & Gelman (2018), Bayesian Analysis 13(3),
+"pseudo-BMA+").
 """
 
 from __future__ import annotations

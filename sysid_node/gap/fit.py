@@ -1,9 +1,9 @@
 """Fits: the parameters of a set of candidates by least squares, the nuisances eliminated by linear algebra.
 
 Variable projection (Golub & Pereyra (1973), SIAM J. Numer. Anal. 10(2); Kaufman's (1975) Jacobian): at given weights
-the nuisances enter linearly about where they are, with their priors as further rows; what is left of residual and slopes
-after projecting them out is a small nonlinear problem. Weights are the residual's own spectrum, never below the noise
-of the sensors.
+the nuisances enter linearly about where they are, with their priors as further rows; what is left of residual and
+slopes after projecting them out is a small nonlinear problem. Weights are the residual's own spectrum, never below the
+noise of the sensors.
 """
 
 from __future__ import annotations
