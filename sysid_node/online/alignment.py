@@ -40,6 +40,8 @@ def _is_regular(bulk: Alignment, streams: Streams, max_gap: float) -> bool:
         (bulk.right[0] < bulk.others[0].stamps.size) & (bulk.right[1] < bulk.others[1].stamps.size)
     )
     imu, buffer = bulk.imu, buffer_ns(max_gap)
+    if any(topic.stamps.size > 1 and int(np.diff(topic.stamps).max()) > buffer for topic in topics):
+        return False  # a silence longer than the buffer: what waited for its end was given up before
     complete = imu.order[decided]  # when the last of the messages that a sample needs has come
     for other, right in zip(bulk.others, bulk.right, strict=True):
         complete = np.maximum(complete, other.order[right[decided]])
