@@ -110,8 +110,9 @@ def _motion(aircraft: Aircraft, time: Array, samples: Array, history: Sequence[E
     inertial = (X * sa - Z * ca, -X * ca - Z * sa, Y, L, M, N)  # of rates and of the IMU's lever arm
     k = row[OFFSET]
     measured = {c: (row[i] + inertial[i]) / k for i, c in enumerate(COEFFICIENTS)}
-    names = layout(aircraft).regressors
-    regressors = {name: x / k for name, x in zip(names, row[len(row) - len(names) :], strict=True)}
+    columns = layout(aircraft)
+    # the row lacks the drift, which stands before the regressors
+    regressors = {name: row[columns.column(name) - 1] / k for name in columns.regressors}
     modelled = _modelled(aircraft, {"0": np.ones(time.size), **regressors}, history[-1]) if history else {}
     controls = {symbol: filled[:, len(SAMPLE_COLUMNS) + i] for i, symbol in enumerate(aircraft.control_symbols)}
     return Motion(time, controls, measured, modelled)
