@@ -13,6 +13,11 @@ the vector's entries (``derivative_error.Cm_alpha`` is added to the file's Cm_al
 ``initial`` are pure: ``jax.vmap`` and ``jax.jacfwd`` them as you like. Surfaces, thrust and gusts are linear between
 samples.
 
+``prediction`` is the same chain on measured signals: ``predict_coefficients(simulator, theta, signals_of(simulator,
+record))`` and its slopes, without integrating the motion. ``sortie`` flies whole flights (trim, weather, autopilot,
+noise), ``recording`` turns them into messages, ``dryden`` makes turbulence, ``export`` writes other simulators' models.
+The page docs/effects.md describes every effect.
+
 Everything is SI, radians, body axes forward-right-down, float64.
 """
 

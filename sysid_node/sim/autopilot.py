@@ -105,7 +105,8 @@ def _fly_held(
 
     def pilot(state: _State, outputs: Scalar, planned: Scalar) -> tuple[Scalar, Scalar, _State]:
         error = outputs[columns] - autopilot.hold
-        wanted = autopilot.gains @ error + autopilot.integral @ state.integral
+        # sums, not matrix products: XLA would call a library for these and leave the loop's kernel
+        wanted = jnp.sum(autopilot.gains * error + autopilot.integral * state.integral, axis=1)
         correction = jnp.clip(wanted, -autopilot.limit, autopilot.limit)
         held = jnp.any(jnp.abs(wanted) > autopilot.limit)  # no winding up
         given = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)

@@ -54,8 +54,6 @@ class Carry(NamedTuple):
     motor: Scalar  # thrust N
     motor_command: Scalar  # N
     drive: Drive
-    surfaces: Scalar  # (controls + 1,)
-    command: Scalar  # (controls + 1,)
     truth: Scalar  # (3,) airspeed, alpha, beta at the probe one sample before
     probe: Scalar  # (3,) the same, lagged
     pilot: Any
@@ -75,16 +73,23 @@ def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state
     time = jnp.arange(inputs.commands.shape[0]) * chain.step
     gusts = airflow.gusts(chain.model, chain.effects, inputs.gusts, inputs.turbulence, time)
     coming = (_next(inputs.commands), _next(gusts), time + chain.step, inputs.noise)
-    carry = _start(chain, initial, inputs.commands[0], gusts[0], pilot_state)
-    _, flight = jax.lax.scan(lambda c, new: _step(chain, pilot, c, *new), carry, coming)
-    stamped = clock.stamp(chain.effects, _continuous_angles(flight.outputs), chain.step)
-    return flight._replace(outputs=sensors.noisy(chain.model, chain.effects, stamped, inputs.noise))
+    carry, surfaces = _start(chain, initial, inputs.commands[0], gusts[0], pilot_state)
+    _, rows = jax.lax.scan(lambda c, new: _step(chain, pilot, c, *new), carry, coming)
+    readings, states, coefficients, moved = rows
+    stamped = clock.stamp(chain.effects, _continuous_angles(readings), chain.step)
+    outputs = sensors.noisy(chain.model, chain.effects, stamped, inputs.noise)
+    surfaces, commands = jnp.split(_previous(jnp.concatenate([surfaces, inputs.commands[0]]), moved), 2, axis=1)
+    return Flight(outputs, states, surfaces, commands, coefficients)
 
 
 def _step(
     chain: Chain, pilot: Pilot, carry: Carry, planned: Scalar, gusts: Scalar, time: Scalar, noise: Scalar
-) -> tuple[Carry, Flight]:
-    """Reads the instruments now, then moves on to ``time``, that of the next sample."""
+) -> tuple[Carry, tuple[Scalar, ...]]:
+    """Reads the instruments now, then moves on to ``time``, that of the next sample.
+
+    Returns readings (12,), state (13,) and coefficients (6,) now; surfaces and command of the next sample in one row:
+    kept apart, or handed through the carry, XLA copies the whole series of commands at every step.
+    """
     h = chain.step
     k1, motion = derivative(chain, carry.x, carry.drive)
     truth, probe, reading = _read(chain, carry, motion)
@@ -95,8 +100,9 @@ def _step(
     motor = propulsion.advance(chain.effects, carry.motor, carry.motor_command, motor_command, h)
     drive, surfaces = drive_of(chain, actuators, motor, gusts, time)
     x = _runge_kutta(chain, carry.x, k1, carry.drive, drive)
-    flight = Flight(reading, carry.x[:13], carry.surfaces, carry.command, jnp.stack(motion.coefficients))
-    return Carry(x, actuators, motor, motor_command, drive, surfaces, given, truth, probe, pilot_state), flight
+    moved = jnp.concatenate([surfaces, given])
+    row = (reading, carry.x[:13], jnp.stack(motion.coefficients), moved)
+    return Carry(x, actuators, motor, motor_command, drive, truth, probe, pilot_state), row
 
 
 #: Stages 2 to 4 of the classical rule: where each is evaluated, as a share of the step, and its weight.
@@ -153,15 +159,15 @@ def _at_probe(chain: Chain, motion: Motion) -> Scalar:
     return jnp.stack(sensors.at_probe(motion.air.velocity, motion.air.rates, arm))
 
 
-def _start(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> Carry:
-    """Everything settled on the first sample's command and flow."""
+def _start(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[Carry, Scalar]:
+    """Everything settled on the first sample's command and flow, and the surfaces (controls + 1,) there."""
     actuators = actuator.start(chain.model, planned[:-1])
     motor = propulsion.commanded(chain.model, planned[-1])
     drive, surfaces = drive_of(chain, actuators, motor, gusts, jnp.zeros_like(chain.step))
     x = settled(chain, initial, drive)
     _, motion = derivative(chain, x, drive)
     truth = _at_probe(chain, motion)
-    return Carry(x, actuators, motor, motor, drive, surfaces, planned, truth, truth, pilot_state)
+    return Carry(x, actuators, motor, motor, drive, truth, truth, pilot_state), surfaces
 
 
 def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:
@@ -178,6 +184,11 @@ def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:
 def _next(series: Scalar) -> Scalar:
     """Each row's successor; the last repeats."""
     return jnp.concatenate([series[1:], series[-1:]])
+
+
+def _previous(first: Scalar, series: Scalar) -> Scalar:
+    """Each row's predecessor, the first one given."""
+    return jnp.concatenate([first[None], series[:-1]])
 
 
 def _continuous_angles(outputs: Scalar) -> Scalar:

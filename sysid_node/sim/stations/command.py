@@ -18,4 +18,5 @@ def arrive_from_history(effects: dict[str, Values], history: Scalar, step: Scala
     """The command (m,) that reaches the actuators now; ``history`` (K, m) of commands, the newest last."""
     position = jnp.arange(history.shape[0])[::-1]
     weight = jnp.maximum(1.0 - jnp.abs(position - effects["command_delay"]["delay"] / step), 0.0)
-    return weight @ history
+    # a sum, not a matrix product: XLA would call a library for it and leave the loop's kernel
+    return jnp.sum(weight[:, None] * history, axis=0)
