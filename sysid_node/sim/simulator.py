@@ -23,6 +23,9 @@ from sysid_node.sim.stations.airflow import velocity_of
 
 Array = NDArray[np.float64]
 
+#: No reading of a flight that means anything is larger, in SI units.
+_SOUND = 1e4
+
 _rollout = jax.jit(rollout, static_argnums=0)
 
 
@@ -161,10 +164,10 @@ class Simulator:
         return slopes
 
     def check(self, flight: Flight) -> Flight:
-        """The flight, if it is finite throughout. Raises InputError naming the time at which it diverged."""
-        finite = np.isfinite(np.asarray(flight.outputs)).all(axis=1)
-        if not finite.all():
-            when = int(np.argmin(finite)) * self.step
+        """The flight, if it stays within what flies. Raises InputError naming the time at which it diverged."""
+        sound = (np.abs(np.asarray(flight.outputs)) < _SOUND).all(axis=1)  # false for NaN
+        if not sound.all():
+            when = int(np.argmin(sound)) * self.step
             raise InputError(
                 f"aircraft {self.aircraft.name!r}: the flight diverged at {when:.2f} s; "
                 "use smaller deflections or effects, the autopilot, or a stable aircraft"

@@ -20,12 +20,16 @@ _OPTIONS = {
     ),
 }
 
+#: Releases that have these options: one that has not would end the process at the first compilation.
+_KNOWS = "0.10."
+
 
 def configure() -> None:
     """Set float64 and, where the user has not set them, the compiler's options and the persistent cache."""
-    flags = os.environ.get("XLA_FLAGS", "")
-    missing = [f"{option}={value}" for option, value in _OPTIONS.items() if option not in flags]
-    os.environ["XLA_FLAGS"] = " ".join([flags, *missing]).strip()
+    if jax.__version__.startswith(_KNOWS):
+        flags = os.environ.get("XLA_FLAGS", "")
+        missing = [f"{option}={value}" for option, value in _OPTIONS.items() if option not in flags]
+        os.environ["XLA_FLAGS"] = " ".join([flags, *missing]).strip()
     _set("jax_enable_x64", True)
     if jax.config.jax_compilation_cache_dir is None:  # type: ignore[attr-defined]
         _set("jax_compilation_cache_dir", str(_cache_folder()))

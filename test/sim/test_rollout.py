@@ -184,13 +184,14 @@ def test_rollouts_may_be_batched(simulator, flown):
     assert np.abs(batch.outputs[1] - batch.outputs[0]).max() > 0.01
 
 
-def test_divergence_is_one_clear_line():
-    unstable = {**DERIVATIVES, "Cm_alpha": 3.0, "Cm_q": 0.0}
-    simulator = Simulator(make_aircraft(unstable), 100.0)
+@pytest.mark.parametrize(("elevator", "when"), [(np.nan, r"0\.00"), (0.2, r"0\.\d\d")])
+def test_divergence_is_one_clear_line(elevator, when):
+    """Bad numbers, and an aircraft whose flight model gives energy instead of taking it."""
+    simulator = Simulator(make_aircraft({**DERIVATIVES, "Cm_q": 2000.0, "CD_0": -5.0}), 100.0)
     initial = simulator.initial(18.0, 0.1, 0.0, (0.0, 0.1, 0.0))
-    commands = np.tile([np.nan, 0, 0, 4.0], (SAMPLES, 1))
+    commands = np.tile([elevator, 0, 0, 4.0], (SAMPLES, 1))
     flight = simulator.rollout(simulator.neutral(), initial, simulator.inputs(commands))
-    with pytest.raises(InputError, match=r"diverged at 0\.00 s; use smaller"):
+    with pytest.raises(InputError, match=rf"diverged at {when} s; use smaller"):
         simulator.check(flight)
 
 
