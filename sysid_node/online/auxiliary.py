@@ -49,7 +49,8 @@ def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxilia
 def with_instruments(model: Auxiliary, lines: Array) -> Array:
     """(2F, W) the transformed lines (2F, T), and behind them the instruments'."""
     F, T = model.gains.shape[0], lines.shape[1]
-    deflections = lines[:F, model.controls] + 1j * lines[F:, model.controls]
+    deflections = np.empty((F, model.gains.shape[2]), dtype=complex)
+    deflections.real, deflections.imag = lines[:F, model.controls], lines[F:, model.controls]
     made = (model.gains @ deflections[:, :, None])[:, :, 0]
     every = np.empty((2 * F, T + made.shape[1]))
     every[:, :T] = lines

@@ -159,36 +159,35 @@ def _judge(
         return [everywhere] * len(table.names)
     motion = current.gram.take(table.motion)
     inflation = current.solution.inverse.diagonal().take(table.unknown) * motion
-    sizes = np.maximum(table.size, np.where(table.size > 0.0, 0.0, np.abs(values)))
-    good = (errors <= state.model.settings.valid_fraction * sizes) & (table.offset | (inflation <= HOPELESS))
-    good &= grounds.sound
+    good = (errors <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
+    good &= table.offset | (inflation <= HOPELESS)
     if not state.thrust_known:
         good &= ~table.needs_thrust
-    statuses = ["ok"] * len(table.names)
-    for i in np.flatnonzero(~good).tolist():
-        statuses[i] = _reason(state, renewed, grounds, current, i, float(inflation[i]), float(motion[i]))
-    return statuses
+    if good.all():
+        return ["ok"] * len(table.names)
+    reasons = _reasons(state, renewed, grounds, current, inflation, motion)
+    return ["ok" if ok else reason for ok, reason in zip(good.tolist(), reasons, strict=True)]
 
 
-def _reason(
-    state: State, renewed: Renewed, grounds: Grounds, current: Present, i: int, inflation: float, motion: float
-) -> str:
-    """Why estimate i is not believed; ``inflation`` of its variance by the others, ``motion`` of its regressor."""
-    table, plan = state.model.table, state.plan
-    c, unknown, slope = int(table.coefficient[i]), int(table.unknown[i]), not table.offset[i]
-    column = plan.columns[unknown]
-    reasons = (
-        (renewed.lost[c], "outside model"),
-        (not state.thrust_known and table.needs_thrust[i], "thrust not measured"),
-        (renewed.uncertainty.freedom[c] < ENOUGH_FREEDOM, "converging"),
-        (grounds.spoilt[i], f"{renewed.timing.blamed.get(c)} not on time"),
-        (slope and inflation > COLLINEAR, "collinear"),
-        (slope and motion < BURIED * renewed.total.bias[column, column], "not excited"),
-    )
-    reason = next((text for holds, text in reasons if holds), "converging")
-    if reason == "collinear":
-        return f"collinear with {regression.collinear_with(plan, current.solution, unknown)}"
-    return reason
+def _reasons(
+    state: State, renewed: Renewed, grounds: Grounds, current: Present, inflation: Array, motion: Array
+) -> list[str]:
+    """(D,) what speaks against each estimate; ``inflation`` of variances by the others, ``motion`` of regressors."""
+    table, c = state.model.table, state.model.table.coefficient
+    reasons = np.full(len(table.names), "converging", dtype=object)
+    # what is found later counts more
+    buried = motion < BURIED * renewed.total.bias.take(table.motion)
+    reasons[buried & ~table.offset] = "not excited"
+    collinear = (inflation > COLLINEAR) & ~table.offset
+    if collinear.any():
+        names = regression.rivals(state.plan, current.solution)
+        reasons[collinear] = [f"collinear with {names[i]}" for i in table.unknown[collinear].tolist()]
+    reasons[grounds.spoilt] = [f"{renewed.timing.blamed[i]} not on time" for i in c[grounds.spoilt].tolist()]
+    reasons[(renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = "converging"
+    if not state.thrust_known:
+        reasons[table.needs_thrust] = "thrust not measured"
+    reasons[renewed.lost[c]] = "outside model"
+    return reasons.tolist()
 
 
 def _whole(state: State, current: Present, now: float | None) -> str:

@@ -51,7 +51,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         settings=settings,
         layout=layout,
         plan=plan,
-        table=table(aircraft, plan),
+        table=table(aircraft, plan, settings.valid_fraction),
         spectrum=information.spectrum(grid.omega, memory),
         lowest=_lowest(len(aircraft.controls)),
         signals=signals.scalar_signals(aircraft),

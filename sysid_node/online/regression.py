@@ -211,9 +211,10 @@ def student_95(freedom: Array) -> Array:
     return np.asarray(stdtrit(np.maximum(freedom, 1.0), 0.975))
 
 
-def collinear_with(plan: Plan, solution: Solution, unknown: int) -> str:
-    """The regressor whose estimate is most correlated with this one's."""
+def rivals(plan: Plan, solution: Solution) -> list[str]:
+    """Of each unknown (P,) the regressor of the same equation whose estimate is most correlated with its own."""
     spread = np.sqrt(np.abs(solution.inverse.diagonal()))
-    correlation = np.abs(solution.inverse[unknown]) / (spread * spread[unknown]) * plan.same[unknown]
-    correlation[unknown] = -1.0
-    return plan.regressors[int(np.argmax(correlation))]
+    # each row's own spread is common to all of it
+    correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
+    correlation *= plan.same - plan.unit
+    return [plan.regressors[i] for i in correlation.argmax(axis=1).tolist()]

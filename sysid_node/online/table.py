@@ -21,16 +21,20 @@ class Table:
     offset: NDArray[np.bool_]  # (D,) whether it is a C_0
     place: NDArray[np.intp]  # (D,) index among the slopes (P x C) and, behind them, the offsets (C,)
     motion: NDArray[np.intp]  # (D,) index of its regressor's energy in the Gram matrix (W x W)
-    size: NDArray[np.float64]  # (D,) what a standard error is measured against; 0 = the estimate itself
+    allowed: NDArray[np.float64]  # (D,) the largest standard error of a valid estimate
+    relative: NDArray[
+        np.float64
+    ]  # (D,) ... and its largest share of the estimate, where nothing is believed of the size
     needs_thrust: NDArray[np.bool_]  # (D,) meaningless without a measured thrust
     unformed: tuple[str, ...]  # derivatives whose equation cannot be formed
 
 
-def table(aircraft: Aircraft, plan: Plan) -> Table:
+def table(aircraft: Aircraft, plan: Plan, valid_fraction: float) -> Table:
     """The aircraft's derivatives in the solution of its ``plan``.
 
     A standard error is measured against the believed size of a derivative, or twice its tolerance where that is more:
-    not against the estimate, which would call the large ones of many chance values valid.
+    not against the estimate, which would call the large ones of many chance values valid. An estimate is valid with a
+    standard error under ``valid_fraction`` of that.
     """
     names, coefficients, unknowns, offsets, sizes, unformed = [], [], [], [], [], []
     for name, belief in aircraft.derivatives.items():
@@ -53,7 +57,8 @@ def table(aircraft: Aircraft, plan: Plan) -> Table:
         offset=offset,
         place=np.where(offset, P * C, unknown * C) + coefficient,
         motion=plan.columns[unknown] * (plan.width + 1),
-        size=np.array(sizes),
+        allowed=valid_fraction * np.array(sizes),
+        relative=np.where(np.array(sizes) > 0.0, 0.0, valid_fraction),
         needs_thrust=np.array([name in ("CL_0", "CD_0") for name in names]),
         unformed=tuple(unformed),
     )
