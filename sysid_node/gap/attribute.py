@@ -98,10 +98,11 @@ def _share_of(progress: Progress, count: int) -> Progress:
 def stage(current: Trial, candidates: Sequence[Candidate], nuisances: Nuisances, progress: Progress) -> list[Trial]:
     """The candidates upon what is known so far, the most probable first."""
     looked: list[tuple[float, Candidate, tuple[float, ...]]] = []
-    problem = Projected(current.fit)
+    fresh = with_candidates(current.fit, current.fit.candidates, nuisances, ())
+    problem = Projected(fresh)
     for i, candidate in enumerate(candidates):
         progress(0.6 * i / len(candidates), candidate.label)
-        looked.append(_first_look(current.fit, problem, candidate))
+        looked.append(_first_look(fresh, problem, candidate))
     looked.sort(key=lambda look: look[0])
     trials = []
     for i, (_, candidate, start) in enumerate(looked[:_POLISHED]):

@@ -23,8 +23,8 @@ from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex, Windows
 from sysid_node.gap.view import View
 
-#: Rounds of linearising the nuisances anew; the third changes nothing that matters.
-_ROUNDS = 2
+#: Rounds of linearising the nuisances anew; a fourth changes nothing that matters.
+_ROUNDS = 3
 
 #: Evaluations of the small nonlinear problem in each round.
 _EVALUATIONS = 12
@@ -121,7 +121,8 @@ def blank(views: Sequence[View], nuisances: Nuisances) -> Fit:
 
 
 def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisances, start: Sequence[float]) -> Fit:
-    """Another set of candidates about where this fit stands; those it did not have at ``start``, others neutral."""
+    """Another set of candidates about where this fit stands; those it did not have at ``start``,
+    all else neutral."""
     view = fit.views[0]
     names, neutral = view.simulator.names, view.simulator.neutral()
     kept = nuisances.without(frozenset(c.effect for c in candidates), names)
@@ -129,7 +130,7 @@ def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisan
     points = []
     for point in fit.points:
         fresh = point.copy()
-        gone = (old | set(fit.nuisances.indices)) - chosen - set(kept.indices)
+        gone = (old | set(fit.nuisances.indices)) - chosen  # clocks that made up for a lag would hide it
         fresh[list(gone)] = neutral[list(gone)]
         new = [i for c in candidates for i in c.indices if i not in old]
         fresh[new] = list(start)
