@@ -172,6 +172,8 @@ def _noise_names(model: Model) -> list[str]:
 
 def _check_complete(unknowns: Unknowns) -> None:
     for m in unknowns.manoeuvres:
+        if m.every != 1:
+            raise InputError(f"{m.name}: filter error needs an output at every sample, not means over {m.every}")
         gaps = np.argwhere(~np.isfinite(m.outputs))
         if gaps.size:
             raise InputError(

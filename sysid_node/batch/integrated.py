@@ -16,7 +16,7 @@ from sysid_node.batch.models.rigid_body import AT_CG, OUTPUTS, STATES, rigid_bod
 from sysid_node.batch.output_error import output_error, predict
 from sysid_node.batch.result import Answer, Fit
 from sysid_node.batch.settings import Settings
-from sysid_node.batch.signals import averaged
+from sysid_node.batch.signals import averaged, samples_together
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
@@ -44,7 +44,7 @@ class Integrated:
         """Raises InputError where the model needs what was not measured."""
         model, remarks = choose_model(aircraft, records, settings)
         started, remark = _started(model, aircraft, records)
-        pieces = tuple(piece for record in records for piece in _pieces(model, aircraft, record, settings))
+        pieces = tuple(piece for record in records for piece in _pieces(method, model, aircraft, record, settings))
         return cls(method, aircraft, settings, started, pieces, (*remarks, *remark))
 
     def fit(self) -> Fit:
@@ -55,7 +55,7 @@ class Integrated:
 
     def answers(self, fit: Fit, record: FlightRecord) -> list[Answer]:
         """The fit's answer to another flight: open loop with its own initial states, or one sample ahead."""
-        pieces = _pieces(self.model, self.aircraft, record, self.settings)
+        pieces = _pieces(self.method, self.model, self.aircraft, record, self.settings)
         own = {"initial_states": self.model.states, "biases": self.settings.biases}
         if self.method == "filter_error":
             return _joined(predict_filter(self.model, pieces, fit.values, fit.extras, **own))
@@ -106,14 +106,19 @@ def _started(model: Model, aircraft: Aircraft, records: Sequence[FlightRecord]) 
     return model.started_at({name: e.value for name, e in found.items() if e.valid and name in model.names}), ()
 
 
-def _pieces(model: Model, aircraft: Aircraft, record: FlightRecord, settings: Settings) -> list[Manoeuvre]:
+def _pieces(method: str, model: Model, aircraft: Aircraft, record: FlightRecord, settings: Settings) -> list[Manoeuvre]:
+    """The flight in pieces. Output error integrates at the full rate and averages the outputs, measured and modelled;
+    a filter, which must correct the state at every output, gets averaged inputs as well.
+    """
     if set(AT_CG) & set(model.inputs):
         record = with_forces_at_cg(aircraft, record)
     if not record.measured("rho"):
         density = np.full(len(record), aircraft.reference.air_density)
         record = replace(record, columns={**record.columns, "rho": density})
-    pieces = segments(averaged(record, settings.rate), settings.segment)
-    return [manoeuvre(model, piece) for piece in pieces]
+    if method == "filter_error":
+        return [manoeuvre(model, piece) for piece in segments(averaged(record, settings.rate), settings.segment)]
+    every = samples_together(record, settings.rate)
+    return [manoeuvre(model, piece, every=every) for piece in segments(record, settings.segment)]
 
 
 def _joined(answers: Sequence[Answer]) -> list[Answer]:

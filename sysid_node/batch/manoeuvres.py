@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.coefficients import at_cg
-from sysid_node.batch.model import Manoeuvre, Model
+from sysid_node.batch.model import Manoeuvre, Model, grouped
 from sysid_node.batch.models.rigid_body import AT_CG
 from sysid_node.batch.signals import differentiate
 from sysid_node.errors import InputError
@@ -19,12 +19,14 @@ from sysid_node.flight.record import Array, FlightRecord
 _DERIVED = {"pdot": "p", "qdot": "q", "rdot": "r"}
 
 
-def manoeuvre(model: Model, record: FlightRecord, initial_state: Mapping[str, float] | None = None) -> Manoeuvre:
+def manoeuvre(
+    model: Model, record: FlightRecord, initial_state: Mapping[str, float] | None = None, every: int = 1
+) -> Manoeuvre:
     """The record's columns as inputs, outputs and initial state of ``model``.
 
     Columns are found by name; pdot, qdot and rdot are differentiated where the record lacks them. The initial state
     is the first sample where ``initial_state`` does not give it; a state that was never measured starts at zero.
-    Raises InputError where an input was not measured.
+    Outputs are averaged over ``every`` samples. Raises InputError where an input was not measured.
     """
     missing = [name for name in model.inputs if not record.measured(name)]
     if missing:
@@ -37,7 +39,8 @@ def manoeuvre(model: Model, record: FlightRecord, initial_state: Mapping[str, fl
     start = np.array([given.get(name, _first(record[name])) for name in model.states])
     inputs = np.column_stack([record[name] for name in model.inputs])
     outputs = np.column_stack([_output(record, name) for name in model.outputs])
-    return Manoeuvre(record.time - record.time[0], inputs, outputs, start, record.name or "flight")
+    time = record.time - record.time[0]
+    return Manoeuvre(time, inputs, grouped(outputs, every), start, record.name or "flight", every)
 
 
 def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:

@@ -121,8 +121,9 @@ class Model:
 class Manoeuvre:
     """One stretch of flight as a model sees it.
 
-    ``time`` (N,) s, increasing; ``inputs`` (N, nu), complete; ``outputs`` (N, ny) as measured, NaN = not measured;
-    ``initial_state`` (nx,) at ``time[0]``. Raises InputError on gaps in the inputs, too few samples, wrong shapes.
+    ``time`` (N,) s, increasing; ``inputs`` (N, nu), complete; ``outputs`` (N // every, ny) as measured, each the mean
+    over ``every`` samples, NaN = not measured; ``initial_state`` (nx,) at ``time[0]``. Raises InputError on too few
+    samples and wrong shapes.
     """
 
     time: Array
@@ -130,6 +131,7 @@ class Manoeuvre:
     outputs: Array
     initial_state: Array
     name: str = "flight"
+    every: int = 1
 
     def __post_init__(self) -> None:
         samples = self.time.size
@@ -137,10 +139,10 @@ class Manoeuvre:
             raise InputError(f"{self.name}: {samples} samples; a manoeuvre needs at least 5")
         if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0.0).all()):
             raise InputError(f"{self.name}: time must be finite and increase")
-        for kind in ("inputs", "outputs"):
+        for kind, wanted in (("inputs", samples), ("outputs", samples // self.every)):
             rows = getattr(self, kind).shape[0]
-            if getattr(self, kind).ndim != 2 or rows != samples:
-                raise InputError(f"{self.name}: {kind} have {rows} rows for {samples} times")
+            if getattr(self, kind).ndim != 2 or rows != wanted:
+                raise InputError(f"{self.name}: {kind} have {rows} rows for {samples} times; expected {wanted}")
         if not np.isfinite(self.initial_state).all():
             raise InputError(f"{self.name}: initial state {self.initial_state} is not finite")
 
@@ -148,9 +150,20 @@ class Manoeuvre:
         return int(self.time.size)
 
     @property
+    def output_time(self) -> Array:
+        """When the outputs were measured, on average (N // every,), s."""
+        return grouped(self.time, self.every)
+
+    @property
     def step(self) -> float:
         """Median sampling interval, s."""
         return float(np.median(np.diff(self.time)))
+
+
+def grouped(values: Array, every: int) -> Array:
+    """Means (N // every, ...) over ``every`` rows each; what is left at the end is dropped."""
+    rows = len(values) // every
+    return np.asarray(values[: rows * every].reshape(rows, every, *values.shape[1:]).mean(axis=1))
 
 
 def check_manoeuvres(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:

@@ -79,7 +79,7 @@ class _OutputError(Problem):
         return [
             Answer(
                 m.name,
-                m.time,
+                m.output_time,
                 u.model.outputs,
                 m.outputs,
                 rollout.outputs(u.model, m, theta, u.initial_state(z, i)) + u.bias(z, i),

@@ -157,7 +157,7 @@ def _filtered(
     correct: Correct,
 ) -> Track:
     check_manoeuvres(model, [manoeuvre])
-    if not np.isfinite(manoeuvre.outputs).all():
+    if manoeuvre.every != 1 or not np.isfinite(manoeuvre.outputs).all():
         raise InputError(f"{manoeuvre.name}: a recursive filter needs every sample of an output; cut the flight")
     free = tuple(i for i, parameter in enumerate(model.parameters) if not parameter.fixed)
     start = np.concatenate([manoeuvre.initial_state, model.start[list(free)]])

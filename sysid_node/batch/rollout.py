@@ -62,16 +62,21 @@ def simulate(dynamics: Dynamics, time: jax.Array, inputs: jax.Array, x0: jax.Arr
     return jnp.concatenate([x0[None, :], states])
 
 
-def _outputs(dynamics: Dynamics, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
-    return output(dynamics, simulate(dynamics, time, inputs, x0, theta), inputs, theta)
+def _outputs(
+    dynamics: Dynamics, every: int, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array
+) -> jax.Array:
+    values = output(dynamics, simulate(dynamics, time, inputs, x0, theta), inputs, theta)
+    rows = len(time) // every
+    return values[: rows * every].reshape(rows, every, -1).mean(axis=1) if every > 1 else values
 
 
-_outputs_jit = jax.jit(_outputs, static_argnums=0)
+_outputs_jit = jax.jit(_outputs, static_argnums=(0, 1))
 
 
-@partial(jax.jit, static_argnums=(0, 5, 6))
+@partial(jax.jit, static_argnums=(0, 1, 6, 7))
 def _sensitivities(
     dynamics: Dynamics,
+    every: int,
     time: jax.Array,
     inputs: jax.Array,
     x0: jax.Array,
@@ -79,21 +84,21 @@ def _sensitivities(
     free: tuple[int, ...],
     free_states: tuple[int, ...],
 ) -> jax.Array:
-    """d outputs / d (theta[free], x0[free_states]): (N, ny, len(free) + len(free_states))."""
+    """d outputs / d (theta[free], x0[free_states]): (N // every, ny, len(free) + len(free_states))."""
 
     def of(change: jax.Array) -> jax.Array:
         moved_theta = theta.at[jnp.array(free, dtype=int)].add(change[: len(free)])
         moved_x0 = x0.at[jnp.array(free_states, dtype=int)].add(change[len(free) :])
-        return _outputs(dynamics, time, inputs, moved_x0, moved_theta)
+        return _outputs(dynamics, every, time, inputs, moved_x0, moved_theta)
 
     jacobian: jax.Array = jax.jacfwd(of)(jnp.zeros(len(free) + len(free_states)))
     return jacobian
 
 
 def outputs(model: Model, manoeuvre: Manoeuvre, theta: Array, x0: Array | None = None) -> Array:
-    """Modelled outputs (N, ny), from the manoeuvre's initial state unless ``x0`` (nx,) says otherwise."""
+    """Modelled outputs (N // every, ny), from the manoeuvre's initial state unless ``x0`` (nx,) says otherwise."""
     start = manoeuvre.initial_state if x0 is None else x0
-    return np.asarray(_outputs_jit(model.dynamics, manoeuvre.time, manoeuvre.inputs, start, theta))
+    return np.asarray(_outputs_jit(model.dynamics, manoeuvre.every, manoeuvre.time, manoeuvre.inputs, start, theta))
 
 
 def sensitivities(
@@ -104,9 +109,6 @@ def sensitivities(
     free: tuple[int, ...],
     free_states: tuple[int, ...] = (),
 ) -> Array:
-    """Exact Jacobian (N, ny, n) of the outputs with respect to the chosen parameters and initial states."""
-    return np.asarray(
-        _sensitivities(
-            model.dynamics, manoeuvre.time, manoeuvre.inputs, jnp.asarray(x0), jnp.asarray(theta), free, free_states
-        )
-    )
+    """Exact Jacobian (N // every, ny, n) of the outputs with respect to the chosen parameters and initial states."""
+    data = (manoeuvre.time, manoeuvre.inputs, jnp.asarray(x0), jnp.asarray(theta))
+    return np.asarray(_sensitivities(model.dynamics, manoeuvre.every, *data, free, free_states))

@@ -18,14 +18,12 @@ class Settings:
 
     frequencies: Frequencies = DEFAULT_FREQUENCIES  # Hz: first line, step, last line (frequency_equation_error)
     low_pass: float = DEFAULT_LOWPASS  # Hz: what is above is left out; 0 = nothing (equation_error)
-    rate: float = 100.0  # Hz: faster flights are averaged down to it; 0 = as recorded (output_error, filter_error)
-    segment: float = (
-        10.0  # s: flights are cut into pieces of at most this length, each with its own initial state; 0 = whole
-    )
+    rate: float = 50.0  # Hz: faster measurements are averaged down to it; 0 = none (output_error, filter_error)
+    segment: float = 10.0  # s: flights are cut into pieces this long, each with its own initial state; 0 = whole
     states: tuple[str, ...] = ()  # to be integrated; the others count as measured. Empty: what the model allows
     biases: tuple[str, ...] = ()  # outputs whose bias is estimated for each piece
     use_prior: bool = False  # whether the aircraft file's tolerances count
-    stepwise: bool = False  # leave out regressors that the data do not support (both equation errors)
+    stepwise: bool = False  # leave out regressors that the data do not support (by equation error)
     correct_sensors: bool = False  # estimate IMU and air-data errors from the kinematics first, and take them out
     max_gap: float = 0.2  # s: the longest gap in a bag that is bridged by interpolation
 

@@ -41,14 +41,19 @@ def lowpass(time: Array, X: Array, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(sections, X, axis=0, padlen=min(len(X) - 1, int(3 * rate / cutoff))))
 
 
+def samples_together(record: FlightRecord, rate: float) -> int:
+    """How many samples make one at ``rate`` Hz or a little above; 1 where ``rate`` is 0 or the flight is slower."""
+    step = float(np.median(np.diff(record.time)))
+    return max(1, int(1.0 / (rate * step) + 1e-6)) if rate > 0.0 else 1
+
+
 def averaged(record: FlightRecord, rate: float) -> FlightRecord:
     """The record at ``rate`` Hz or a little above, each sample the mean of those it replaces; 0 leaves it as it is.
 
-    Means use all samples, and keep what is said of one instant together: a mean of the states belongs to the mean
-    time as the mean of the inputs does. A mean over a missing value is missing.
+    A mean over a missing value is missing. Means of states and inputs belong together only as far as both are nearly
+    straight lines for so long.
     """
-    step = float(np.median(np.diff(record.time)))
-    together = int(1.0 / (rate * step) + 1e-6) if rate > 0.0 else 1
+    together = samples_together(record, rate)
     if together < 2 or len(record) < 2 * together:
         return record
     whole = len(record) // together * together

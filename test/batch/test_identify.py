@@ -1,0 +1,121 @@
+"""Whole flights through every method, with held-out flights, whatever was measured."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_flight import KESTREL, TRUTH, clean, flight, scores
+
+from sysid_node.batch.identify import METHODS, identify
+from sysid_node.batch.integrated import choose_model
+from sysid_node.batch.manoeuvres import segments
+from sysid_node.batch.settings import Settings
+from sysid_node.errors import InputError
+from sysid_node.flight.record import FlightRecord
+
+#: Fast: fewer samples, and pieces of one length.
+QUICK = Settings(rate=50.0, segment=6.0)
+
+
+def without(record, *names):
+    return FlightRecord(record.time, {n: v for n, v in record.columns.items() if n not in names}, record.name)
+
+
+@pytest.fixture(scope="module", params=METHODS[:3])
+def found(request):
+    return identify(request.param, KESTREL, [flight(1)], QUICK, [flight(2, turn=-1)])
+
+
+def test_every_method_finds_the_truth(found):
+    assert found.fit.converged
+    assert set(found.fit.estimates) == set(TRUTH)
+    assert np.mean(np.abs(scores(found.fit.estimates)) < 2.2) > 0.8
+    assert np.abs(scores(found.fit.estimates)).max() < 5.0
+
+
+def test_every_method_answers_a_held_out_flight(found):
+    ((name, outputs),) = found.holdout.items()
+    assert name == "kestrel -1 #2"
+    assert {"CL", "CD", "CY", "Cl", "Cm", "Cn"} <= set(outputs)
+    if found.fit.method == "output_error":
+        assert {"V", "alpha", "beta", "p", "q", "r", "phi", "theta", "ax", "ay", "az"} <= set(outputs)
+    assert all(figures["r_squared"] > 0.9 for output, figures in outputs.items() if output not in ("CD", "ax", "V"))
+
+
+def test_filter_error_on_two_states_that_the_others_are_measured_for():
+    settings = dataclasses.replace(QUICK, states=("alpha", "q"), rate=0.0)
+    found = identify("filter_error", KESTREL, [flight(1)], settings, [flight(2, turn=-1)])
+    assert found.fit.converged
+    assert np.abs(scores(found.fit.estimates)).max() < 5.0
+    assert {"CL", "Cm", "alpha", "q", "az"} == set(found.holdout["kestrel -1 #2"])
+    assert found.holdout["kestrel -1 #2"]["q"]["r_squared"] > 0.95
+
+
+def test_output_error_is_the_sharpest_on_still_air():
+    errors = {
+        method: identify(method, KESTREL, [flight(1)], QUICK).fit.estimates["Cm_q"].standard_error
+        for method in ("equation_error", "output_error")
+    }
+    assert errors["output_error"] < 0.5 * errors["equation_error"]
+
+
+def test_the_model_follows_what_was_measured():
+    record = clean()
+    model, remarks = choose_model(KESTREL, [record], Settings())
+    assert model.states == ("V", "alpha", "beta", "p", "q", "r", "phi", "theta")
+    assert not remarks
+    gliding, remarks = choose_model(KESTREL, [without(record, "thrust")], Settings())
+    assert "V" not in gliding.states
+    assert "V" in gliding.inputs
+    assert not any(name.startswith("CD") for name in gliding.names)
+    assert "thrust was not measured" in remarks[0]
+    blind, remarks = choose_model(KESTREL, [without(record, "beta")], Settings())
+    assert "beta" in blind.states
+    assert "beta" not in blind.outputs
+    assert "beta not measured: known through the other outputs alone" in remarks
+
+
+def test_a_flight_without_a_sideslip_vane_can_still_be_integrated():
+    found = identify("output_error", KESTREL, [without(flight(1), "beta")], QUICK)
+    assert any("started from the aircraft file's values" in remark for remark in found.fit.remarks)
+    assert found.fit.converged
+    assert abs(found.fit.values["Cn_beta"] - TRUTH["Cn_beta"]) < 4 * found.fit.estimates["Cn_beta"].standard_error
+
+
+def test_longitudinal_motion_alone():
+    settings = dataclasses.replace(QUICK, states=("alpha", "q"))
+    fit = identify("output_error", KESTREL, [flight(1)], settings).fit
+    assert {name.partition("_")[0] for name in fit.estimates} == {"CL", "Cm"}
+    assert np.abs(scores(fit.estimates)).max() < 6.0
+
+
+def test_stepwise_and_sensor_correction_are_told():
+    settings = dataclasses.replace(QUICK, stepwise=True, correct_sensors=True)
+    found = identify("equation_error", KESTREL, [flight(1)], settings)
+    assert any(remark.startswith("stepwise regression left out") for remark in found.fit.remarks)
+    assert any("sensor" in remark for remark in found.fit.remarks)
+    assert set(found.selections) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
+
+
+def test_pieces_cover_the_flight():
+    record = clean()
+    pieces = segments(record, 5.0)
+    assert len(pieces) == 3
+    assert sum(map(len, pieces)) == len(record)
+    assert max(piece.duration for piece in pieces) <= 5.0
+    assert pieces[1].name == "kestrel +1 [2/3]"
+    assert segments(record, 0.0) == [record]
+    with pytest.raises(InputError, match=r"cannot be cut into segments of 0\.01 s"):
+        segments(record, 0.01)
+
+
+def test_flights_of_one_name_are_kept_apart():
+    found = identify("equation_error", KESTREL, [flight(1)], QUICK, [flight(2), flight(2)])
+    assert len(found.holdout) == 2
+
+
+def test_an_unknown_method_and_no_flight_are_refused():
+    with pytest.raises(InputError, match="method 'kalman': expected one of equation_error"):
+        identify("kalman", KESTREL, [clean()], QUICK)
+    with pytest.raises(InputError, match="no flight to identify from"):
+        identify("equation_error", KESTREL, [], QUICK)
