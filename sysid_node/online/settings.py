@@ -10,6 +10,9 @@ from typing import Any, get_type_hints
 from sysid_node.errors import InputError
 
 METHODS = ("sls_rft", "iv_rft")
+MOST_LINES = 1000
+LONGEST_GAP = 5.0  # s
+SHORTEST_MEMORY = 1.0  # s
 
 
 @dataclass(frozen=True)
@@ -30,14 +33,20 @@ class Settings:
         start, step, stop = self.frequencies
         if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
             raise InputError(f"frequencies {start}:{step}:{stop}: expected 0 < start < stop and step > 0, in Hz")
+        if (stop - start) / step > MOST_LINES:
+            raise InputError(f"frequencies {start}:{step}:{stop}: expected at most {MOST_LINES} lines; widen the step")
         if self.method not in METHODS:
             raise InputError(f"method {self.method!r}: expected one of {', '.join(METHODS)}")
         for name in ("forgetting_time", "window", "settle_time"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"{name} {value}: expected seconds, zero or more")
-        if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):
-            raise InputError(f"max_gap {self.max_gap}: expected seconds, more than zero")
+        if 0.0 < self.forgetting_time < SHORTEST_MEMORY:
+            raise InputError(f"forgetting_time {self.forgetting_time}: expected 0 or at least {SHORTEST_MEMORY:g} s")
+        if self.forgetting_time and self.window:
+            raise InputError("forgetting_time and window: expected one of them at most; leave the other at 0")
+        if not 0.0 < self.max_gap <= LONGEST_GAP:
+            raise InputError(f"max_gap {self.max_gap}: expected seconds, more than 0 and at most {LONGEST_GAP:g}")
         if not self.valid_fraction > 0.0:
             raise InputError(f"valid_fraction {self.valid_fraction}: expected a positive fraction")
 

@@ -1,0 +1,227 @@
+"""Solutions and covariances against numpy.linalg.lstsq and textbook formulas."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from sysid_node.online import regression
+from sysid_node.online.information import BANDS, Information, nothing
+from sysid_node.online.regression import Plan
+from sysid_node.online.signals import Layout
+
+Array = NDArray[np.float64]
+STRUCTURE = {
+    "CL": ("0", "alpha", "q", "de"),
+    "CD": ("0", "alpha", "de"),
+    "Cm": ("0", "alpha", "q", "de"),
+    "CY": ("beta", "p", "dr"),
+    "Cn": ("beta", "p", "dr"),
+    "Cl": ("p",),
+}
+INSTRUMENTED = ("alpha", "q", "beta", "p")
+ROWS = 120  # 20 in each band
+
+
+def layout(instrumented: tuple[str, ...] = ()) -> Layout:
+    return Layout(("alpha", "q", "beta", "p", "de", "dr"), ("de", "dr"), instrumented)
+
+
+def made(plan: Plan, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:
+    """Lines (ROWS, W) of regressors, their instruments, and outputs of a known model with white noise."""
+    rng = np.random.default_rng(seed)
+    lines = rng.normal(size=(ROWS, plan.width))
+    truth = {}
+    for c, coefficient in enumerate(plan.coefficients):
+        mine = plan.unknowns(c)
+        truth[coefficient] = rng.normal(size=mine.size)
+        lines[:, plan.outputs[c]] = lines[:, plan.columns[mine]] @ truth[coefficient] + noise * rng.normal(size=ROWS)
+    return lines, truth
+
+
+def information(lines: Array, density: float) -> Information:
+    """Information of lines that are independent, of variance ``density`` each for noise of unit density."""
+    info = nothing(layout(("alpha", "q", "beta", "p")))
+    parts = np.split(lines, BANDS)
+    info.grams = np.stack([part.T @ part for part in parts])
+    info.scores = density * info.grams
+    info.traces = np.full(BANDS, density * ROWS / BANDS)
+    info.trace_square = density**2 * ROWS
+    return info
+
+
+PLAIN = regression.plan(STRUCTURE, layout())
+INSTRUMENTAL = regression.plan(STRUCTURE, layout(INSTRUMENTED))
+
+
+def test_plan_shares_blocks_and_knows_its_unknowns() -> None:
+    assert PLAIN.coefficients == tuple(STRUCTURE)
+    for c, regressors in enumerate(STRUCTURE.values()):
+        assert [PLAIN.regressors[i] for i in PLAIN.unknowns(c)] == [r for r in regressors if r != "0"]
+    assert PLAIN.block[0] == PLAIN.block[2] != PLAIN.block[1]
+    assert PLAIN.least_squares
+    assert not INSTRUMENTAL.least_squares
+
+
+def test_all_coefficients_at_once_equal_lstsq_each() -> None:
+    lines, _ = made(PLAIN)
+    solution = regression.solve(PLAIN, lines.T @ lines)
+    assert solution.usable
+    for c in range(len(STRUCTURE)):
+        mine = PLAIN.unknowns(c)
+        expected, residual, *_ = np.linalg.lstsq(lines[:, PLAIN.columns[mine]], lines[:, PLAIN.outputs[c]])
+        np.testing.assert_allclose(solution.theta[mine, c], expected, rtol=1e-10)
+        assert solution.residual[c] == pytest.approx(residual[0], rel=1e-9)
+        assert not np.delete(solution.theta[:, c], mine).any()
+
+
+def test_instrumental_variables_are_those_of_two_stages() -> None:
+    """Just identified, (Z'A)^-1 Z'y is least squares on the regressors as predicted from all instruments."""
+    lines, _ = made(INSTRUMENTAL, 1)
+    plan = INSTRUMENTAL
+    lines[:, plan.instruments] += lines[:, plan.columns]  # instruments that are correlated with their regressors
+    solution = regression.solve(plan, lines.T @ lines)
+    for c in range(len(STRUCTURE)):
+        mine = plan.unknowns(c)
+        A, Z, y = lines[:, plan.columns[mine]], lines[:, plan.instruments[mine]], lines[:, plan.outputs[c]]
+        predicted = Z @ np.linalg.lstsq(Z, A)[0]
+        expected = np.linalg.lstsq(predicted, y)[0]
+        np.testing.assert_allclose(solution.theta[mine, c], expected, rtol=1e-8)
+        assert solution.residual[c] == pytest.approx(np.sum((y - A @ expected) ** 2), rel=1e-9)
+        np.testing.assert_allclose(solution.inverse[np.ix_(mine, mine)], np.linalg.inv(Z.T @ A), rtol=1e-8)
+
+
+def test_known_noise_is_taken_out_of_the_normal_equations() -> None:
+    lines, _ = made(PLAIN, 2)
+    gram = lines.T @ lines
+    bias = np.diag(np.linspace(1.0, 5.0, PLAIN.width))
+    solution = regression.solve(PLAIN, gram, regression.bias_of(PLAIN, bias))
+    mine = PLAIN.unknowns(0)
+    J, y = PLAIN.columns[mine], PLAIN.outputs[0]
+    expected = np.linalg.solve((gram - bias)[np.ix_(J, J)], gram[J, y])
+    np.testing.assert_allclose(solution.theta[mine, 0], expected, rtol=1e-10)
+    misfit = lines[:, y] - lines[:, J] @ expected
+    assert solution.residual[0] == pytest.approx(misfit @ misfit, rel=1e-9)
+
+
+@pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
+@pytest.mark.parametrize("spoiled", ["nothing flown", "twice the same", "nan", "inf", "more noise than motion"])
+def test_singular_equations_are_not_usable_and_never_raise(plan: Plan, spoiled: str) -> None:
+    lines, _ = made(plan, 3)
+    bias = None
+    if spoiled == "nothing flown":
+        lines[:] = 0.0
+    elif spoiled == "twice the same":
+        lines[:, plan.columns[1]] = lines[:, plan.instruments[1]] = lines[:, plan.columns[0]]
+        lines[:, plan.instruments[0]] = lines[:, plan.columns[0]]
+    elif spoiled == "more noise than motion":
+        if not plan.least_squares:
+            pytest.skip("no definiteness is asked of instruments")
+        bias = regression.bias_of(plan, 1e4 * np.eye(plan.width))
+    else:
+        lines[5, plan.columns[0]] = float(spoiled)
+    with np.errstate(all="ignore"):
+        gram = lines.T @ lines
+        solution = regression.solve(plan, gram, bias)
+        if spoiled == "twice the same":  # rounding decides whether a pivot is zero; then errors are without bound
+            assert not solution.usable or np.abs(solution.inverse).max() > 1e9
+            return
+    assert not solution.usable
+    spread = regression.uncertainty(plan, solution, information(made(plan)[0], 1.0), np.zeros(len(STRUCTURE)))
+    assert not spread.freedom.any()
+
+
+def test_covariance_of_independent_lines_is_the_textbook_one() -> None:
+    """Homogeneous white noise: s^2 (A'A)^-1 with s^2 the residual over the degrees of freedom left.
+
+    ``density`` cancels: only products of residual densities and line variances are in the covariance.
+    """
+    lines, _ = made(PLAIN, 4)
+    for c in range(len(STRUCTURE)):  # the same residual in every band
+        mine = PLAIN.unknowns(c)
+        A = lines[:, PLAIN.columns[mine]]
+        residual = lines[:, PLAIN.outputs[c]] - A @ np.linalg.lstsq(A, lines[:, PLAIN.outputs[c]])[0]
+        for part in np.split(np.arange(ROWS), BANDS):
+            lines[part, PLAIN.outputs[c]] += residual[part] * (0.3 / np.sqrt(np.mean(residual[part] ** 2)) - 1.0)
+    for density in (1.0, 12.5):
+        info = information(lines, density)
+        solution = regression.solve(PLAIN, info.grams.sum(axis=0))
+        spread = regression.uncertainty(PLAIN, solution, info, np.zeros(len(STRUCTURE)))
+        for c in range(len(STRUCTURE)):
+            mine = PLAIN.unknowns(c)
+            A, y = lines[:, PLAIN.columns[mine]], lines[:, PLAIN.outputs[c]]
+            s2 = np.sum((y - A @ solution.theta[mine, c]) ** 2) / (ROWS - mine.size)
+            textbook = s2 * np.linalg.inv(A.T @ A)
+            found = spread.covariance[c][np.ix_(mine, mine)]
+            np.testing.assert_allclose(found.diagonal(), textbook.diagonal(), rtol=0.05)
+            assert spread.density[c] == pytest.approx(s2 / density, rel=1e-9)
+            assert spread.freedom[c] == pytest.approx((ROWS - mine.size) ** 2 / ROWS, rel=1e-9)
+
+
+def test_coloured_residuals_count_where_the_regressor_moves() -> None:
+    """Noise in the lowest band alone: a regressor that moves there alone is less sure than one that moves elsewhere."""
+    lines, _ = made(PLAIN, 5, noise=0.0)
+    first = slice(0, ROWS // BANDS)
+    lines[:, PLAIN.columns[0]] *= np.where(np.arange(ROWS) < ROWS // BANDS, 1.0, 0.01)
+    lines[first, PLAIN.columns[1]] *= 0.01
+    lines[first, PLAIN.outputs[0]] += np.random.default_rng(6).normal(size=ROWS // BANDS)
+    info = information(lines, 1.0)
+    solution = regression.solve(PLAIN, info.grams.sum(axis=0))
+    spread = regression.uncertainty(PLAIN, solution, info, np.zeros(len(STRUCTURE)))
+    white = spread.density[0] * solution.inverse.diagonal()
+    found = spread.covariance[0].diagonal()
+    assert found[0] > 1.5 * white[0]
+    assert found[1] < 0.85 * white[1]
+
+
+def test_a_common_scale_error_is_in_the_covariance() -> None:
+    lines, _ = made(PLAIN, 7)
+    info = information(lines, 1.0)
+    solution = regression.solve(PLAIN, info.grams.sum(axis=0))
+    scale = np.linspace(0.0, 0.01, len(STRUCTURE))
+    without, with_it = (regression.uncertainty(PLAIN, solution, info, s).covariance for s in (0.0 * scale, scale))
+    for c in range(len(STRUCTURE)):
+        theta = solution.theta[:, c]
+        np.testing.assert_allclose(with_it[c] - without[c], scale[c] * np.outer(theta, theta), atol=1e-12)
+
+
+def test_strength_is_that_of_the_first_stage() -> None:
+    """One instrument that explains a share R^2 of its regressor: F = freedom R^2 / (1 - R^2)."""
+    plan = regression.plan({"Cl": ("p",)}, layout(("p",)))
+    rng = np.random.default_rng(8)
+    lines = np.zeros((ROWS, plan.width))
+    lines[:, plan.instruments[0]] = rng.normal(size=ROWS)
+    lines[:, plan.columns[0]] = 0.8 * lines[:, plan.instruments[0]] + rng.normal(size=ROWS)
+    lines[:, plan.outputs[0]] = lines[:, plan.columns[0]]
+    info = information(np.pad(lines, ((0, 0), (0, 19 - plan.width))), 1.0)
+    info.grams = info.grams[:, : plan.width, : plan.width]
+    R2 = np.corrcoef(lines[:, plan.instruments[0]], lines[:, plan.columns[0]])[0, 1] ** 2
+    found = regression.strength(plan, regression.solve(plan, info.grams.sum(axis=0)), info)
+    assert found[0] == pytest.approx(ROWS * R2 / (1.0 - R2), rel=0.05)
+    assert regression.trusting(plan, np.array([100.0])) is plan
+    assert regression.trusting(plan, np.array([3.0])).least_squares
+
+
+def test_weak_instruments_cost_their_block_alone() -> None:
+    strength = np.full(INSTRUMENTAL.columns.size, 100.0)
+    strength[INSTRUMENTAL.unknowns(3)[0]] = 2.0
+    mixed = regression.trusting(INSTRUMENTAL, strength)
+    weak = INSTRUMENTAL.group == INSTRUMENTAL.block[3]
+    np.testing.assert_array_equal(mixed.instruments[weak], INSTRUMENTAL.columns[weak])
+    np.testing.assert_array_equal(mixed.instruments[~weak], INSTRUMENTAL.instruments[~weak])
+
+
+def test_quantiles_are_students() -> None:
+    freedom = np.array([1.0, 3.7, 30.0, 1e6])
+    np.testing.assert_allclose(regression.student_95(freedom), student.ppf(0.975, freedom), rtol=1e-6)
+    assert math.isfinite(regression.student_95(np.array([0.0]))[0])
+
+
+def test_a_rival_is_the_regressor_that_moved_alike() -> None:
+    lines, _ = made(PLAIN, 9)
+    alpha, q, de = (PLAIN.columns[i] for i in PLAIN.unknowns(0))
+    lines[:, q] = lines[:, de] + 0.05 * lines[:, alpha] + 0.01 * np.random.default_rng(1).normal(size=ROWS)
+    names = regression.rivals(PLAIN, regression.solve(PLAIN, lines.T @ lines))
+    assert [names[i] for i in PLAIN.unknowns(0)][1:] == ["de", "q"]
