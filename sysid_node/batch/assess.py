@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
-from sysid_node.batch.identifiability import inseparable_pairs, null_combination, sentences
+from sysid_node.batch.identifiability import Groups, sentences, status_of, undetermined
 from sysid_node.batch.likelihood import Problem
 from sysid_node.batch.result import Estimate, Fit, interval
 from sysid_node.batch.unknowns import Unknowns
@@ -25,12 +25,13 @@ def assess(
     residuals, sensitivities = problem.weighted(z, noise)
     information = _information(problem, sensitivities)
     count = len(unknowns.free)
-    lost = null_combination(_condensed(information, count), unknowns.names)
+    lost = undetermined(_condensed(information, count), unknowns.names)
     inverse = np.asarray(np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=np.float64)
     covariance = coloured_covariance(inverse, sensitivities, residuals)[:count, :count]
     white = np.sqrt(np.clip(np.diag(inverse)[:count], 0.0, None))
     freedom = degrees_of_freedom([len(answer.time) for answer in answers])
     status = _status(unknowns, z, lost)
+    bounded = [f"{name} ended {text}" for name, text in status.items() if text.startswith("at its")]
     estimates = {
         name: _estimate(name, float(z[i]), float(np.sqrt(covariance[i, i])), freedom, status[name], float(white[i]))
         for i, name in enumerate(unknowns.names)
@@ -45,7 +46,7 @@ def assess(
         converged=not complaint,
         iterations=iterations,
         message=complaint or f"converged after {iterations} rounds of noise relaxation",
-        remarks=_remarks(status, covariance, unknowns.names, lost),
+        remarks=(*bounded, *sentences(covariance, unknowns.names, lost)),
         nuisance=unknowns.nuisance(z),
         extras=extras or {},
     )
@@ -70,36 +71,20 @@ def _condensed(information: Array, count: int) -> Array:
     return np.asarray(0.5 * (condensed + condensed.T))
 
 
-def _status(unknowns: Unknowns, z: Array, lost: Sequence[str]) -> dict[str, str]:
+def _status(unknowns: Unknowns, z: Array, lost: Groups) -> dict[str, str]:
     """ "ok", or why a parameter deserves no trust."""
     lower, upper = unknowns.bounds()
     status = {}
     for i, name in enumerate(unknowns.names):
         margin = 1e-6 * max(1.0, abs(z[i]))
-        others = [other for other in lost if other != name]
-        if name in lost:
-            status[name] = f"collinear with {', '.join(others)}" if others else "not excited"
-        elif z[i] - lower[i] < margin:
+        status[name] = status_of(name, lost)
+        if status[name] == "ok" and z[i] - lower[i] < margin:
             status[name] = f"at its lower bound {lower[i]:g}"
-        elif upper[i] - z[i] < margin:
+        elif status[name] == "ok" and upper[i] - z[i] < margin:
             status[name] = f"at its upper bound {upper[i]:g}"
-        else:
-            status[name] = "ok"
     return status
 
 
 def _estimate(name: str, value: float, error: float, freedom: float, status: str, white: float) -> Estimate:
     lower, upper = interval(value, error, freedom)
     return Estimate(name, value, error, lower, upper, status == "ok", status, white)
-
-
-def _remarks(status: dict[str, str], covariance: Array, names: Sequence[str], lost: Sequence[str]) -> tuple[str, ...]:
-    remarks = []
-    if len(lost) > 1:
-        remarks.append(f"this flight does not determine {', '.join(lost)} apart from one another")
-    elif lost:
-        remarks.append(f"this flight says nothing about {lost[0]}")
-    remarks += [f"{name} ended {text}" for name, text in status.items() if text.startswith("at its")]
-    kept = [i for i, name in enumerate(names) if name not in lost]
-    pairs = inseparable_pairs(covariance[np.ix_(kept, kept)], [names[i] for i in kept])
-    return tuple(remarks + sentences(pairs))

@@ -14,7 +14,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.coefficients import Equations, equations, usable
-from sysid_node.batch.identifiability import inseparable_pairs, sentences
+from sysid_node.batch.identifiability import sentences
 from sysid_node.batch.regression import Regression, regress
 from sysid_node.batch.result import Answer, Fit
 from sysid_node.batch.signals import lowpass
@@ -97,11 +97,5 @@ def collected(method: str, fits: Mapping[str, Regression], flights: Sequence[Equ
 def _remarks(fits: Mapping[str, Regression], flights: Sequence[Equations]) -> tuple[str, ...]:
     remarks = list(dict.fromkeys(remark for flight in flights for remark in flight.remarks))
     for fit in fits.values():
-        if len(fit.lost) > 1:
-            remarks.append(f"these flights do not determine {', '.join(fit.lost)} apart from one another")
-        elif fit.lost:
-            remarks.append(f"these flights say nothing about {fit.lost[0]}")
-        kept = [i for i, name in enumerate(fit.estimates) if name not in fit.lost]
-        names = [list(fit.estimates)[i] for i in kept]
-        remarks += sentences(inseparable_pairs(fit.covariance[np.ix_(kept, kept)], names))
+        remarks += sentences(fit.covariance, list(fit.estimates), fit.lost)
     return tuple(remarks)

@@ -20,20 +20,44 @@ HIGH_CORRELATION = 0.95
 HIGHEST_CONDITION = 1e6
 
 
-def null_combination(information: Array, names: Sequence[str]) -> tuple[str, ...]:
-    """Parameters of the combination that the data do not determine at all; empty where all are determined.
+#: Groups of parameters that only together have an effect that the data show; one alone has none.
+Groups = tuple[tuple[str, ...], ...]
 
-    ``information`` (P, P) is the Fisher information. A parameter without any effect stands alone.
+
+def undetermined(information: Array, names: Sequence[str]) -> Groups:
+    """What the data do not determine at all: parameters without effect alone, those of one effect together.
+
+    ``information`` (P, P) is the Fisher information. Empty where every parameter is determined.
     """
-    scale = np.sqrt(np.clip(np.diag(information), 0.0, None))
-    without = tuple(name for name, s in zip(names, scale, strict=True) if not s > 0.0)
-    if without:
-        return without
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] * HIGHEST_CONDITION**2 > values[-1]:
-        return ()
-    weight = np.abs(vectors[:, 0])
-    return tuple(name for name, w in zip(names, weight, strict=True) if w > 0.1 * weight.max())
+    size = np.sqrt(np.clip(np.diag(information), 0.0, None))
+    without = [i for i, s in enumerate(size) if not s > 0.0]
+    kept = [i for i in range(len(names)) if i not in without]
+    groups = [{i} for i in without]
+    if kept:
+        values, vectors = np.linalg.eigh(information[np.ix_(kept, kept)] / np.outer(size[kept], size[kept]))
+        null = vectors[:, values * HIGHEST_CONDITION**2 <= values[-1]]
+        # the projector on the null space, unlike its vectors, does not mix what has nothing to do with one another
+        linked = np.abs(null @ null.T) > 1e-3
+        groups += [{kept[k] for k in np.flatnonzero(row)} for row in linked if row.any()]
+    return tuple(tuple(names[i] for i in sorted(group)) for group in _merged(groups))
+
+
+def status_of(name: str, groups: Groups) -> str:
+    """ "ok", "not excited" or "collinear with ..."."""
+    for group in groups:
+        if name in group:
+            others = [other for other in group if other != name]
+            return f"collinear with {', '.join(others)}" if others else "not excited"
+    return "ok"
+
+
+def _merged(groups: list[set[int]]) -> list[set[int]]:
+    """Groups that share a member as one."""
+    apart: list[set[int]] = []
+    for group in groups:
+        touching = [other for other in apart if other & group]
+        apart = [other for other in apart if not other & group] + [group.union(*touching)]
+    return apart
 
 
 def inseparable_pairs(covariance: Array, names: Sequence[str]) -> list[tuple[str, str, float]]:
@@ -48,6 +72,15 @@ def inseparable_pairs(covariance: Array, names: Sequence[str]) -> list[tuple[str
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def sentences(pairs: Sequence[tuple[str, str, float]]) -> list[str]:
-    """The pairs in words."""
-    return [f"{a} and {b} cannot be told apart here (correlation {value:+.3f})" for a, b, value in pairs]
+def sentences(covariance: Array, names: Sequence[str], groups: Groups) -> list[str]:
+    """In words: what was not determined, and which pairs are hardly told apart."""
+    lost = {name for group in groups for name in group}
+    kept = [i for i, name in enumerate(names) if name not in lost]
+    said = [
+        f"nothing here determines {', '.join(group)} apart from one another"
+        if len(group) > 1
+        else f"nothing here shows {group[0]}"
+        for group in groups
+    ]
+    pairs = inseparable_pairs(covariance[np.ix_(kept, kept)], [names[i] for i in kept])
+    return said + [f"{a} and {b} cannot be told apart here (correlation {value:+.3f})" for a, b, value in pairs]

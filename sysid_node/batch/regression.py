@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
-from sysid_node.batch.identifiability import null_combination
+from sysid_node.batch.identifiability import Groups, status_of, undetermined
 from sysid_node.batch.result import Estimate, interval
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
@@ -25,7 +25,7 @@ class Regression:
     covariance: Array
     modelled: list[Array]
     noise: float
-    lost: tuple[str, ...]
+    lost: Groups
 
 
 def regress(
@@ -55,13 +55,13 @@ def regress(
     covariance = coloured_covariance(
         inverse, [X[:, None, :] for X in Xs], [r[:, None] for r in residuals], [Z[:, None, :] for Z in Zs]
     )
-    lost = null_combination(information, names)
+    lost = undetermined(information, names)
     scatter: Array = np.sum([Z.T @ Z for Z in Zs], axis=0)
     white = noise * np.sqrt(np.clip(np.diag(inverse @ scatter @ inverse), 0.0, None) * samples / (samples - len(names)))
     freedom = min(freedom, degrees_of_freedom([len(y) for y in ys]))
     errors = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     estimates = {
-        name: _estimate(name, float(values[i]), float(errors[i]), freedom, float(white[i]), lost)
+        name: _estimate(name, float(values[i]), float(errors[i]), freedom, float(white[i]), status_of(name, lost))
         for i, name in enumerate(names)
     }
     return Regression(estimates, covariance, modelled, noise, lost)
@@ -74,10 +74,6 @@ def _inverse(information: Array) -> Array:
     return np.asarray(np.linalg.pinv(information / sizes, rcond=1e-12, hermitian=True) / sizes)
 
 
-def _estimate(name: str, value: float, error: float, freedom: float, white: float, lost: Sequence[str]) -> Estimate:
-    others = [other for other in lost if other != name]
-    status = "ok"
-    if name in lost:
-        status = f"collinear with {', '.join(others)}" if others else "not excited"
+def _estimate(name: str, value: float, error: float, freedom: float, white: float, status: str) -> Estimate:
     lower, upper = interval(value, error, freedom)
     return Estimate(name, value, error, lower, upper, status == "ok", status, white)

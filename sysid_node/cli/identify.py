@@ -6,7 +6,7 @@ import argparse
 import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -214,7 +214,8 @@ def run(args: argparse.Namespace) -> None:
     topics = topic_names(args.topic)
 
     def load(path: Path) -> FlightRecord:
-        return load_flight(path, aircraft, topics=topics, frame=args.body_frame, max_gap=settings.max_gap)
+        flight = load_flight(path, aircraft, topics=topics, frame=args.body_frame, max_gap=settings.max_gap)
+        return replace(flight, name=path.name)
 
     with progress_bar(f"identify by {args.method.replace('_', ' ')}", quiet=args.quiet) as progress:
         records, holdout = [load(path) for path in args.bag], [load(path) for path in args.holdout]

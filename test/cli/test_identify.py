@@ -1,0 +1,134 @@
+"""``sysid identify``: the files it leaves, and one line for whatever is wrong."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from sysid_node.batch.identify import METHODS
+from sysid_node.cli.main import main
+
+BAGS = Path(__file__).resolve().parents[2] / "bags"
+KEYS = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
+
+
+def arguments(out, *more, bag="cdrw_multistep", method="equation_error"):
+    return ["identify", str(BAGS / bag), "--aircraft", "cdrw", "--method", method, "--out", str(out), *more]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Of a quiet identification with a flight held out."""
+    out = tmp_path_factory.mktemp("identify") / "out"
+    holdout = ["--holdout", str(BAGS / "cdrw_random"), "--set", "stepwise=true", "--quiet"]
+    assert main(arguments(out, *holdout)) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_summary_keeps_the_contract(summary):
+    assert set(summary) >= KEYS
+    assert summary["method"] == "equation_error"
+    assert summary["data_seconds"] == pytest.approx(60.0, abs=0.5)
+    assert set(summary["derivatives"]["Cm_alpha"]) >= {"value", "standard_error", "lower", "upper", "valid", "status"}
+    assert set(summary["fits"]) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
+    assert summary["fits"]["Cm"]["r_squared"] > 0.98
+    assert set(summary["holdout"]["cdrw_random"]) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
+    assert summary["settings"]["stepwise"] is True
+
+
+def test_the_bundled_flights_truth_is_found(summary):
+    truth = json.loads((BAGS / "cdrw_multistep.truth.json").read_text())["derivatives"]
+    found = summary["derivatives"]
+    assert set(found) == set(truth)
+    for name in ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr"):
+        assert found[name]["valid"]
+        assert found[name]["value"] == pytest.approx(truth[name], rel=0.03), name
+
+
+def test_the_tables_and_the_report_are_there(folder, summary):
+    names = [row["name"] for row in rows(folder / "derivatives.csv")]
+    assert names == list(summary["derivatives"])
+    estimated = [name for name, d in summary["derivatives"].items() if d["value"] is not None]
+    table = rows(folder / "correlation.csv")
+    assert sorted(row[""] for row in table) == sorted(estimated)
+    assert all(float(row[row[""]]) == pytest.approx(1.0) for row in table)
+    assert {row["coefficient"] for row in rows(folder / "structure.csv")} == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
+    assert {row["name"] for row in rows(folder / "noise.csv")} >= {"residual_CL", "residual_Cn"}
+    report = (folder / "report.html").read_text()
+    assert "Cm_alpha" in report or "C<sub>m" in report
+
+
+def test_a_rerun_leaves_no_table_of_the_run_before(tmp_path):
+    out = tmp_path / "out"
+    assert main(arguments(out, "--set", "stepwise=true", "--quiet", bag="cdrw_random")) == 0
+    assert (out / "structure.csv").exists()
+    assert main(arguments(out, "--quiet", bag="cdrw_random")) == 0
+    assert not (out / "structure.csv").exists()
+
+
+def test_output_error_on_a_bag(tmp_path, capsys):
+    """Pitch alone, in few samples, so that it is quick."""
+    settings = ["--set", "states=alpha,q", "--set", "rate=25", "--set", "segment=20"]
+    assert main(arguments(tmp_path / "out", *settings, method="output_error", bag="cdrw_random")) == 0
+    said = capsys.readouterr().out
+    assert "Cm_alpha" in said
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["derivatives"]["Cm_de"]["valid"]
+    assert summary["derivatives"]["Cl_p"]["value"] is None
+    assert summary["derivatives"]["Cl_p"]["status"] == "not part of the model that these flights allow"
+    assert {"alpha", "q", "az"} <= set(summary["fits"])
+    pieces = {row["piece"] for row in rows(tmp_path / "out" / "nuisance.csv")}
+    assert pieces == {"0", "1", "2"}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (["--set", "window=20"], "setting 'window' is not one of a batch method"),
+        (["--set", "segment"], "--set 'segment': expected KEY=VALUE"),
+        (["--set", "states=alpha,speed"], "state 'speed' is not known"),
+        (["--frequencies", "2:1"], "expected START:STEP:STOP in Hz"),
+        (["--holdout", "nowhere.csv"], "nowhere.csv"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, change, said):
+    method = "output_error" if "states=alpha,speed" in change else "frequency_equation_error"
+    assert main(arguments(tmp_path / "out", *change, "--quiet", method=method, bag="cdrw_random")) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("sysid identify: ")
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_an_unknown_method_names_the_known_ones(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments(tmp_path / "out", method="kalman"))
+    assert stopped.value.code == 2
+    assert all(method in capsys.readouterr().err.replace("'", "") for method in METHODS[:1])
+
+
+def test_a_flight_that_never_moves_gives_no_number_marked_valid(tmp_path):
+    """A log at rest in the air: every regressor constant."""
+    header = "t,ax,ay,az,p,q,r,phi,theta,V,alpha,beta,rho,thrust,de,da,dr"
+    still = "0.8,0,-9.77,0,0,0,0,0.085,18,0.085,0,1.2,4.3,0,0,0"
+    log = tmp_path / "still.csv"
+    log.write_text("\n".join([header, *(f"{k / 50:.2f},{still}" for k in range(500))]) + "\n")
+    out = tmp_path / "out"
+    assert (
+        main(["identify", str(log), "--aircraft", "cdrw", "--method", "equation_error", "--out", str(out), "--quiet"])
+        == 0
+    )
+    found = json.loads((out / "summary.json").read_text())["derivatives"]
+    assert not any(d["valid"] for name, d in found.items() if not name.endswith("_0"))
+    assert all(d["status"] != "ok" for d in found.values() if not d["valid"])
