@@ -21,6 +21,7 @@ from monte_carlo.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.run import run
+from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 
 AIRCRAFT = "cdrw"
@@ -122,7 +123,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=20, help="a loss and weather (default: 20)")
     parser.add_argument("--hours", type=int, default=2, help="of unchanged flight in each weather (default: 2)")
-    parser.add_argument("--method", choices=METHODS, default="sls_rft")
+    parser.add_argument("--method", choices=METHODS, default=Settings().method)
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     with processes() as pool:

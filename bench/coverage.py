@@ -1,7 +1,7 @@
 """Whether the online estimator's intervals hold the truth, by Monte Carlo. `python bench/coverage.py`
 
-The cropped-delta UAV of the file cdrw, IMU at 200 Hz, air data at 100 Hz, 3-2-1-1s on all surfaces, in still air and in
-Dryden turbulence, open loop and with the autopilot holding attitude: each flight with noise and turbulence of its own.
+The cropped-delta UAV of the file cdrw, IMU at 200 Hz, air data at 100 Hz, in still air and in Dryden turbulence, each
+flight with noise and turbulence of its own. Closed loop: 3-2-1-1s, the autopilot holding attitude; otherwise doublets.
 Estimates after 5, 15 and 60 s are compared with the truth, among those marked valid. `--method` compares estimators.
 """
 
@@ -14,18 +14,19 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from monte_carlo.flying import Setting
+from monte_carlo.flying import DOUBLETS, Setting
 from monte_carlo.judging import METHODS, Verdict, judge, many, processes
 from monte_carlo.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.online.settings import Settings
 
 AIRCRAFT = "cdrw"
 TIMES = np.array([5.0, 15.0, 60.0])  # s
 SETTINGS = (
-    Setting("white noise", autopilot=False),
-    Setting("light turbulence", "light", autopilot=False),
-    Setting("moderate turbulence", "moderate", autopilot=False),
+    Setting("white noise", autopilot=False, manoeuvre=DOUBLETS),
+    Setting("light turbulence", "light", autopilot=False, manoeuvre=DOUBLETS),
+    Setting("moderate turbulence", "moderate", autopilot=False, manoeuvre=DOUBLETS),
     Setting("white noise, closed loop", "none"),
     Setting("light, closed loop", "light"),
     Setting("moderate, closed loop", "moderate"),
@@ -135,7 +136,7 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=200, help="a setting (default: 200)")
     parser.add_argument("--quick", action="store_true", help="60 flights a setting")
     parser.add_argument("--setting", choices=[s.name for s in SETTINGS], help="only this one")
-    parser.add_argument("--method", choices=[*METHODS, "compare"], default="sls_rft")
+    parser.add_argument("--method", choices=[*METHODS, "compare"], default=Settings().method)
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     flights = 60 if args.quick else args.flights

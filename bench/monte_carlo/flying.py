@@ -46,6 +46,12 @@ MULTISTEP = tuple(
     for sign, late in ((1, 0), (-1, 6))
 )
 
+#: For flights without an autopilot: what leaves no net bank, pitch or yaw behind, so that the aircraft stays near trim.
+DOUBLETS = tuple(
+    f"doublet:{surface}:amplitude={amplitude}:width=0.35:start={start}:every=6:repeat=9"
+    for surface, amplitude, start in (("elevator", 0.05, 0.7), ("aileron", 0.05, 0.9), ("rudder", 0.1, 2.7))
+)
+
 
 @dataclass(frozen=True)
 class Setting:

@@ -1,0 +1,1 @@
+"""Real flights against the numbers that the field's own programs give for them."""

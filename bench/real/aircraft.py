@@ -1,0 +1,84 @@
+"""The real aircraft as the estimator knows them: geometry from beside the records, models as the references state them.
+
+The derivatives' values only say what size to expect: estimates are not drawn to them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import yaml
+
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+
+CONTROLS = {"elevator": "de", "aileron": "da", "rudder": "dr"}
+
+
+def twin_otter(folder: Path) -> Aircraft:
+    """Longitudinal model of SIDPAC's example."""
+    beliefs = _of("CL", {"0": 0.4, "alpha": 6.0, "q": 18.0, "de": 0.6}) | _of("CD", {"0": 0.06, "alpha": 0.1})
+    beliefs |= _of("Cm", {"0": 0.05, "alpha": -1.5, "q": -37.0, "de": -1.9})
+    return _aircraft(folder, "twin_otter", Reference(72.0, 1.03), ["elevator"], beliefs, Throttle("throttle"))
+
+
+def attas(folder: Path) -> Aircraft:
+    """Lateral model in rates, sideslip, aileron and rudder."""
+    beliefs = _of("CY", {"0": 0.01, "beta": -1.0, "p": 0.2, "r": 0.6, "da": 0.01, "dr": 0.2})
+    beliefs |= _of("Cl", {"0": 0.01, "beta": -0.06, "p": -0.4, "r": 0.2, "da": -0.1, "dr": 0.02})
+    beliefs |= _of("Cn", {"0": 0.01, "beta": 0.13, "p": -0.05, "r": -0.2, "da": -0.01, "dr": -0.07})
+    return _aircraft(folder, "attas", Reference(131.0, 0.73), ["aileron", "rudder"], beliefs)
+
+
+def hfb320(folder: Path) -> Aircraft:
+    """Longitudinal model with the airspeed's effects; the engines' thrust line from Jategaonkar's example."""
+    beliefs = _of("CL", {"0": -0.1, "V": 0.15, "alpha": 4.3}) | _of("CD", {"0": 0.12, "V": -0.06, "alpha": 0.32})
+    beliefs |= _of("Cm", {"0": 0.1, "V": 0.01, "alpha": -1.0, "q": -35.0, "de": -1.5})
+    Iyy = _numbers(folder)["hfb320"]["inertia"]["Iyy"]
+    engines = Throttle("throttle", inclination=0.0524, arm=-7.0153e-6 * Iyy)
+    return _aircraft(folder, "hfb320", Reference(104.67, 0.792), ["elevator"], beliefs, engines)
+
+
+def thor(folder: Path) -> Aircraft:
+    """The standard linear model; the rudder turned round, for this one's positive is the other way."""
+    beliefs = _of("CL", {"0": 0.1, "alpha": 4.5, "q": 5.0, "de": 0.3}) | _of("CD", {"0": 0.03, "alpha": 0.3})
+    beliefs |= _of("Cm", {"0": 0.05, "alpha": -0.7, "q": -10.0, "de": -1.0}) | _of(
+        "CY", {"0": 0.01, "beta": -0.3, "dr": 0.1}
+    )
+    beliefs |= _of("Cl", {"0": 0.01, "beta": -0.03, "p": -0.4, "r": 0.1, "da": -0.15})
+    beliefs |= _of("Cn", {"0": 0.01, "beta": 0.05, "p": -0.03, "r": -0.1, "dr": -0.05})
+    return _aircraft(folder, "thor", Reference(15.0, 1.15), list(CONTROLS), beliefs)
+
+
+def _of(coefficient: str, values: Mapping[str, float]) -> dict[str, Derivative]:
+    return {f"{coefficient}_{regressor}": Derivative(value) for regressor, value in values.items()}
+
+
+def _numbers(folder: Path) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+    """Masses, inertias and geometries beside the records."""
+    known: Mapping[str, Mapping[str, Mapping[str, float]]] = yaml.safe_load((folder / "aircraft.yaml").read_text())
+    return known
+
+
+def _aircraft(
+    folder: Path,
+    name: str,
+    reference: Reference,
+    controls: Sequence[str],
+    beliefs: Mapping[str, Derivative],
+    throttle: Throttle | None = None,
+) -> Aircraft:
+    numbers = _numbers(folder)[name]
+    moments = {axis: numbers["inertia"].get(axis, math.nan) for axis in ("Ixx", "Iyy", "Izz")}
+    return Aircraft(
+        name=name,
+        source="mass, inertia and geometry from beside the record; derivatives rounded from published results",
+        mass=float(numbers["mass"]),  # type: ignore[arg-type]
+        inertia=Inertia(**moments, Ixz=numbers["inertia"].get("Ixz", 0.0)),
+        geometry=Geometry(**numbers["geometry"]),
+        reference=reference,
+        controls={c: Control(c, CONTROLS[c], {c: 1.0}) for c in controls},
+        derivatives=dict(beliefs),
+        throttle=throttle,
+    )
