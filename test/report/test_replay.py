@@ -134,7 +134,7 @@ def test_after_an_abrupt_change_only_what_follows_counts(aircraft):
     time, samples = flight(aircraft)
     samples[time < 30.0, SAMPLE_COLUMNS.index("az")] += np.sin(2 * np.pi * 1.3 * time[time < 30.0])
     changed = believed(aircraft, 31.0)
-    derivatives = {n: replace(d, valid=False, status="changed") for n, d in changed.derivatives.items()}
+    derivatives = {n: d._replace(valid=False, status="changed") for n, d in changed.derivatives.items()}
     history = [believed(aircraft, 20.0), replace(changed, derivatives=derivatives), believed(aircraft, 60.0)]
     result = replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={})
     assert result.spectra.residuals["CL"].max() < 0.01 * result.spectra.measured["CL"].max()
