@@ -5,7 +5,7 @@
 
 Forces and moments are predicted from the measured motion by the simulator's own chain (``sim.prediction``), so that
 turbulence is an input and drift does no harm; comparison is by frequency, in short windows (``spectra``). Errors of the
-derivatives within their tolerances, biases and clocks' half samples are nuisances (``nuisance``), integrated out. Every
+derivatives within their tolerances and biases are nuisances (``nuisance``), integrated out. Every
 effect is a candidate (``candidates``), fitted by variable projection (``fit``) and judged by how well it predicts
 flight that it was not fitted to (``evidence``).
 """

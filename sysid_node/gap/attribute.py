@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import Candidate, bounds, candidates_of
+from sysid_node.gap.candidates import TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
@@ -115,9 +115,19 @@ def stage(current: Trial, candidates: Sequence[Candidate], nuisances: Nuisances,
 def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter."""
     sure = probabilities([trial.evidence.scores, without.evidence.scores])[0] > _SURE
+    if _trifling(trial):
+        return False
     left, whole = power_left(without.evidence), power_left(base.evidence)
     gone = left - power_left(trial.evidence)
     return bool(sure and np.any((gone > MATERIAL * left) & (gone > MATERIAL_OF_ALL * whole)))
+
+
+def _trifling(trial: Trial) -> bool:
+    """Whether what was added is a time within one sample of the slowest topic: a matter of sampling."""
+    if trial.added is None or trial.added.effect not in TIMES:
+        return False
+    slowest = min(min(v.flight.actuator_rate, v.flight.air_rate) for v in trial.fit.views)
+    return bool(abs(trial.fit.points[0][trial.added.indices[0]]) < 1.0 / slowest)
 
 
 def power_left(evidence: Evidence) -> Array:

@@ -27,7 +27,9 @@ _HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural
 _PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
 
 #: Effects of one time, whose fingerprint turns with its size.
-_TIMES = frozenset({"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay"})
+TIMES = frozenset(
+    {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
+)
 
 #: Onsets that are tried, as shares of the flight.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
@@ -109,7 +111,9 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         speed = max(float(np.abs(np.diff(np.asarray(v.signals.commands)[:, :-1], axis=0)).max()) * v.simulator.rate
                     for v in views)  # fmt: skip
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
-    if effect in _TIMES:
+    if effect == "actuator_backlash":
+        yield from ((control, (0.005, 0.03)) for control in simulator.layout.controls)
+    if effect in TIMES:
         name = "delay" if effect.endswith("delay") else "time_constant"
         yield name, (0.02, 0.07)
     if effect == "structural_mode":

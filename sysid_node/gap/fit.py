@@ -130,7 +130,7 @@ def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisan
     points = []
     for point in fit.points:
         fresh = point.copy()
-        gone = (old | set(fit.nuisances.indices)) - chosen  # clocks that made up for a lag would hide it
+        gone = (old | set(fit.nuisances.indices)) - chosen  # what made up for an effect would hide it
         fresh[list(gone)] = neutral[list(gone)]
         new = [i for c in candidates for i in c.indices if i not in old]
         fresh[new] = list(start)

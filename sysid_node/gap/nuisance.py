@@ -1,7 +1,8 @@
-"""What is always allowed for: the derivatives' errors within their tolerances, biases, and half a sample of each clock.
+"""What is always allowed for: the derivatives' errors within their tolerances, and biases.
 
 Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value. Derivatives are shared by
-all flights; biases and clocks are each flight's own.
+all flights; biases are each flight's own. Clocks are none: data that know a delay to a millisecond overrule any prior
+that is meant for half a sample, and a lag would pass as one; a delay is a candidate, and must matter.
 """
 
 from __future__ import annotations
@@ -26,9 +27,6 @@ _BIASES = {
     "vane_bias.alpha": "alpha",
     "vane_bias.beta": "beta",
 }
-
-#: A stamp may be off by this share of the topic's period (1 sigma).
-_CLOCK_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,6 @@ def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
-    sigma["air_data_delay.delay"] = _CLOCK_SHARE / view.flight.air_rate
-    sigma["actuator_stamp_delay.delay"] = _CLOCK_SHARE / view.flight.actuator_rate
     names = view.simulator.names
     shared = np.array([name.startswith("derivative_error") for name in sigma])
     return Nuisances(tuple(names.index(n) for n in sigma), np.array(list(sigma.values())), shared)
