@@ -42,6 +42,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
     add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
     add("--height", type=float, default=100.0, help="m above the ground, for turbulence (default: 100)")
+    add("--linear-gusts", action="store_true", help="turbulence without rotation of the air")
     add("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
     add("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
     add("--noise", type=float, default=1.0, help="of the aircraft file's sensor noise (default: 1)")
@@ -66,7 +67,14 @@ def run(args: argparse.Namespace) -> None:
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate))
     conditions = Conditions(
-        args.effect, args.airspeed, args.turbulence, args.height, args.autopilot, args.noise, args.seed
+        args.effect,
+        args.airspeed,
+        args.turbulence,
+        args.height,
+        args.autopilot,
+        args.noise,
+        args.seed,
+        rotary_gusts=not args.linear_gusts,
     )
     sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
     streams = recorder.record(sortie)
@@ -127,6 +135,7 @@ def _command(args: argparse.Namespace) -> str:
             words += [word for item in value for word in (option, item)]
         elif isinstance(value, bool):
             words += ["--open-loop"] if name == "autopilot" and not value else []
+            words += ["--linear-gusts"] if name == "linear_gusts" and value else []
         elif value is not None and name != "command":
             words += [option, str(value)]
     return shlex.join(words)

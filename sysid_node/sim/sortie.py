@@ -34,6 +34,7 @@ class Conditions:
     autopilot: bool = True
     noise: float = 1.0  # of the aircraft file's sigmas
     seed: int = 0
+    rotary_gusts: bool = True  # whether the air of the turbulence turns, too
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: Condi
     speed = float(np.linalg.norm(trim.initial[3:6]))
     dryden = Dryden.at(conditions.height, simulator.aircraft.geometry.b)
     gusts = dryden.realisation(samples, simulator.rate, speed, turbulence)
+    gusts[:, 3:] *= conditions.rotary_gusts
     return simulator.inputs(
         jnp.asarray(commands), turbulence=gusts, noise=noise.standard_normal((samples, len(OUTPUTS)))
     )

@@ -64,6 +64,14 @@ def test_truth_of_a_sortie(fast, moves):
     assert sortie.effects["sensor_noise"] == {"scale": 1.0}
 
 
+def test_rotary_gusts_may_be_left_out(fast, moves):
+    gusts = [
+        fly_sortie(fast, moves, Conditions(turbulence="light", rotary_gusts=on)).inputs.turbulence for on in (0, 1)
+    ]
+    np.testing.assert_array_equal(gusts[0][:, :3], gusts[1][:, :3])
+    assert not gusts[0][:, 3:].any() and gusts[1][:, 3:].all()
+
+
 def test_seeds_decide(fast, moves, sortie):
     again = fly_sortie(fast, moves, sortie.conditions)
     np.testing.assert_array_equal(again.flight.outputs, sortie.flight.outputs)
