@@ -46,7 +46,7 @@ class Windows:
     def frequencies(self) -> Array:
         """Lines (L,), Hz, from zero."""
         step = self.rate / self.size
-        lines: Array = np.arange(int(HIGHEST / step + 1e-9) + 1) * step
+        lines: Array = np.asarray(np.arange(int(HIGHEST / step + 1e-9) + 1) * step, dtype=np.float64)
         return lines
 
     @property
