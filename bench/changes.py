@@ -15,9 +15,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from monte_carlo.flying import Setting, fly
-from monte_carlo.judging import METHODS, Array, processes
-from monte_carlo.pages import publish, table
+from evaluation.flying import Setting, fly
+from evaluation.judging import METHODS, Array, processes
+from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.run import run

@@ -14,9 +14,9 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from monte_carlo.flying import MULTISTEP, Setting
-from monte_carlo.judging import LOWER, METHODS, UPPER, VALID, VALUE, Array, many, processes
-from monte_carlo.pages import publish, table
+from evaluation.flying import MULTISTEP, Setting
+from evaluation.judging import LOWER, METHODS, UPPER, VALID, VALUE, Array, many, processes
+from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.settings import Settings

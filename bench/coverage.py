@@ -14,9 +14,9 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from monte_carlo.flying import DOUBLETS, Setting
-from monte_carlo.judging import METHODS, Verdict, judge, many, processes
-from monte_carlo.pages import publish, table
+from evaluation.flying import DOUBLETS, Setting
+from evaluation.judging import METHODS, Verdict, judge, many, processes
+from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.settings import Settings

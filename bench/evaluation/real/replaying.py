@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +14,10 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.main import main as sysid
 from sysid_node.flight.csv import write_csv
 from sysid_node.flight.record import FlightRecord
+
+from .dimensional import Frequencies
+
+METHODS = ("sls_rft", "iv_rft")
 
 
 class Found(NamedTuple):
@@ -23,17 +28,37 @@ class Found(NamedTuple):
     status: str
 
 
-def replay(flight: FlightRecord, aircraft: Aircraft, *options: str) -> tuple[dict[str, Found], dict[str, Any]]:
-    """``sysid convert`` and ``sysid replay`` in a temporary folder: derivatives, and the whole summary."""
+class Replayed(NamedTuple):
+    """What a replay found: derivatives by name, and how much of each coefficient's motion they explain."""
+
+    derivatives: dict[str, Found]
+    r_squared: dict[str, float]
+
+
+def replay(
+    flight: FlightRecord, aircraft: Aircraft, method: str = "sls_rft", frequencies: Frequencies | None = None
+) -> Replayed:
+    """``sysid convert`` and ``sysid replay`` in a temporary folder; every sample counts."""
+    settings = ["--set", "settle_time=0", "--set", f"method={method}"]
+    if frequencies is not None:
+        settings += ["--frequencies", ":".join(str(f) for f in frequencies)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         log, file, bag, out = (folder / part for part in ("log.csv", "aircraft.yaml", "bag", "out"))
         write_csv(log, flight)
         file.write_text(dump_aircraft(aircraft), encoding="utf-8")
         _run("convert", log, "--aircraft", file, "--out", bag, "--quiet")
-        _run("replay", bag, "--aircraft", file, "--out", out, "--quiet", "--set", "settle_time=0", *options)
+        _run("replay", bag, "--aircraft", file, "--out", out, "--quiet", *settings)
         summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    return {name: _found(d) for name, d in summary["derivatives"].items()}, summary
+    derivatives = {name: _found(d) for name, d in summary["derivatives"].items()}
+    return Replayed(derivatives, {name: fit["r_squared"] for name, fit in summary["fits"].items()})
+
+
+def replays(
+    flight: FlightRecord, aircraft: Aircraft, frequencies: Frequencies | None = None, methods: Sequence[str] = METHODS
+) -> dict[str, Replayed]:
+    """What each method finds."""
+    return {method: replay(flight, aircraft, method, frequencies) for method in methods}
 
 
 def _run(*arguments: object) -> None:

@@ -7,6 +7,7 @@ the angle of attack on angle of attack, pitch rate and elevator; this puts such 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +64,7 @@ def regress(
 
 def _parts(time: Array, breaks: Sequence[float]) -> list[slice]:
     edges = [0, *np.searchsorted(time, breaks).tolist(), time.size]
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def _columns(layout: Layout, time: Array, regressors: Mapping[str, Array]) -> Array:

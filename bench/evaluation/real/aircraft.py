@@ -43,9 +43,8 @@ def hfb320(folder: Path) -> Aircraft:
 def thor(folder: Path) -> Aircraft:
     """The standard linear model; the rudder turned round, for this one's positive is the other way."""
     beliefs = _of("CL", {"0": 0.1, "alpha": 4.5, "q": 5.0, "de": 0.3}) | _of("CD", {"0": 0.03, "alpha": 0.3})
-    beliefs |= _of("Cm", {"0": 0.05, "alpha": -0.7, "q": -10.0, "de": -1.0}) | _of(
-        "CY", {"0": 0.01, "beta": -0.3, "dr": 0.1}
-    )
+    beliefs |= _of("Cm", {"0": 0.05, "alpha": -0.7, "q": -10.0, "de": -1.0})
+    beliefs |= _of("CY", {"0": 0.01, "beta": -0.3, "dr": 0.1})
     beliefs |= _of("Cl", {"0": 0.01, "beta": -0.03, "p": -0.4, "r": 0.1, "da": -0.15})
     beliefs |= _of("Cn", {"0": 0.01, "beta": 0.05, "p": -0.03, "r": -0.1, "dr": -0.05})
     return _aircraft(folder, "thor", Reference(15.0, 1.15), list(CONTROLS), beliefs)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from real.dimensional import Value
+from .dimensional import Value
 
 Numbers = Mapping[str, Value]
 

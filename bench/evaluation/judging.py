@@ -16,6 +16,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.run import run
 from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
 
 from .flying import Setting, fly, noisier
 
@@ -54,18 +55,18 @@ def estimates(aircraft: str, setting: Setting, methods: Sequence[Method], times:
     return np.array(
         [
             [
-                [
-                    [
-                        [d.value, d.standard_error, d.lower, d.upper, d.valid]
-                        for d in map(e.derivatives.get, known.derivatives)
-                    ]
-                    for e in run(method.aircraft(known, setting), method.settings, batch.time, samples, times)
-                ]
+                [_numbers(known, found) for found in run(seen, method.settings, batch.time, samples, times)]
                 for samples in batch.samples
             ]
             for method in methods
+            for seen in [method.aircraft(known, setting)]
         ]
     )
+
+
+def _numbers(known: Aircraft, found: Estimates) -> list[list[float]]:
+    derivatives = [found.derivatives[name] for name in known.derivatives]
+    return [[d.value, d.standard_error, d.lower, d.upper, float(d.valid)] for d in derivatives]
 
 
 def many(

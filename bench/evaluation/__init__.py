@@ -1,0 +1,1 @@
+"""What benches of the estimator share: flights simulated in batches, real flights, and how estimates are judged."""
