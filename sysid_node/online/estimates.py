@@ -26,6 +26,7 @@ HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apar
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
+POOR = 0.7  # share of a coefficient's motion left unexplained beyond which no estimate of it is valid
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
@@ -161,6 +162,7 @@ def _judge(
     inflation = current.solution.inverse.diagonal().take(table.unknown) * motion
     good = (errors <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
     good &= table.offset | (inflation <= HOPELESS)
+    good &= ~_poor(state, current)[table.coefficient]
     if not state.thrust_known:
         good &= ~table.needs_thrust
     if good.all():
@@ -176,6 +178,7 @@ def _reasons(
     table, c = state.model.table, state.model.table.coefficient
     reasons = np.full(len(table.names), "converging", dtype=object)
     # what is found later counts more
+    reasons[_poor(state, current)[c]] = "outside model"
     buried = motion < BURIED * renewed.total.bias.take(table.motion)
     reasons[buried & ~table.offset] = "not excited"
     collinear = (inflation > COLLINEAR) & ~table.offset
@@ -188,6 +191,12 @@ def _reasons(
         reasons[table.needs_thrust] = "thrust not measured"
     reasons[renewed.lost[c]] = "outside model"
     return reasons.tolist()
+
+
+def _poor(state: State, current: Present) -> NDArray[np.bool_]:
+    """(C,) whether the model leaves most of a coefficient's motion unexplained: then its interval means nothing."""
+    poor: NDArray[np.bool_] = current.solution.residual > POOR * current.gram.take(state.plan.square)
+    return poor
 
 
 def _whole(state: State, current: Present, now: float | None) -> str:
