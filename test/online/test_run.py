@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -149,11 +150,10 @@ spoilers: dict[str, Callable[[np.random.Generator, Array], None]] = {
     spoilt=st.lists(st.sampled_from(sorted(spoilers)), max_size=6),
     count=st.integers(0, 400),
     gaps=st.lists(st.tuples(st.integers(0, 399), st.floats(0.0, 3.0)), max_size=4),
+    memory=st.sampled_from([{}, {"forgetting_time": 2.0}, {"window": 3.0}]),
     settings=st.builds(
         Settings,
         method=st.sampled_from(["sls_rft", "iv_rft"]),
-        forgetting_time=st.sampled_from([0.0, 2.0]),
-        window=st.sampled_from([0.0, 3.0]),
         settle_time=st.sampled_from([0.0, 0.5]),
         frequencies=st.sampled_from([(0.1, 0.04, 2.0), (0.3, 0.17, 1.7)]),
         use_prior=st.booleans(),
@@ -161,7 +161,12 @@ spoilers: dict[str, Callable[[np.random.Generator, Array], None]] = {
 )
 @hypothesis_settings(max_examples=40, deadline=None)
 def test_any_record(
-    seed: int, spoilt: list[str], count: int, gaps: list[tuple[int, float]], settings: Settings
+    seed: int,
+    spoilt: list[str],
+    count: int,
+    gaps: list[tuple[int, float]],
+    memory: dict[str, float],
+    settings: Settings,
 ) -> None:
     rng = np.random.default_rng(seed)
     time = 0.02 * np.arange(400) + rng.uniform(0.0, 0.015, 400)
@@ -170,4 +175,5 @@ def test_any_record(
         spoilers[kind](rng, samples)
     for at, length in gaps:
         time[at:] += length
+    settings = replace(settings, **memory)
     assert_same(AIRCRAFT, settings, time[:count], samples[:count], np.arange(0.0, 12.0, 0.9))
