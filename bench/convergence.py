@@ -3,8 +3,7 @@
 Each input goes to all surfaces with the same peaks, in still air with the sensors' noise, the autopilot holding
 attitude: steps on one surface after the other, sweeps and ramps too, multisines and noise on all at once. A derivative
 has converged from the time on at which it stays valid and within 10 % of the truth (an offset near zero: of twice its
-tolerance). Subrahmanyam, Kim and Ghosh compare
-inputs in this way; slow ones come last, and their intervals must say so.
+tolerance). Subrahmanyam, Kim and Ghosh compare inputs in this way; slow ones come last, and their intervals must say so.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from evaluation.flying import MULTISTEP, Setting
+from evaluation.flying import Setting, multistep
 from evaluation.judging import LOWER, METHODS, UPPER, VALID, VALUE, Array, many, processes
 from evaluation.pages import publish, table
 
@@ -42,7 +41,7 @@ def in_turn(kind: str, first: float, apart: float, rest: str) -> tuple[str, ...]
 
 
 INPUTS = {
-    "3-2-1-1": MULTISTEP,
+    "3-2-1-1": multistep(60.0),
     "doublets": in_turn("doublet", 0.7, 2.0, "width=0.35:every=6:repeat=9"),
     "multisine": (f"multisine:{ALL}:length=20:low=0.1:high=2:start=0.7:every=20:repeat=2",),
     "noise": (f"random:{ALL}:length=58:low=0.1:high=2:start=0.7",),

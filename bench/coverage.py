@@ -14,7 +14,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from evaluation.flying import DOUBLETS, Setting
+from evaluation.flying import Setting
 from evaluation.judging import METHODS, Verdict, judge, many, processes
 from evaluation.pages import publish, table
 
@@ -24,9 +24,9 @@ from sysid_node.online.settings import Settings
 AIRCRAFT = "cdrw"
 TIMES = np.array([5.0, 15.0, 60.0])  # s
 SETTINGS = (
-    Setting("white noise", autopilot=False, manoeuvre=DOUBLETS),
-    Setting("light turbulence", "light", autopilot=False, manoeuvre=DOUBLETS),
-    Setting("moderate turbulence", "moderate", autopilot=False, manoeuvre=DOUBLETS),
+    Setting("white noise", autopilot=False),
+    Setting("light turbulence", "light", autopilot=False),
+    Setting("moderate turbulence", "moderate", autopilot=False),
     Setting("white noise, closed loop", "none"),
     Setting("light, closed loop", "light"),
     Setting("moderate, closed loop", "moderate"),

@@ -35,22 +35,34 @@ HEIGHT = 100.0  # m above the ground, for the turbulence
 ROTARY = slice(3, 6)  # of the gusts: the air's rotation
 AIR = [OUTPUTS.index(name) for name in ("V", "alpha", "beta")]
 
-#: 3-2-1-1 on each surface in turn, all of them within the first five seconds, every other one turned round.
-MULTISTEP = tuple(
-    f"3211:{surface}:amplitude={sign * amplitude}:width={width}:start={start + late}:every=12:repeat=5"
-    for surface, amplitude, width, start in (
-        ("elevator", 0.06, 0.3, 0.7),
-        ("aileron", 0.06, 0.25, 0.9),
-        ("rudder", 0.12, 0.3, 2.7),
-    )
-    for sign, late in ((1, 0), (-1, 6))
-)
+PERIOD = 6.0  # s from one manoeuvre to the next on the same surface
 
-#: For flights without an autopilot: what leaves no net bank, pitch or yaw behind, so that the aircraft stays near trim.
-DOUBLETS = tuple(
-    f"doublet:{surface}:amplitude={amplitude}:width=0.35:start={start}:every=6:repeat=9"
-    for surface, amplitude, start in (("elevator", 0.05, 0.7), ("aileron", 0.05, 0.9), ("rudder", 0.1, 2.7))
-)
+
+def multistep(seconds: float) -> tuple[str, ...]:
+    """3-2-1-1s on each surface in turn, all within the first five seconds, every other one turned round."""
+    return tuple(
+        f"3211:{surface}:amplitude={sign * size}:width={width}:{_times(start + late, 7 * width, 2 * PERIOD, seconds)}"
+        for surface, size, width, start in (
+            ("elevator", 0.06, 0.3, 0.7),
+            ("aileron", 0.06, 0.25, 0.9),
+            ("rudder", 0.12, 0.3, 2.7),
+        )
+        for sign, late in ((1, 0.0), (-1, PERIOD))
+        if start + late + 7 * width <= seconds
+    )
+
+
+def doublets(seconds: float) -> tuple[str, ...]:
+    """For flights without an autopilot: no net bank, pitch or yaw is left, so that the aircraft stays near trim."""
+    return tuple(
+        f"doublet:{surface}:amplitude={amplitude}:width=0.35:{_times(start, 0.7, PERIOD, seconds)}"
+        for surface, amplitude, start in (("elevator", 0.05, 0.7), ("aileron", 0.05, 0.9), ("rudder", 0.1, 2.7))
+    )
+
+
+def _times(start: float, length: float, every: float, seconds: float) -> str:
+    """As often as it fits into the flight."""
+    return f"start={start:g}:every={every:g}:repeat={int((seconds - start - length) / every) + 1}"
 
 
 @dataclass(frozen=True)
@@ -60,8 +72,8 @@ class Setting:
     name: str
     turbulence: str = "none"
     autopilot: bool = True
-    manoeuvre: Sequence[str] = MULTISTEP
     seconds: float = 60.0
+    manoeuvre: Sequence[str] = ()  # none: multistep, or without the autopilot doublets
     effects: Effects = field(default_factory=dict)
     vane_noise: float = 1.0  # of the aircraft file's
     rotary: bool = True  # whether the turbulence turns the air, too
@@ -89,7 +101,9 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
         effects["turbulence"] = {"intensity": INTENSITIES[setting.turbulence]}
     theta = simulator.vector(effects)
     trim = trim_flight(simulator, theta=theta)
-    plan = parse_manoeuvre(setting.manoeuvre, simulator.aircraft, RATE, setting.seconds)
+    usual = multistep if setting.autopilot else doublets
+    flown = setting.manoeuvre or usual(setting.seconds)
+    plan = parse_manoeuvre(flown, simulator.aircraft, RATE, setting.seconds)
     commands = jnp.asarray(trim.command + np.column_stack([plan.surfaces(), np.zeros(plan.time.size)]))
     pilot = autopilot_for(simulator, trim)
 

@@ -1,0 +1,56 @@
+"""Intervals hold the truth, in a few simulated flights; bench/coverage.py flies hundreds. Truth: the aircraft file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench.evaluation.flying import AIR_INTERVAL, Setting, fly
+from bench.evaluation.judging import METHODS, estimates, judge
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+TRUTH = [d.value for d in load_aircraft("cdrw").derivatives.values()]
+FLIGHTS = range(1, 25)
+
+
+@pytest.mark.parametrize("turbulence", ["none", "light"])
+def test_intervals_hold_the_truth(turbulence):
+    """24 flights of 27 derivatives: the estimates of a flight depend on one another, so the bounds are wide."""
+    setting = Setting("test", turbulence, seconds=15.0)
+    found = estimates("cdrw", setting, [METHODS["iv_rft"]], np.array([14.9]), FLIGHTS)[0, :, 0]
+    verdicts = [judge(found[:, d], truth) for d, truth in enumerate(TRUTH)]
+    assert np.mean([v.share_valid for v in verdicts]) > 0.9
+    assert 0.88 < np.nanmean([v.coverage for v in verdicts]) < 0.99
+    assert sum(v.far for v in verdicts) <= 0.005 * sum(v.valid for v in verdicts)
+
+
+def test_a_verdict_knows_honest_estimates_from_bold_ones():
+    random = np.random.default_rng(3)
+    value = 2.0 + 0.1 * random.standard_normal(4000)
+
+    def claimed(error):
+        return np.column_stack([value, *np.broadcast_arrays(error, value - 1.96 * error, value + 1.96 * error, 1.0)])
+
+    honest, bold = judge(claimed(np.full(4000, 0.1)), 2.0), judge(claimed(np.full(4000, 0.02)), 2.0)
+    assert honest.coverage == pytest.approx(0.95, abs=0.015)
+    assert honest.spread == pytest.approx(1.0, abs=0.05)
+    assert not honest.off
+    assert bold.off
+    assert bold.far > 1000
+
+
+def test_what_is_not_valid_does_not_count():
+    rows = np.array([[1.0, 0.1, 0.8, 1.2, 1.0], [1.1, 0.1, 0.9, 1.3, 1.0], [99.0, 0.1, 98.0, 100.0, 0.0]])
+    verdict = judge(rows, 1.0)
+    assert verdict.share_valid == pytest.approx(2 / 3)
+    assert verdict.coverage == 1.0
+    assert verdict.far == 0
+
+
+def test_air_data_come_at_their_own_rate_and_are_interpolated():
+    batch = fly("cdrw", Setting("test", seconds=5.0), [1, 2])
+    alpha = batch.samples[..., SAMPLE_COLUMNS.index("alpha")]
+    np.testing.assert_allclose(alpha[:, 1:-1:2], 0.5 * (alpha[:, :-2:2] + alpha[:, 2::2]), rtol=1e-12)
+    assert np.all(batch.samples[..., SAMPLE_COLUMNS.index("air_interval")] == AIR_INTERVAL)
+    assert not np.array_equal(batch.samples[0], batch.samples[1])
