@@ -3,7 +3,7 @@
 Each input goes to all surfaces with the same peaks, in still air with the sensors' noise, the autopilot holding
 attitude: steps on one surface after the other, sweeps and ramps too, multisines and noise on all at once. A derivative
 has converged from the time on at which it stays valid and within 10 % of the truth (an offset near zero: of twice its
-tolerance). Subrahmanyam, Kim and Ghosh compare inputs in this way; slow ones come last, and their intervals must say so.
+tolerance). Subrahmanyam, Kim and Ghosh compare inputs so; slow ones come last, and their intervals must say it.
 """
 
 from __future__ import annotations
