@@ -108,7 +108,7 @@ def test_the_bag_of_estimates_holds_every_one(arguments, tmp_path, bag):
     assert len(messages) == len(done.history)
     for (log_ns, m), known, stamp in zip(messages, done.history, done.stamps_ns.tolist(), strict=True):
         assert log_ns == m.header.stamp.sec * 10**9 + m.header.stamp.nanosec == stamp
-        assert (m.aircraft, m.method, m.header.frame_id) == ("made", "sls_rft", "imu")
+        assert (m.aircraft, m.method, m.header.frame_id) == ("made", Settings().method, "imu")
         for told, d in zip(m.derivatives, known.derivatives.values(), strict=True):
             assert (told.name, told.status, told.valid) == (d.name, d.status, d.valid)
             ours, theirs = ([getattr(x, f) for f in ("value", "standard_error", "lower", "upper")] for x in (told, d))

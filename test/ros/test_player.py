@@ -68,8 +68,11 @@ def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Pat
     imu, _ = hear(probe, bag, "--rate", "8", "--wait", "0.5", "--restamp")
     now = probe.node.get_clock().now().nanoseconds
     stamps = read_streams(bag).imu.arrival.stamp_ns.tolist()
-    shifts = {conversion.stamp_ns(message.header.stamp) - stamp for message, stamp in zip(imu, stamps, strict=True)}
-    (shift,) = shifts
+    heard = [conversion.stamp_ns(message.header.stamp) for message in imu]
+    shift = heard[-1] - stamps[-1]
+    # a busy machine may hear the first messages late, or not at all
+    assert len(heard) > 0.9 * len(stamps)
+    assert {stamp - shift for stamp in heard} <= set(stamps)
     assert abs(START_NS + shift - now) < 30 * 10**9
 
 
