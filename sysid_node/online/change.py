@@ -22,7 +22,7 @@ from scipy.special import gdtrix
 
 from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.information import products
-from sysid_node.online.regression import STRONG, Plan, Solution, Uncertainty, misfits
+from sysid_node.online.regression import STRONG, TINY, Plan, Solution, Uncertainty, misfits
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,8 @@ def _suspects(plan: Plan, reference: Reference, gram: Array, energy: float) -> l
     """Coefficients whose earlier estimates are trusted and miss more than noise, a share of the motion that matters."""
     v = misfits(plan, reference.solution.theta)
     misfit = ((gram @ v) * v).sum(axis=0)
-    missed = (misfit > MISFIT * gram.take(plan.square)) & (misfit > NOISY * energy * reference.uncertainty.density)
+    motion = gram.take(plan.square)
+    missed = (misfit > MISFIT * motion) & (misfit > NOISY * energy * reference.uncertainty.density) & (motion > TINY)
     firm = (np.where(plan.mine > 0.0, reference.strength[:, None], np.inf) >= STRONG).all(axis=0)
     return np.flatnonzero(missed & firm & (reference.uncertainty.freedom >= KNOWN)).tolist()
 

@@ -161,30 +161,35 @@ def _judge(
     motion = current.gram.take(table.motion)
     inflation = current.solution.inverse.diagonal().take(table.unknown) * motion
     good = (errors <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
-    good &= table.offset | (inflation <= HOPELESS)
+    slope = ~table.offset
+    buried = slope & (motion < np.maximum(BURIED * renewed.total.bias.take(table.motion), regression.TINY))
+    hidden = buried | (slope & (inflation > HOPELESS))
+    if hidden.any():
+        # what a hidden slope does is in the offset
+        hidden |= table.offset & np.isin(table.coefficient, table.coefficient[hidden])
+        good &= ~hidden
     good &= ~_poor(state, current)[table.coefficient]
     if not state.thrust_known:
         good &= ~table.needs_thrust
     if good.all():
         return ["ok"] * len(table.names)
-    reasons = _reasons(state, renewed, grounds, current, inflation, motion)
+    reasons = _reasons(state, renewed, grounds, current, inflation, buried)
     return ["ok" if ok else reason for ok, reason in zip(good.tolist(), reasons, strict=True)]
 
 
 def _reasons(
-    state: State, renewed: Renewed, grounds: Grounds, current: Present, inflation: Array, motion: Array
+    state: State, renewed: Renewed, grounds: Grounds, current: Present, inflation: Array, buried: NDArray[np.bool_]
 ) -> list[str]:
-    """(D,) what speaks against each estimate; ``inflation`` of variances by the others, ``motion`` of regressors."""
+    """(D,) what speaks against each estimate: ``inflation`` of variances, regressors ``buried`` in noise, and more."""
     table, c = state.model.table, state.model.table.coefficient
     reasons = np.full(len(table.names), "converging", dtype=object)
     # what is found later counts more
     reasons[_poor(state, current)[c]] = "outside model"
-    buried = motion < BURIED * renewed.total.bias.take(table.motion)
-    reasons[buried & ~table.offset] = "not excited"
     collinear = (inflation > COLLINEAR) & ~table.offset
     if collinear.any():
         names = regression.rivals(state.plan, current.solution)
         reasons[collinear] = [f"collinear with {names[i]}" for i in table.unknown[collinear].tolist()]
+    reasons[buried] = "not excited"
     reasons[grounds.spoilt] = [f"{renewed.timing.blamed[i]} not on time" for i in c[grounds.spoilt].tolist()]
     reasons[(renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = "converging"
     if not state.thrust_known:
@@ -195,7 +200,8 @@ def _reasons(
 
 def _poor(state: State, current: Present) -> NDArray[np.bool_]:
     """(C,) whether the model leaves most of a coefficient's motion unexplained: then its interval means nothing."""
-    poor: NDArray[np.bool_] = current.solution.residual > POOR * current.gram.take(state.plan.square)
+    motion = current.gram.take(state.plan.square)
+    poor: NDArray[np.bool_] = (current.solution.residual > POOR * motion) & (motion > regression.TINY)
     return poor
 
 

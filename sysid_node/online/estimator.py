@@ -32,6 +32,7 @@ DRIFT = OUTPUTS + NUISANCES.index("t")
 AIRSPEED, DENSITY = SAMPLE_COLUMNS.index("V"), SAMPLE_COLUMNS.index("rho")
 THRUST, INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
 LIMIT = 1e9  # nothing measured is as large in SI units
+SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorter steps would pass for acceleration
 
 
 def init(aircraft: Aircraft, settings: Settings) -> State:
@@ -71,9 +72,10 @@ def _lowest(controls: int) -> tuple[float, ...]:
 
 
 def update(state: State, time: float, sample: Sequence[float]) -> None:
-    """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s, increasing).
+    """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s).
 
-    A sample that lacks a value other than thrust, or has an impossible one, is left out and counted in ``incomplete``.
+    A sample that lacks a value other than thrust, has an impossible one, or does not come after the last one, is left
+    out and counted in ``incomplete``.
     """
     if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = time + state.model.settings.settle_time
@@ -84,8 +86,8 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
         if not sample:
             return
     previous = state.previous
-    if previous is not None and time <= previous[0]:
-        state.incomplete["time"] = state.incomplete.get("time", 0) + 1
+    if previous is not None and time - previous[0] < SHORTEST:
+        leave_out(state, len(sample))
         return
     row, angles = state.model.signals(sample)
     row.insert(DRIFT, time)
@@ -113,14 +115,14 @@ def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[f
             leave_out(state, column)
             return ()
     if not time < LIMIT:
-        state.incomplete["time"] = state.incomplete.get("time", 0) + 1
+        leave_out(state, len(filled))
         return ()
     return filled
 
 
 def leave_out(state: State, column: int) -> None:
-    """Count a sample that lacks a possible value of a column."""
-    name = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols)[column]
+    """Count a sample that lacks a possible value of a column; the one behind them all stands for the time."""
+    name = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols, "time")[column]
     state.incomplete[name] = state.incomplete.get(name, 0) + 1
 
 

@@ -26,6 +26,10 @@ BAND_PRIOR = 8.0
 STRONG = 15.0
 #: Energy under which a regressor has not moved at all.
 TINY = 1e-18
+#: Share of its energy by which a regressor is set apart from others where their equations are singular.
+RIDGE = 1e-12
+#: Share of an output's energy that is rounding: no residual is smaller.
+ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
@@ -114,11 +118,12 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     normal, cross = gathered[0], gathered[-1]
     if bias is not None:
         cross = cross - bias
-    known = np.empty_like(cross)
-    known[:P] = plan.unit
-    known[P:] = cross[P:]
-    solver = dposv if plan.least_squares else dgesv
-    *_, solved, fault = solver(cross[:P].T, known.T, overwrite_b=True)
+    solved, fault = _factorise(plan, cross)
+    if fault:
+        # a regressor that has not moved, or that moved as others did: its own estimate is lost, not all of them
+        ridged = cross.copy()
+        ridged[:P] += plan.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
+        solved, fault = _factorise(plan, ridged)
     squares = gram.take(plan.square)
     if fault or not math.isfinite(solved[0, 0]):
         return Solution(np.zeros_like(plan.mine), np.zeros((P, P)), squares, False)
@@ -128,8 +133,20 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     misfit -= normal[P:]
     misfit -= normal[P:]
     misfit *= theta.T
+    least = ROUNDING * squares
     squares += misfit.sum(axis=1)
-    return Solution(theta, solved[:, :P], np.maximum(squares, 0.0), True)
+    return Solution(theta, solved[:, :P], np.maximum(squares, least), True)
+
+
+def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
+    """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), and LAPACK's fault, 0 for none."""
+    P = plan.columns.size
+    known = np.empty_like(cross)
+    known[:P] = plan.unit
+    known[P:] = cross[P:]
+    solver = dposv if plan.least_squares else dgesv
+    *_, solved, fault = solver(cross[:P].T, known.T, overwrite_b=True)
+    return solved, fault
 
 
 def bias_of(plan: Plan, bias: Array) -> Array:
@@ -167,7 +184,8 @@ def uncertainty(plan: Plan, solution: Solution, info: Information, scale_varianc
     if not solution.usable or info.trace_square <= 0.0:
         return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
     v = misfits(plan, solution.theta)
-    squares = np.maximum(((info.grams @ v) * v).sum(axis=1), 0.0).T  # (C, B)
+    least = ROUNDING * info.grams[:, plan.outputs, plan.outputs]
+    squares = np.maximum(((info.grams @ v) * v).sum(axis=1), least).T  # (C, B)
     scores = info.scores[:, plan.instruments[:, None], plan.instruments] * plan.same
     used = ((scores * solution.inverse.T).sum(axis=2) @ plan.mine).T  # (C, B): taken up by the unknowns
     expected = np.maximum(info.traces - used, 0.05 * info.traces + TINY)
@@ -203,6 +221,7 @@ def strength(plan: Plan, solution: Solution, info: Information) -> Array:
     efficiency = np.clip(best / np.maximum(achieved, TINY), 0.0, 1.0 - 1e-9)
     freedom = float(info.traces.sum()) ** 2 / info.trace_square
     statistic: Array = freedom * efficiency / (1.0 - efficiency)
+    statistic[outer.diagonal() <= TINY] = 0.0  # no instrument at all
     return statistic
 
 

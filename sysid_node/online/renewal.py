@@ -143,7 +143,7 @@ def _scale_variance(state: State, total: Information) -> Array:
     outputs = model.plan.outputs
     interval = state.intervals / max(state.samples, 1)
     relative = (2.0 * model.aircraft.noise["airspeed"] / model.aircraft.reference.airspeed) ** 2 * interval
-    motion = np.maximum(total.motion[outputs], 1e-300)
+    motion = np.maximum(total.motion[outputs], 1e-100)
     variance: Array = np.minimum(relative * total.bursts[outputs] / motion**2, 1.0)
     return variance
 

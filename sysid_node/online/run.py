@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -55,7 +56,7 @@ class _Chunk:
     """Consecutive usable samples (n,), each with the interval that ends in it. Times in s."""
 
     kept: NDArray[np.intp]  # (N + 1,) usable samples among the first of those given
-    missing: NDArray[np.intp]  # (N,) column that a sample lacks, -1 where it is usable or too early to count
+    missing: NDArray[np.intp]  # (N,) what ``leave_out`` counts, -1 where a sample is usable or too early to count
     powerless: NDArray[np.bool_]  # (N,) samples without a thrust
     time: Array  # (n,)
     begins: Array  # (n,) start of the interval; NaN where none leads to the sample
@@ -107,7 +108,26 @@ def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_
     powerless = late & ~possible[:, estimator.THRUST]
     possible[:, estimator.THRUST] = True
     complete = possible.all(axis=1)
-    return late & complete, np.where(late & ~complete, np.argmin(possible, axis=1), -1), powerless
+    missing = np.where(late & ~complete, np.argmin(possible, axis=1), -1)
+    usable = late & complete
+    hasty = _hasty(state, time, np.flatnonzero(usable))
+    missing[hasty] = samples.shape[1]
+    usable[hasty] = False
+    return usable, missing, powerless
+
+
+def _hasty(state: State, time: Array, rows: NDArray[np.intp]) -> list[int]:
+    """Those of the ``rows`` that do not come after the last usable sample before them."""
+    last = state.previous[0] if state.previous is not None else -math.inf
+    if not np.any(np.diff(time[rows], prepend=last) < estimator.SHORTEST):
+        return []
+    hasty = []
+    for row in rows.tolist():
+        if time[row] - last < estimator.SHORTEST:
+            hasty.append(row)
+        else:
+            last = float(time[row])
+    return hasty
 
 
 def _advance(state: State, chunk: _Chunk, first: int, stop: int) -> None:

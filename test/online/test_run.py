@@ -99,6 +99,16 @@ def test_thrust_lost_late_is_not_known_early() -> None:
     assert found[1].derivatives["CL_0"].status == "thrust not measured"
 
 
+def test_repeated_and_too_early_times() -> None:
+    """Samples no later than the one before are left out alike, at the edges of chunks too."""
+    time, samples = flight(7)
+    time[[50, 51, 400]] = time[49]
+    time[run.CHUNK] = time[run.CHUNK - 1] + 1e-6
+    time[700:] -= 0.05
+    order = np.searchsorted(np.maximum.accumulate(time), np.arange(0.3, SECONDS, 0.9))
+    assert_same(AIRCRAFT, Settings(), time, samples, np.maximum.accumulate(time)[order])
+
+
 def test_an_abrupt_change() -> None:
     time, samples = flight(3)
     rows = time >= 8.0

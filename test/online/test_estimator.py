@@ -1,0 +1,185 @@
+"""The estimator takes whatever comes: no exception, and nothing valid that is nonsense."""
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from plant import TRUTH, exact_flight, made_aircraft
+
+from sysid_node.aircraft.model import Derivative
+from sysid_node.errors import InputError
+from sysid_node.online import estimator, intake
+from sysid_node.online.estimates import estimate
+from sysid_node.online.model_gap import model_gap
+from sysid_node.online.settings import METHODS, Settings
+from sysid_node.online.state import State
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+AIRCRAFT = made_aircraft()
+TIME = np.arange(0.0, 6.0, 0.02)
+SAMPLES = exact_flight(AIRCRAFT, TIME)
+WIDTH = SAMPLES.shape[1]
+anything = st.one_of(
+    st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, 1e-200, 1e200, -1e308, 1e9, 57.3]), st.floats()
+)
+
+
+def assert_sound(state: State) -> None:
+    """What is marked valid is a finite value inside a finite interval of positive length."""
+    for d in estimate(state).derivatives.values():
+        assert d.valid == (d.status == "ok")
+        if d.valid:
+            assert all(map(math.isfinite, d[1:5])), d
+            assert d.lower < d.value < d.upper
+            assert d.standard_error > 0.0
+    model_gap(state)
+
+
+def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: str = "iv_rft") -> State:
+    """The state after the samples; numerical warnings count as errors."""
+    state = estimator.init(AIRCRAFT, Settings(method=method, settle_time=0.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for time, sample in zip(times, samples, strict=True):
+            estimator.update(state, time, sample)
+        assert_sound(state)
+    return state
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, len(TIME) - 1), st.integers(0, WIDTH - 1), anything), max_size=40),
+    st.sampled_from(METHODS),
+)
+@hypothesis_settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_any_values(spoilt: list[tuple[int, int, float]], method: str) -> None:
+    samples = SAMPLES.tolist()
+    for row, column, value in spoilt:
+        samples[row][column] = value
+    flown(samples, TIME.tolist(), method)
+
+
+@given(st.lists(st.tuples(st.integers(0, len(TIME) - 1), anything), max_size=40))
+@hypothesis_settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@example([(0, math.nan), (1, math.inf), (2, -math.inf), (50, 1e200)])
+def test_any_times(spoilt: list[tuple[int, float]]) -> None:
+    """Repeated, shuffled, absent and absurd times: left out, and the flight goes on where they are bearable."""
+    times = TIME.tolist()
+    for row, time in spoilt:
+        times[row] = time
+    flown(SAMPLES.tolist(), times)
+
+
+@given(st.permutations(range(60)), st.sampled_from(METHODS))
+@hypothesis_settings(max_examples=15, deadline=None)
+def test_any_order(order: list[int], method: str) -> None:
+    rows = [*range(200), *(200 + i for i in order)]
+    flown(SAMPLES[rows].tolist(), TIME[rows].tolist(), method)
+
+
+@given(st.lists(st.lists(anything, min_size=WIDTH, max_size=WIDTH), max_size=30))
+@hypothesis_settings(max_examples=30, deadline=None)
+def test_nothing_but_nonsense(samples: list[list[float]]) -> None:
+    flown(samples, [0.1 * i for i in range(len(samples))])
+
+
+@given(st.data())
+@hypothesis_settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_any_messages(data: st.DataObject) -> None:
+    """Messages with any values and stamps through the intake, as the node and the replay feed them."""
+    door = intake.init(AIRCRAFT, 0.2)
+    state = estimator.init(AIRCRAFT, Settings(settle_time=0.0))
+    stamps = (1_000_000_000 + np.round(TIME * 1e9)).astype(int).tolist()
+    odd = dict(data.draw(st.lists(st.tuples(st.integers(0, len(TIME) - 1), st.integers(-(10**9), 10**18)), max_size=8)))
+    wrong = dict(data.draw(st.lists(st.tuples(st.integers(0, len(TIME) - 1), anything), max_size=8)))
+    names = tuple(AIRCRAFT.controls)
+    for i, (regular, sample) in enumerate(zip(stamps, SAMPLES.tolist(), strict=True)):
+        stamp, values = odd.get(i, regular), [wrong.get(i, sample[0]), *sample[1:]]
+        complete = intake.on_imu(door, stamp, tuple(values[:6]))
+        complete += intake.on_air_data(door, stamp, tuple(wrong.get(i, x) for x in values[6:10]))
+        complete += intake.on_actuators(door, stamp, (*names, "throttle"), [*values[12:], 0.2])
+        for time, aligned in complete:
+            estimator.update(state, time, aligned)
+    assert_sound(state)
+
+
+def test_what_is_left_out_is_counted_by_its_column() -> None:
+    samples = SAMPLES.tolist()
+    samples[100][SAMPLE_COLUMNS.index("alpha")] = math.nan
+    samples[101][SAMPLE_COLUMNS.index("alpha")] = 1e200
+    samples[102][SAMPLE_COLUMNS.index("V")] = 0.0
+    samples[103][SAMPLE_COLUMNS.index("rho")] = -1.0
+    samples[104][len(SAMPLE_COLUMNS)] = math.inf
+    times = TIME.tolist()
+    times[105] = times[99]
+    times[106] = math.inf
+    state = flown(samples, times)
+    assert state.incomplete == {"alpha": 2, "V": 1, "rho": 1, "de": 1, "time": 2}
+
+
+def test_nonsense_in_the_middle_leaves_the_estimates_alone() -> None:
+    samples = SAMPLES.tolist()
+    for row in range(120, 125):
+        samples[row] = [1e300] * WIDTH
+    spoilt = estimate(flown(samples, TIME.tolist(), "sls_rft")).derivatives
+    clean = estimate(flown(SAMPLES.tolist(), TIME.tolist(), "sls_rft")).derivatives
+    for name in TRUTH:
+        assert spoilt[name].value == pytest.approx(clean[name].value, rel=2e-2, abs=1e-3)
+
+
+def test_a_long_silence_is_not_bridged() -> None:
+    """A gap of a minute, at another trim: what lies in between is not made up."""
+    later = exact_flight(AIRCRAFT, TIME, seed=3, alpha=0.14)
+    state = flown([*SAMPLES.tolist(), *later.tolist()], [*TIME.tolist(), *(TIME + 66.0).tolist()], "sls_rft")
+    found = estimate(state)
+    for name in ("CL_alpha", "Cm_alpha", "Cm_de", "Cl_p", "Cn_beta"):
+        assert found.derivatives[name].value == pytest.approx(TRUTH[name], rel=2e-3)
+    assert found.fits["Cm"].samples == pytest.approx(2 * len(TIME), abs=60)
+
+
+def test_settling_counts_from_the_first_sample() -> None:
+    state = estimator.init(AIRCRAFT, Settings(settle_time=2.0))
+    for time, sample in zip((TIME + 50.0).tolist(), SAMPLES.tolist(), strict=True):
+        estimator.update(state, time, sample)
+        if time < 52.0:
+            assert state.previous is None
+    assert state.segment_start >= 52.0
+
+
+def test_a_model_of_offsets_alone_is_refused() -> None:
+    aircraft = replace(AIRCRAFT, derivatives={"CL_0": Derivative(0.1), "Cm_0": Derivative(0.0)})
+    with pytest.raises(InputError, match="at least one besides offsets"):
+        estimator.init(aircraft, Settings())
+
+
+@pytest.mark.parametrize("settings", [Settings(window=10.0), Settings(forgetting_time=5.0)], ids=["window", "fading"])
+def test_what_was_flown_long_ago_is_forgotten(settings: Settings) -> None:
+    """The elevator's effect changes without a test for changes: after five memories the new one alone is known."""
+    changed = made_aircraft({**TRUTH, "Cm_de": 0.6 * TRUTH["Cm_de"]})
+    time = np.arange(0.0, 60.0, 0.02)
+    samples = np.vstack([exact_flight(AIRCRAFT, time[:1500]), exact_flight(changed, time[1500:], 4)])
+    blind = replace(settings, detect_changes=False, method="sls_rft")
+    state = estimator.init(AIRCRAFT, blind)
+    for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, t, sample)
+    assert estimate(state).derivatives["Cm_de"].value == pytest.approx(0.6 * TRUTH["Cm_de"], rel=0.02)
+    assert len(state.inside) <= 6
+
+
+def test_memory_does_not_grow() -> None:
+    """Containers after two minutes are no longer than after one."""
+    time = np.arange(0.0, 120.0, 0.05)
+    samples = exact_flight(AIRCRAFT, time)
+    state = estimator.init(AIRCRAFT, Settings(window=20.0))
+    sizes = []
+    for i, (t, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
+        estimator.update(state, t, sample)
+        if i in (1199, 2399):
+            watch = state.watch
+            sizes.append([len(state.inside), len(watch.pieces), len(watch.references), len(watch.usual)])
+    assert sizes[0] == sizes[1]
