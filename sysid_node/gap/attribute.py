@@ -99,7 +99,7 @@ def stage(current: Trial, candidates: Sequence[Candidate], nuisances: Nuisances,
     """The candidates upon what is known so far, the most probable first."""
     looked: list[tuple[float, Candidate, tuple[float, ...]]] = []
     fresh = with_candidates(current.fit, current.fit.candidates, nuisances, ())
-    problem = Projected(fresh)
+    problem = Projected(fresh, bounded=False)
     for i, candidate in enumerate(candidates):
         progress(0.6 * i / len(candidates), candidate.label)
         looked.append(_first_look(fresh, problem, candidate))

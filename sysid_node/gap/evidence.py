@@ -1,7 +1,9 @@
 """Evidence: how probable flight is that a fit has not seen, and the probabilities of explanations that follow.
 
 Each group of windows is predicted from the others (or from the training flights), with the uncertainty of everything
-that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12; 5.10-5.12 leave out).
+that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12; 5.10-5.12 leave out). What
+the fit asks of the priors counts too, as a share of each group: prediction from the rest alone would forgive an
+explanation that needs every derivative two sigmas out.
 Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities mean no
 more than so many independent observations can say (Yao, Vehtari, Simpson & Gelman (2018), Bayesian Analysis 13(3),
 "pseudo-BMA+").
@@ -68,7 +70,7 @@ def cross_validated(fit: Fit) -> Evidence:
             scores.append(score)
             unseen[group] = part
         residuals.append(unseen)
-    return Evidence(np.array(scores), tuple(residuals), fit.views)
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views)
 
 
 def _without_shapes(fit: Fit) -> Array:
@@ -107,7 +109,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
             score, _ = _predictive(view, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
             scores.append(score)
         residuals.append(view.residual(point))
-    return Evidence(np.array(scores), tuple(residuals), tuple(views))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(views))
 
 
 def _ordered(nuisances: Nuisances) -> list[int]:

@@ -26,6 +26,9 @@ from sysid_node.gap.view import View
 #: Rounds of linearising the nuisances anew; a fourth changes nothing that matters.
 _ROUNDS = 3
 
+#: Times that nuisances are put at their limits before what is left beyond is cut off.
+_BINDINGS = 6
+
 #: Evaluations of the small nonlinear problem in each round.
 _EVALUATIONS = 12
 
@@ -51,11 +54,16 @@ class Fit:
 
     @property
     def loose(self) -> NDArray[np.bool_]:
-        """Of all unknowns, those that evidence takes as uncertain: all but parameters that only shape an effect."""
+        """Of all unknowns, those that evidence takes as uncertain.
+
+        All but parameters that only shape an effect, and nuisances that stand at their limits.
+        """
         assert self.information is not None
         loose = np.ones(self.information.shape[0], bool)
         for place, index in enumerate(self.indices):
             loose[place] = self.views[0].simulator.parameters[index][1].switch
+        now, _, limit = self.stacked
+        loose[len(self.indices) :] = np.abs(now) < limit * (1.0 - 1e-9)
         return loose
 
     @property
@@ -75,14 +83,22 @@ class Fit:
         return np.asarray(np.linalg.inv(self.information))
 
     @property
-    def stacked(self) -> tuple[Array, Array]:
-        """Values (about neutral, which is zero for all) and 1-sigma of all flights' nuisances."""
+    def stacked(self) -> tuple[Array, Array, Array]:
+        """Values (about neutral, which is zero for all), 1-sigma and limits of all flights' nuisances."""
         _, shared, own = self.sizes
-        now, sigma = np.zeros(shared + len(self.views) * own), np.ones(shared + len(self.views) * own)
+        now, sigma, limit = (np.ones(shared + len(self.views) * own) for _ in range(3))
         for i, point in enumerate(self.points):
             places = _places(self.nuisances, i)
-            now[places], sigma[places] = point[list(self.nuisances.indices)], self.nuisances.sigma
-        return now, sigma
+            now[places] = point[list(self.nuisances.indices)]
+            sigma[places], limit[places] = self.nuisances.sigma, self.nuisances.limit
+        return now, sigma, limit
+
+    @property
+    def prior_score(self) -> float:
+        """Log probability of where everything stands under its prior, up to a constant: nats, zero at best."""
+        now, sigma, _ = self.stacked
+        centre, own = prior(self.views[0].simulator, self.indices)
+        return -0.5 * float(np.sum((now / sigma) ** 2) + np.sum(((self.values - centre) / own) ** 2))
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -165,21 +181,49 @@ def _one_round(fit: Fit) -> Fit:
 
 
 class Projected:
-    """What is left of the residual at the candidates' parameters when the nuisances do their best."""
+    """What is left of the residual at the candidates' parameters when the nuisances do their best.
 
-    def __init__(self, fit: Fit) -> None:
+    ``bounded``: nuisances that would go beyond their limits at the fit's values are put there and stay (an active set,
+    found anew for each linearisation).
+    """
+
+    def __init__(self, fit: Fit, bounded: bool = True) -> None:
         self.fit, self.weights = fit, [weights(v.windows, p) for v, p in zip(fit.views, fit.power, strict=True)]
         own = list(fit.nuisances.indices)
         blocks = []
         for i, (view, point, weight) in enumerate(zip(fit.views, fit.points, self.weights, strict=True)):
             slopes = real_rows(view.slopes(point, own), weight)
             blocks.append(_placed(slopes.reshape(-1, len(own)), fit.nuisances, i, len(fit.views)))
-        self.now, spread = fit.stacked
+        self.now, spread, self.limit = fit.stacked
         self.prior = np.diag(1.0 / spread)
-        matrix = np.vstack([*blocks, self.prior])
-        self.Q, self.R = qr(matrix, mode="economic")
+        self.matrix = np.vstack([*blocks, self.prior])
         self.indices = list(fit.indices)
         self.centre, self.sigma = prior(fit.views[0].simulator, fit.indices)
+        self._settle(np.ones(self.now.size, bool), np.zeros(self.now.size))
+        if bounded:
+            self._bind(fit.values)
+
+    def _settle(self, free: NDArray[np.bool_], shift: Array) -> None:
+        """Which nuisances may move, and how far the others stand from where the residual is taken."""
+        self.free, self.shift = free, shift
+        self.moved_rows = self.matrix @ shift
+        self.Q, self.R = qr(self.matrix[:, free], mode="economic")
+
+    def _bind(self, values: Array) -> None:
+        """Puts at their limits those that would go beyond, until none would."""
+        for _ in range(_BINDINGS):
+            there = self.now + self._step(values)
+            beyond = self.free & (np.abs(there) > self.limit)
+            if not beyond.any():
+                return
+            shift = np.where(beyond, np.sign(there) * self.limit - self.now, self.shift)
+            self._settle(self.free & ~beyond, shift)
+
+    def _step(self, values: Array) -> Array:
+        """How far the nuisances' best at these values lies from where the residual is taken."""
+        step = self.shift.copy()
+        step[self.free] = np.linalg.solve(self.R, self.Q.T @ self._rows(values))
+        return step
 
     def looking(self, indices: Sequence[int]) -> Projected:
         """The same nuisances, but another set of parameters to move."""
@@ -195,7 +239,7 @@ class Projected:
             there = point.copy()
             there[self.indices] = values
             rows.append(real_rows(view.residual(there), weight).ravel())
-        return np.concatenate([*rows, -self.prior @ self.now])
+        return np.concatenate([*rows, -self.prior @ self.now]) - self.moved_rows
 
     def residual(self, values: Array) -> Array:
         """Rows to be made small, the parameters' own priors last."""
@@ -216,8 +260,7 @@ class Projected:
 
     def points(self, values: Array) -> tuple[Array, ...]:
         """All parameters by flight, with the nuisances' best at these values."""
-        step = np.linalg.solve(self.R, self.Q.T @ self._rows(values))
-        moved = self.now + step
+        moved = np.clip(self.now + self._step(values), -self.limit, self.limit)
         points = []
         for i, point in enumerate(self.fit.points):
             fresh = point.copy()
@@ -249,11 +292,11 @@ def moved(fit: Fit, step: Array) -> Fit:
     """The fit with all unknowns a step (unknowns,) on, the candidates' within their bounds."""
     chosen = list(fit.indices)
     low, high = bounds(fit.views[0].simulator, chosen)
-    points = []
+    own, limit, points = list(fit.nuisances.indices), fit.nuisances.limit, []
     for i, point in enumerate(fit.points):
         fresh = point.copy()
         fresh[chosen] = np.clip(point[chosen] + step[: len(chosen)], low, high)
-        fresh[list(fit.nuisances.indices)] += step[len(chosen) + _places(fit.nuisances, i)]
+        fresh[own] = np.clip(point[own] + step[len(chosen) + _places(fit.nuisances, i)], -limit, limit)
         points.append(fresh)
     return replace(fit, points=tuple(points))
 
@@ -261,8 +304,8 @@ def moved(fit: Fit, step: Array) -> Fit:
 def linearised(fit: Fit) -> Fit:
     """The fit with its residual, slopes and information where it stands, for evidence and errors."""
     own, chosen = list(fit.nuisances.indices), list(fit.indices)
-    _, spread = fit.stacked
-    centre, sigma = prior(fit.views[0].simulator, fit.indices)
+    _, spread, _ = fit.stacked
+    _, sigma = prior(fit.views[0].simulator, fit.indices)
     rows, slopes = [], []
     for i, (view, point, power) in enumerate(zip(fit.views, fit.points, fit.power, strict=True)):
         weight = weights(view.windows, power)
@@ -274,9 +317,7 @@ def linearised(fit: Fit) -> Fit:
     for block in slopes:
         flat = block.reshape(-1, block.shape[2])
         information += flat.T @ flat
-    now, _ = fit.stacked
-    cost = sum(float(np.sum(r**2)) for r in rows) + float(np.sum((now / spread) ** 2))
-    cost += float(np.sum(((fit.values - centre) / sigma) ** 2))
+    cost = sum(float(np.sum(r**2)) for r in rows) - 2.0 * fit.prior_score
     return replace(fit, rows=tuple(rows), slopes=tuple(slopes), information=information, cost=cost)
 
 

@@ -1,8 +1,9 @@
-"""What is always allowed for: the derivatives' errors within their tolerances, and biases.
+"""What is always allowed for: the derivatives' errors within their tolerances, biases, and clocks within one sample.
 
-Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value. Derivatives are shared by
-all flights; biases are each flight's own. Clocks are none: data that know a delay to a millisecond overrule any prior
-that is meant for half a sample, and a lag would pass as one; a delay is a candidate, and must matter.
+Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value, cut off at three sigmas (a
+clock's: at one sample). The cut is what makes a tolerance a tolerance: data that know a derivative to a thousandth
+would overrule any prior, and a shifted centre of gravity would pass as a Cm_alpha ten sigmas out. Derivatives and
+clocks are shared by all flights; biases are each flight's own.
 """
 
 from __future__ import annotations
@@ -20,6 +21,15 @@ from sysid_node.gap.view import View
 #: Effects whose parameters are all linear nuisances; as a candidate, each is the same with a wider prior.
 WIDENED = {"derivative_error": 5.0, "imu_bias": 10.0, "vane_bias": 10.0}
 
+#: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
+LIMIT = 3.0
+
+#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves.
+_CLOCKS = {
+    "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay", "imu_delay"),
+    "air_data_delay": ("air_data_delay", "imu_delay"),
+}
+
 #: Noise of the aircraft file that a bias may be as large as.
 _BIASES = {
     **{f"imu_bias.{n}": "accel" for n in ("ax", "ay", "az")},
@@ -31,20 +41,22 @@ _BIASES = {
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Indices into the parameter vector, 1-sigma of each, and which are shared by the flights."""
+    """Indices into the parameter vector, 1-sigma of each, the most each may be, and which the flights share."""
 
     indices: tuple[int, ...]
     sigma: Array
+    limit: Array
     shared: NDArray[np.bool_]
 
     def without(self, effects: frozenset[str], names: tuple[str, ...]) -> Nuisances:
         """Those that do not belong to these effects, unless only their prior widens."""
         gone = {e for e in effects if e not in WIDENED}
+        gone |= {clock for clock, same in _CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
         wide = np.array([WIDENED.get(e, 1.0) if (e := names[i].partition(".")[0]) in effects else 1.0
                          for i in self.indices])  # fmt: skip
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
-        return Nuisances(indices, (self.sigma * wide)[keep], self.shared[keep])
+        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep])
 
 
 def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
@@ -60,9 +72,13 @@ def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
+    limit = {name: LIMIT * s for name, s in sigma.items()}
+    for clock, rate in zip(_CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
+        sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
     names = view.simulator.names
-    shared = np.array([name.startswith("derivative_error") for name in sigma])
-    return Nuisances(tuple(names.index(n) for n in sigma), np.array(list(sigma.values())), shared)
+    shared = np.array([name.startswith(("derivative_error", *_CLOCKS)) for name in sigma])
+    numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
+    return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
 
 
 _LATERAL = frozenset({"CY", "Cl", "Cn"})

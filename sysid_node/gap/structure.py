@@ -103,7 +103,7 @@ def _solution(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], slopes
 
 def _priors(fit: Fit) -> tuple[Array, Array]:
     """Precision of each unknown's prior, and how far the fit is from the prior's centre."""
-    now, spread = fit.stacked
+    now, spread, _ = fit.stacked
     centre, sigma = prior(fit.views[0].simulator, fit.indices)
     return np.concatenate([sigma, spread]) ** -2.0, np.concatenate([fit.values - centre, now])
 
