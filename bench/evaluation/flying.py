@@ -6,6 +6,7 @@ surfaces and thrust are measured. The truth is the aircraft file.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -22,9 +23,11 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.atmosphere import air_density
-from sysid_node.sim.autopilot import autopilot_for, fly_held
+from sysid_node.sim.autopilot import Autopilot, autopilot_for, fly_held
 from sysid_node.sim.dryden import INTENSITIES, Dryden
 from sysid_node.sim.layout import OUTPUTS
+from sysid_node.sim.rollout import Flight, Inputs
+from sysid_node.sim.trim import Trim
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
@@ -33,6 +36,7 @@ RATE = 200.0  # Hz, of the IMU and the integration
 AIR_INTERVAL = 2 / RATE  # s between air data
 HEIGHT = 100.0  # m above the ground, for the turbulence
 ROTARY = slice(3, 6)  # of the gusts: the air's rotation
+HELD = np.array([OUTPUTS.index(name) for name in ("p", "q", "r", "phi", "theta", "V")])  # by the autopilot
 AIR = [OUTPUTS.index(name) for name in ("V", "alpha", "beta")]
 
 PERIOD = 6.0  # s from one manoeuvre to the next on the same surface
@@ -75,6 +79,8 @@ class Setting:
     seconds: float = 60.0
     manoeuvre: Sequence[str] = ()  # none: multistep, or without the autopilot doublets
     effects: Effects = field(default_factory=dict)
+    later: Effects = field(default_factory=dict)  # from ``onset`` on, besides
+    onset: float = math.inf  # s
     vane_noise: float = 1.0  # of the aircraft file's
     rotary: bool = True  # whether the turbulence turns the air, too
 
@@ -99,24 +105,45 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     effects = {**setting.effects, "sensor_noise": {"scale": 1.0}}
     if setting.turbulence != "none":
         effects["turbulence"] = {"intensity": INTENSITIES[setting.turbulence]}
-    theta = simulator.vector(effects)
+    theta, later = simulator.vector(effects), simulator.vector({**effects, **setting.later})
     trim = trim_flight(simulator, theta=theta)
     usual = multistep if setting.autopilot else doublets
     flown = setting.manoeuvre or usual(setting.seconds)
     plan = parse_manoeuvre(flown, simulator.aircraft, RATE, setting.seconds)
     commands = jnp.asarray(trim.command + np.column_stack([plan.surfaces(), np.zeros(plan.time.size)]))
-    pilot = autopilot_for(simulator, trim)
+    pilot = autopilot_for(simulator, trim) if setting.autopilot else None
 
     def one(gusts: Any, noise: Any) -> Any:
         inputs = simulator.inputs(commands, turbulence=gusts, noise=noise)
-        if setting.autopilot:
-            return fly_held(simulator, theta, trim, inputs, pilot)
-        return simulator.rollout(theta, trim.initial, inputs)
+        if setting.onset > setting.seconds:
+            return _flown(simulator, theta, trim, inputs, pilot)
+        return _flown_on(simulator, (theta, later), trim, inputs, pilot, round(setting.onset * RATE))
 
     flights = jax.vmap(one)(*_weather(simulator, setting, plan.time.size, seeds))
     for i in range(len(seeds)):
         simulator.check(jax.tree.map(lambda x, i=i: x[i], flights))
     return Batch(plan.time, _samples(np.asarray(flights.outputs), np.asarray(flights.surfaces), flights.states))
+
+
+def _flown(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, pilot: Autopilot | None) -> Flight:
+    """One flight from trim, in the autopilot's hands if there is one."""
+    if pilot is None:
+        return simulator.rollout(theta, trim.initial, inputs)
+    return fly_held(simulator, theta, trim, inputs, pilot)
+
+
+def _flown_on(
+    simulator: Simulator, thetas: tuple[Array, Array], trim: Trim, inputs: Inputs, pilot: Autopilot | None, onset: int
+) -> Flight:
+    """One flight that goes on from sample ``onset`` as another aircraft, at what the autopilot's integrals were."""
+    before = _flown(simulator, thetas[0], trim, jax.tree.map(lambda x: x[: onset + 1], inputs), pilot)
+    rest = jax.tree.map(lambda x: x[onset:], inputs)
+    if pilot is not None:
+        error = before.outputs[onset - 1, HELD] - pilot.hold
+        integrals = before.commands[onset] - rest.commands[0] - pilot.gains @ error
+        rest = rest._replace(commands=(rest.commands + integrals).at[0].set(before.commands[onset]))
+    after = _flown(simulator, thetas[1], replace(trim, initial=before.states[onset]), rest, pilot)
+    return Flight(*(jnp.concatenate([a[:onset], b]) for a, b in zip(before, after, strict=True)))
 
 
 @lru_cache
