@@ -16,6 +16,7 @@ from sysid_node.gap.candidates import TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.spectra import Complex
 from sysid_node.gap.structure import Structure, instrumented, structure_of
 from sysid_node.gap.view import View
 
@@ -31,6 +32,9 @@ _SURE = 0.95
 #: Share of the power left over, and of that which derivatives and biases leave, that an effect must take away on flight
 #: not fitted, on the axis where it does most.
 MATERIAL, MATERIAL_OF_ALL = 0.25, 0.08
+
+#: Error, as a share of the motion, that nobody would look for.
+NOTICED = 0.01
 
 Progress = Callable[[float, str], None]
 
@@ -119,7 +123,9 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
         return False
     left, whole = power_left(without.evidence), power_left(base.evidence)
     gone = left - power_left(trial.evidence)
-    return bool(sure and np.any((gone > MATERIAL * left) & (gone > MATERIAL_OF_ALL * whole)))
+    motion = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views)
+    matters = (gone > MATERIAL * left) & (gone > MATERIAL_OF_ALL * whole) & (gone > NOTICED**2 * motion)
+    return bool(sure and np.any(matters))
 
 
 def _trifling(trial: Trial) -> bool:
@@ -131,8 +137,14 @@ def _trifling(trial: Trial) -> bool:
 
 
 def power_left(evidence: Evidence) -> Array:
-    """Power (6,) of what is left on flight not fitted, above the mean."""
-    return np.asarray(sum((np.abs(r[:, 1:]) ** 2).sum(axis=(0, 1)) for r in evidence.residuals))
+    """Power (12,) of what is left on flight not fitted."""
+    return np.asarray(sum(power_of(r) for r in evidence.residuals))
+
+
+def power_of(residual: Complex) -> Array:
+    """Power (12,) of a residual (W, L, 12); the mean, which has no imaginary part, counts half."""
+    power = (np.abs(residual) ** 2).sum(axis=0)
+    return np.asarray(power.sum(axis=0) - 0.5 * power[0])
 
 
 def _trial(fit: Fit, added: Candidate | None) -> Trial:

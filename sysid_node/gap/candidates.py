@@ -108,11 +108,12 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         yield "depth", (0.8,)
         yield from (("a1", (20.0,)), ("CD_X", (0.1,)), ("Cm_X", (-0.05,)))
     if effect == "actuator_rate_limit":
-        speed = max(float(np.abs(np.diff(np.asarray(v.signals.commands)[:, :-1], axis=0)).max()) * v.simulator.rate
+        speed = max(float(np.abs(np.diff(v.commands[:, :-1], axis=0)).max()) * v.simulator.rate
                     for v in views)  # fmt: skip
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
-        yield from ((control, (0.005, 0.03)) for control in simulator.layout.controls)
+        # mostly one control has it; a start that gives it to all of them looks worse than none
+        yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
     if effect in TIMES:
         name = "delay" if effect.endswith("delay") else "time_constant"
         yield name, (0.02, 0.07)

@@ -42,10 +42,10 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
     """The gap on flights not fitted, from their residuals (W, L, 6) as the file has it, then as fitted."""
     groups = [(i, group) for i, view in enumerate(views) for group in groups_of(view)]
     measured = _powers([v.measured for v in views], groups)
-    noise = np.array([len(g) * views[i].noise[1:].sum(axis=0) for i, g in groups])
+    noise = np.array([len(g) * views[i].noise[1:, :6].sum(axis=0) for i, g in groups])
     stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
-    floor = np.maximum(noise, stages[2] * (1.0 - np.clip(left.share, 0.0, 1.0)))
-    counted = views[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
+    floor = np.maximum(noise, stages[2] * (1.0 - np.clip(left.share[:6], 0.0, 1.0)))
+    counted = views[0].axes[:6] & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
     table = np.stack([*stages, np.minimum(floor, stages[1])])  # (4, groups, 6)
 
     def errors(weight: Array) -> Array:
@@ -73,4 +73,4 @@ def _shrink(errors: Array) -> float:
 
 def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:
     """Power (G, 6) by group, above the mean."""
-    return np.array([(np.abs(amplitudes[i][g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
+    return np.array([(np.abs(amplitudes[i][g][:, 1:, :6]) ** 2).sum(axis=(0, 1)) for i, g in groups])

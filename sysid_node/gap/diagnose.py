@@ -20,9 +20,8 @@ from sysid_node.gap.flights import RATE, Flight
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.structure import instrumented
-from sysid_node.gap.view import View, view_of
+from sysid_node.gap.view import CHANNELS, View, view_of
 from sysid_node.sim import Simulator
-from sysid_node.sim.prediction import COEFFICIENTS
 
 #: Probability from which an effect counts as told apart from its rivals.
 _TOLD_APART = 0.8
@@ -109,7 +108,7 @@ def _require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> No
 
 def _checked(view: View) -> View:
     """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
-    commands = np.asarray(view.signals.commands)[: len(view.record), :-1]
+    commands = view.commands[:, :-1]
     travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
     if (travel < _TRAVEL).all():
         raise InputError(
@@ -136,7 +135,7 @@ def _verdict(views: Sequence[View], attribution: Attribution, base: Evidence, fi
         return "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) else "no_gap"
-    if final.total <= base.total or explained(attribution) < _EXPLAINED:
+    if final.total <= base.total or (structured(attribution) and explained(attribution) < _EXPLAINED):
         return "unknown_effect"
     return "explained" if all(c.probability >= _TOLD_APART for c in attribution.causes) else "ambiguous"
 
@@ -199,7 +198,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "unexplained": {
             "share": 1.0 - explained(attribution) if structured(attribution) else 0.0,
             "where": [w for w in found.where if w["station"] == "unexplained"][:3],
-            "coherent_share": {c: float(s) for c, s in zip(COEFFICIENTS, left.share, strict=True)},
+            "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
         },
         "next_flight": found.next_flight,
     }

@@ -21,7 +21,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.fit import Fit, real_rows, residual_power, solve, weights
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
-from sysid_node.gap.view import View
+from sysid_node.gap.view import CHANNELS, View
 
 #: Draws of the Bayesian bootstrap.
 _DRAWS = 2000
@@ -32,7 +32,7 @@ _GROUPS = 8
 
 @dataclass(frozen=True)
 class Evidence:
-    """Scores (G,) of groups of windows not seen, and their residuals (W, L, 6) by flight."""
+    """Scores (G,) of groups of windows not seen, and their residuals (W, L, 12) by flight."""
 
     scores: Array
     residuals: tuple[Complex, ...]
@@ -130,25 +130,27 @@ def _carried(fit: Fit, view: View) -> Array:
 def _train_power(fit: Fit, view: View) -> Array:
     """Mean residual power of the flights fitted, at the lines of another."""
     lines = view.windows.frequencies
-    total = np.zeros((lines.size, 6))
+    total = np.zeros((lines.size, len(CHANNELS)))
     for known, power in zip(fit.views, fit.power, strict=True):
         own = known.windows.frequencies
-        total += np.column_stack([np.interp(lines, own, power[:, axis]) for axis in range(6)])
+        total += np.column_stack([np.interp(lines, own, power[:, axis]) for axis in range(len(CHANNELS))])
     return np.asarray(total / len(fit.views))
 
 
 def _predictive(
     view: View, power: Array, own_power: Array, rows: Array, slopes: Array, step: Array, information: Array
 ) -> tuple[float, Complex]:
-    """Log probability of a group's rows, and its residual (w, L, 6), after a step of the unknowns.
+    """Log probability of a group's rows, and its residual (w, L, 12), after a step of the unknowns.
 
     The rows are weighted by ``power``; the probability is that of ``own_power``.
     """
     change = rows - slopes @ step
-    parts = change.reshape(rows.shape[0], 2, -1, 6)
+    parts = change.reshape(rows.shape[0], 2, -1, len(CHANNELS))
     scale = np.sqrt(power / own_power)
     scaled = (parts * scale).ravel()
-    J = (slopes.reshape(rows.shape[0], 2, -1, 6, slopes.shape[2]) * scale[..., None]).reshape(-1, slopes.shape[2])
+    J = (slopes.reshape(rows.shape[0], 2, -1, len(CHANNELS), slopes.shape[2]) * scale[..., None]).reshape(
+        -1, slopes.shape[2]
+    )
     gained, right = information + J.T @ J, J.T @ scaled
     _, before = np.linalg.slogdet(information)
     _, after = np.linalg.slogdet(gained)
@@ -160,9 +162,9 @@ def _predictive(
 
 
 def amplitudes(rows: Array, weight: Array) -> Complex:
-    """Weighted real rows (w, R) as amplitudes (w, L, 6) again."""
-    parts = rows.reshape(rows.shape[0], 2, -1, 6)
-    weight = weight.reshape(2, -1, 6)
+    """Weighted real rows (w, R) as amplitudes (w, L, 12) again."""
+    parts = rows.reshape(rows.shape[0], 2, -1, len(CHANNELS))
+    weight = weight.reshape(2, -1, len(CHANNELS))
     raw = np.where(weight > 0, parts / np.where(weight > 0, weight, 1.0), 0.0)
     return np.asarray(raw[:, 0] + 1j * raw[:, 1])
 

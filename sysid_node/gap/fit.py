@@ -41,7 +41,7 @@ class Fit:
     candidates: tuple[Candidate, ...]
     nuisances: Nuisances
     points: tuple[Array, ...]  # (P,) all parameters by flight, nuisances included
-    power: tuple[Array, ...]  # (L, 6) of the residual, by flight
+    power: tuple[Array, ...]  # (L, 12) of the residual, by flight
     rows: tuple[Array, ...] = ()  # weighted residual (W, R) by flight
     slopes: tuple[Array, ...] = ()  # weighted slopes (W, R, unknowns) by flight
     information: Array | None = None  # (unknowns, unknowns)
@@ -98,7 +98,8 @@ class Fit:
         """Log probability of where everything stands under its prior, up to a constant: nats, zero at best."""
         now, sigma, _ = self.stacked
         centre, own = prior(self.views[0].simulator, self.indices)
-        return -0.5 * float(np.sum((now / sigma) ** 2) + np.sum(((self.values - centre) / own) ** 2))
+        far = float(np.sum((now / sigma) ** 2) + np.sum(((self.values - centre) / own) ** 2))
+        return -0.5 * far - self.nuisances.widened
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -108,7 +109,7 @@ class Fit:
 
 
 def weights(windows: Windows, power: Array) -> Array:
-    """Weights (2 L, 6) of real and imaginary parts; the mean has no imaginary part."""
+    """Weights (2 L, 12) of real and imaginary parts; the mean has no imaginary part."""
     w = np.sqrt(2.0 * SHARE / power)
     w[0] *= np.sqrt(0.5)
     imaginary = w.copy()
@@ -117,14 +118,14 @@ def weights(windows: Windows, power: Array) -> Array:
 
 
 def real_rows(amplitudes: Complex, weight: Array) -> Array:
-    """Amplitudes (W, L, 6, ...) as weighted real rows (W, R, ...)."""
+    """Amplitudes (W, L, 12, ...) as weighted real rows (W, R, ...)."""
     parts = np.concatenate([amplitudes.real, amplitudes.imag], axis=1)
     parts = parts * weight.reshape(1, *weight.shape, *(1,) * (parts.ndim - 3))
     return np.asarray(parts.reshape(parts.shape[0], -1, *parts.shape[3:]))
 
 
 def residual_power(view: View, residual: Complex) -> Array:
-    """Power (L, 6) of a residual (W, L, 6), smoothed by band, at least the sensors' noise."""
+    """Power (L, 12) of a residual (W, L, 12), smoothed by band, at least the sensors' noise."""
     power = view.windows.smoothed((np.abs(residual) ** 2).mean(axis=0))
     return np.where(view.axes, np.maximum(power, view.noise), 1.0)
 

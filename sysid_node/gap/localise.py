@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.attribute import Attribution
+from sysid_node.gap.attribute import Attribution, power_of
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.spectra import EDGES, Complex
-from sysid_node.gap.view import View
-from sysid_node.sim.prediction import COEFFICIENTS
+from sysid_node.gap.view import CHANNELS, View
 
 #: Share of the power that a band, a time or a regime holds when it is named.
 _MOST = 0.8
@@ -49,14 +48,12 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
         for axis, gone in enumerate(np.maximum(high - low, 0.0) / np.maximum(scale, 1e-300)):
             parts[station, axis] = parts.get((station, axis), 0.0) + float(gone)
     remainder = powers[-1] / np.maximum(scale, 1e-300)
-    for axis in range(6):
+    for axis in range(len(CHANNELS)):
         parts["unexplained", axis] = float(remainder[axis] * attribution.left.share[axis])
         parts["noise", axis] = float(remainder[axis] * (1.0 - attribution.left.share[axis]))
     total = sum(parts.values()) or 1.0
     kept = sorted(((k, p / total) for k, p in parts.items() if p > 0.0), key=lambda pair: -pair[1])
-    return [
-        {"station": s, "axis": COEFFICIENTS[a], "share": share, **_when(views, before, a)} for (s, a), share in kept
-    ]
+    return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(views, before, a)} for (s, a), share in kept]
 
 
 def _steps(fit: Fit) -> list[list[Complex]]:
@@ -77,7 +74,7 @@ def _entries(fit: Fit, effect: str) -> list[int]:
 
 
 def _power(residuals: Sequence[Complex]) -> Array:
-    return np.asarray(sum((np.abs(r[:, 1:]) ** 2).sum(axis=(0, 1)) for r in residuals))
+    return np.asarray(sum(power_of(r) for r in residuals))
 
 
 def _when(views: Sequence[View], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
@@ -160,6 +157,4 @@ def _binned(view: View, name: str, unit: str, axis: int, remainder: Array) -> Sh
     independent = np.maximum(
         counts * 4.0 / view.simulator.rate, 1.0
     )  # the remainder keeps its sign for a quarter second
-    return Shape(
-        COEFFICIENTS[axis], name, unit, centres[full], means[full], (spread / np.sqrt(independent))[full], between
-    )
+    return Shape(CHANNELS[axis], name, unit, centres[full], means[full], (spread / np.sqrt(independent))[full], between)

@@ -18,8 +18,8 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.view import View
 
-#: Effects whose parameters are all linear nuisances; as a candidate, each is the same with a wider prior.
-WIDENED = {"derivative_error": 5.0, "imu_bias": 10.0, "vane_bias": 10.0}
+#: Effects whose parameters are all nuisances; as a candidate, each is the same with a wider prior.
+WIDENED = {"derivative_error": 5.0}
 
 #: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
 LIMIT = 3.0
@@ -47,6 +47,7 @@ class Nuisances:
     sigma: Array
     limit: Array
     shared: NDArray[np.bool_]
+    widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
 
     def without(self, effects: frozenset[str], names: tuple[str, ...]) -> Nuisances:
         """Those that do not belong to these effects, unless only their prior widens."""
@@ -56,7 +57,8 @@ class Nuisances:
         wide = np.array([WIDENED.get(e, 1.0) if (e := names[i].partition(".")[0]) in effects else 1.0
                          for i in self.indices])  # fmt: skip
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
-        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep])
+        widened = float(np.log(wide[keep]).sum())
+        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], widened)
 
 
 def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:

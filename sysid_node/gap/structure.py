@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import prior
 from sysid_node.gap.fit import Fit, linearised, moved, real_rows, solve, weights
-from sysid_node.gap.view import View
+from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
 _LAGS = (0.0, 0.06, 0.2, 0.6)
@@ -34,7 +34,7 @@ _STEPPED = 0.3
 
 @dataclass(frozen=True)
 class Structure:
-    """By coefficient (6,): power coherent with what was done, beyond chance, and all power, in noise levels."""
+    """By coefficient (12,): power coherent with what was done, beyond chance, and all power, in noise levels."""
 
     coherent: Array
     total: Array
@@ -42,7 +42,7 @@ class Structure:
 
     @property
     def share(self) -> Array:
-        """Share (6,) of the remainder that is structure."""
+        """Share (12,) of the remainder that is structure."""
         return np.asarray(self.coherent / np.maximum(self.total, 1e-300))
 
 
@@ -51,7 +51,7 @@ def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
     basis, rows, slopes = _equations(fit, (like or fit).power)
     step, _ = _solution(fit, basis, rows, slopes)
     left = [r - J @ step for r, J in zip(rows, slopes, strict=True)]
-    coherent, total, size = np.zeros(6), np.zeros(6), np.zeros(6)
+    coherent, total, size = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     for U, r in zip(basis, left, strict=True):
         for axis, directions in U.items():
             series = r[:, :, axis].ravel()
@@ -72,15 +72,15 @@ def instrumented(fit: Fit) -> Fit:
 
 
 def _equations(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
-    """By flight: the instruments' directions, residuals (W, 2 L, 6) and slopes (W, 2 L, 6, unknowns), without means."""
+    """By flight: the instruments' directions, residuals (W, 2 L, 12), slopes (W, 2 L, 12, unknowns), without means."""
     basis, rows, slopes = [], [], []
     for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
         weight = weights(view.windows, power)
         weight[[0, view.windows.frequencies.size]] = 0.0
         own = weights(view.windows, own_power)
         ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
-        rows.append((r * ratio).reshape(r.shape[0], -1, 6))
-        slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, 6, J.shape[2]))
+        rows.append((r * ratio).reshape(r.shape[0], -1, len(CHANNELS)))
+        slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2]))
         basis.append(_basis(view, weight))
     return basis, rows, slopes
 
@@ -95,9 +95,9 @@ def _solution(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], slopes
             information += seen.T @ seen
             right += seen.T @ (directions.T @ r[:, :, axis].ravel())
     for r, J in zip(fit.rows, fit.slopes, strict=True):  # means, from which gusts average out
-        mean = J.reshape(J.shape[0], -1, 6, J.shape[2])[:, 0].reshape(-1, J.shape[2])
+        mean = J.reshape(J.shape[0], -1, len(CHANNELS), J.shape[2])[:, 0].reshape(-1, J.shape[2])
         information += mean.T @ mean
-        right += mean.T @ r.reshape(r.shape[0], -1, 6)[:, 0].ravel()
+        right += mean.T @ r.reshape(r.shape[0], -1, len(CHANNELS))[:, 0].ravel()
     return solve(information, right), information
 
 
@@ -110,9 +110,10 @@ def _priors(fit: Fit) -> tuple[Array, Array]:
 
 def _basis(view: View, weight: Array) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by coefficient that was measured."""
-    spectra = view.windows.transform(instruments(view))
+    all_of_them, commands = (view.windows.transform(table) for table in instruments(view))
     found = {}
     for axis in np.flatnonzero(view.axes):
+        spectra = all_of_them if axis < len(COEFFICIENTS) else commands
         own = weight[:, axis : axis + 1]
         rows = real_rows(spectra, np.repeat(own, spectra.shape[2], axis=1))
         matrix = rows.reshape(rows.shape[0] * own.shape[0], -1)
@@ -121,13 +122,17 @@ def _basis(view: View, weight: Array) -> dict[int, Array]:
     return found
 
 
-def instruments(view: View) -> Array:
-    """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread."""
+def instruments(view: View) -> tuple[Array, Array]:
+    """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread; those that owe nothing to
+    gusts of any kind, which are in every reading of the air data."""  # fmt: skip
     given, record = _deliberate(view), view.record
     columns = [_lagged(given[:, i], lag, view.simulator.step) for i in range(given.shape[1]) for lag in _LAGS]
-    alpha, beta, speed = (record[n] - record[n].mean() for n in ("alpha", "beta", "V"))
-    columns += [alpha**2, np.abs(beta), speed * alpha]
     columns += [series for i in range(given.shape[1]) for series in (given[:, i] ** 2, given[:, i] ** 3)]
+    alpha, beta, speed = (record[n] - record[n].mean() for n in ("alpha", "beta", "V"))
+    return _standard([*columns, alpha**2, np.abs(beta), speed * alpha]), _standard(columns)
+
+
+def _standard(columns: list[Array]) -> Array:
     table = np.column_stack(columns)
     table = table - table.mean(axis=0)
     spread = table.std(axis=0)
@@ -140,7 +145,7 @@ def _deliberate(view: View) -> Array:
     Where a command steps, its steps, forgotten after some seconds: between them it moves with the autopilot, hence with
     the gusts. Where it has none (a multisine), the command itself.
     """
-    commands = np.asarray(view.signals.commands)[: len(view.record)]
+    commands = view.commands
     changes = np.diff(commands, axis=0, prepend=commands[:1])
     kept = np.where(np.abs(changes) > _STEP * np.median(np.abs(changes), axis=0), changes, 0.0)
     decay = np.exp(-view.simulator.step / _MEMORY)

@@ -1,20 +1,40 @@
-"""A flight as the diagnosis sees it: measured coefficients by window and frequency, and what parameters predict."""
+"""A flight as the diagnosis sees it: what was measured by window and frequency, and what parameters predict.
+
+Six coefficients of forces and moments, predicted from motion and commands (``sim.prediction``), and six readings of air
+data and attitude, predicted from the inertial instruments (``kinematics``): together they are as many as the signals,
+so that each measurement counts once.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flights import Flight, thinned
+from sysid_node.gap.kinematics import READINGS, Motion, motion_of, reconstruct
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import Simulator
 from sysid_node.sim.layout import Layout, Model, Scalar
 from sysid_node.sim.prediction import ACCELERATIONS, COEFFICIENTS, Signals, coefficients, predict, signals_of
+
+#: What is compared.
+CHANNELS = (*COEFFICIENTS, *READINGS)
+
+#: Channels of a flight without lateral measurements.
+_LONGITUDINAL = frozenset({"CL", "CD", "Cm", "V", "alpha", "theta"})
+
+#: Memory of the observer of the air, at most and at least, s.
+LONGEST, SHORTEST_MEMORY = 4.0, 0.05
+
+#: Band in which gusts are told from noise, Hz.
+_GUSTS = (0.3, 2.0)
 
 #: Directions in which a prediction is differentiated at once.
 _LANES = 8
@@ -32,20 +52,31 @@ _NOISE = {
     "airspeed": ("V",),
     "alpha": ("alpha",),
     "beta": ("beta",),
+    "attitude": ("phi", "theta", "psi"),
 }
 
 
-@partial(jax.jit, static_argnums=0)
-def _expected(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: float) -> Scalar:
-    return coefficients(model, signals, predict(layout, model, theta, signals, jnp.asarray(step)))
+class Given(NamedTuple):
+    """All that a prediction takes from a flight."""
+
+    signals: Signals  # padded
+    motion: Motion  # padded
+    fading: Scalar  # s, of the observer
+    step: Scalar  # s
 
 
 @partial(jax.jit, static_argnums=0)
-def _changes(layout: Layout, model: Model, theta: Scalar, directions: Scalar, signals: Signals, step: float) -> Scalar:
-    """d expected along each of the directions (K, P): (K, N, 6)."""
+def _expected(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
+    forces = coefficients(model, given.signals, predict(layout, model, theta, given.signals, given.step))
+    return jnp.concatenate([forces, reconstruct(layout, model, theta, given.motion, given.fading, given.step)], axis=1)
+
+
+@partial(jax.jit, static_argnums=0)
+def _changes(layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given) -> Scalar:
+    """d expected along each of the directions (K, P): (K, N, 12)."""
 
     def along(direction: Scalar) -> Scalar:
-        slope: Scalar = jax.jvp(lambda t: _expected(layout, model, t, signals, step), (theta,), (direction,))[1]
+        slope: Scalar = jax.jvp(lambda t: _expected(layout, model, t, given), (theta,), (direction,))[1]
         return slope
 
     return jax.vmap(along)(directions)
@@ -56,40 +87,44 @@ _reduced = jax.jit(coefficients)
 
 @dataclass(frozen=True)
 class View:
-    """One flight, W windows of L lines, six coefficients (``prediction.COEFFICIENTS``)."""
+    """One flight, W windows of L lines, twelve ``CHANNELS``."""
 
     simulator: Simulator
     flight: Flight
     record: FlightRecord  # at the analysis rate
-    signals: Signals  # padded
+    given: Given
     windows: Windows
-    series: Array  # (N, 6) measured coefficients
-    measured: Complex  # (W, L, 6)
-    noise: Array  # (L, 6) power that the sensors' noise leaves in measured minus predicted
-    axes: Array  # (6,) bool: coefficients that were measured
+    series: Array  # (N, 12) as measured
+    measured: Complex  # (W, L, 12)
+    noise: Array  # (L, 12) power that the sensors' noise leaves in measured minus predicted
+    axes: NDArray[np.bool_]  # (12,): what was measured
+
+    @property
+    def commands(self) -> Array:
+        """(N, controls + 1) rad, and thrust N, as recorded."""
+        return np.asarray(self.given.signals.commands)[: len(self.record)]
 
     def predicted_series(self, theta: Array) -> Array:
-        """Coefficients (N, 6) that parameters (P,) expect."""
+        """Channels (N, 12) that parameters (P,) expect."""
         s = self.simulator
-        expected = _expected(s.layout, s.model, jnp.asarray(theta), self.signals, s.step)
-        return np.asarray(expected)[: len(self.record)]
+        return np.asarray(_expected(s.layout, s.model, jnp.asarray(theta), self.given))[: len(self.record)]
 
     def predicted(self, theta: Array) -> Complex:
-        """The same by window and line, (W, L, 6)."""
+        """The same by window and line, (W, L, 12)."""
         return self.windows.transform(self.predicted_series(theta))
 
     def residual(self, theta: Array) -> Complex:
-        """Measured minus predicted (W, L, 6), zero where not measured."""
+        """Measured minus predicted (W, L, 12), zero where not measured."""
         return np.asarray((self.measured - self.predicted(theta)) * self.axes)
 
     def slopes(self, theta: Array, indices: list[int]) -> Complex:
-        """d predicted / d parameters of these indices, (W, L, 6, K)."""
+        """d predicted / d parameters of these indices, (W, L, 12, K)."""
         s, blocks = self.simulator, []
         for first in range(0, len(indices), _LANES):
             some = indices[first : first + _LANES]
             directions = np.zeros((_LANES, len(theta)))
             directions[np.arange(len(some)), some] = 1.0
-            changes = _changes(s.layout, s.model, jnp.asarray(theta), directions, self.signals, s.step)
+            changes = _changes(s.layout, s.model, jnp.asarray(theta), directions, self.given)
             blocks.append(np.asarray(changes)[: len(some), : len(self.record)])
         stacked = np.moveaxis(np.concatenate(blocks), 0, 2)
         return np.asarray(self.windows.transform(stacked) * self.axes[:, None])
@@ -98,38 +133,70 @@ class View:
 def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     """The flight as windows and lines, with its noise floor. Raises InputError where a signal is missing."""
     record = thinned(flight, simulator.rate)
-    signals, series = _signals(simulator, record)
     windows = Windows.over(len(record), simulator.rate)
-    measured = windows.transform(series)
-    axes = np.array([True, True, flight.lateral, flight.lateral, True, flight.lateral])
-    bare = View(simulator, flight, record, signals, windows, series, measured, np.ones((1, 6)), axes)
-    noise = _noise_power(bare, np.random.default_rng(seed))
-    return View(simulator, flight, record, signals, windows, series, measured, noise, axes)
+    axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
+    axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
+    calm = _measured_noise(_bare(simulator, flight, record, windows, axes, LONGEST), seed)
+    fading = _fading(calm)
+    return calm if fading == LONGEST else _measured_noise(_bare(simulator, flight, record, windows, axes, fading), seed)
 
 
-def _signals(simulator: Simulator, record: FlightRecord) -> tuple[Signals, Array]:
-    """Signals, padded, and the measured coefficients (N, 6)."""
-    signals = signals_of(simulator, record)
-    short = -len(record) % _BLOCK
-    padded = Signals(*(jnp.asarray(np.pad(x, [(0, short)] + [(0, 0)] * (x.ndim - 1), mode="edge")) for x in signals))
-    shown = np.column_stack([record[name] for name in ACCELERATIONS])
-    shown = np.pad(shown, [(0, short), (0, 0)], mode="edge")
-    series = np.asarray(_reduced(simulator.model, padded, jnp.asarray(shown)))[: len(record)]
-    return padded, series
+def _measured_noise(view: View, seed: int) -> View:
+    return replace(view, noise=_noise_power(view, np.random.default_rng(seed)))
+
+
+def _bare(
+    simulator: Simulator, flight: Flight, record: FlightRecord, windows: Windows, axes: NDArray[np.bool_], fading: float
+) -> View:
+    """A view that does not know its noise."""
+    given, series = _given(simulator, record, fading)
+    return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
+
+
+def _fading(calm: View) -> float:
+    """The observer's best memory of the air (s), from innovations of a long one.
+
+    Gusts wander (their power falls with the square of frequency), readings are noisy: the Kalman filter of a random
+    walk of intensity q in white noise of density r forgets within sqrt(r / q).
+    """
+    lines = calm.windows.frequencies
+    band = (lines > _GUSTS[0]) & (lines < _GUSTS[1])
+    air = len(COEFFICIENTS) + np.flatnonzero(calm.axes[len(COEFFICIENTS) :][:3])
+    if not air.size:
+        return LONGEST
+    power = (np.abs(calm.residual(calm.simulator.neutral())) ** 2).mean(axis=0)[np.ix_(band, air)]
+    noise = calm.noise[np.ix_(band, air)]
+    wandering = np.maximum(power - noise, 0.0) * (2.0 * np.pi * lines[band, None]) ** 2
+    memory = np.sqrt(noise.mean(axis=0) / np.maximum(wandering.mean(axis=0), 1e-300))
+    return float(np.clip(np.exp(np.log(memory).mean()), SHORTEST_MEMORY, LONGEST))
+
+
+def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[Given, Array]:
+    """What a prediction needs, padded, and the measured channels (N, 12)."""
+    signals, short = signals_of(simulator, record), -len(record) % _BLOCK
+    nothing = jnp.zeros((len(record), 3))
+    motion = motion_of(record) or Motion(nothing, nothing, nothing, signals.air, nothing)
+    signals, motion = (jax.tree.map(lambda x: _padded(x, short), parts) for parts in (signals, motion))
+    shown = _padded(np.column_stack([record[name] for name in ACCELERATIONS]), short)
+    forces = np.asarray(_reduced(simulator.model, signals, shown))[: len(record)]
+    readings = np.concatenate([motion.air, motion.attitude], axis=1)[: len(record)]
+    given = Given(signals, motion, jnp.asarray(fading), jnp.asarray(simulator.step))
+    return given, np.concatenate([forces, readings], axis=1)
+
+
+def _padded(series: Scalar | Array, short: int) -> Scalar:
+    """A series (N, ...) with its end held for so many samples."""
+    return jnp.pad(jnp.asarray(series), [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge")
 
 
 def _noise_power(view: View, random: np.random.Generator) -> Array:
-    """Power (L, 6) by flying through the noise of the aircraft file again, a few times."""
+    """Power (L, 12) by flying through the noise of the aircraft file again, a few times."""
     neutral = view.simulator.neutral()
     clean = view.residual(neutral)
     power = np.zeros(clean.shape[1:])
     for _ in range(_REALISATIONS):
         record = thinned(_noisier(view, random), view.simulator.rate)
-        signals, series = _signals(view.simulator, record)
-        again = View(
-            view.simulator, view.flight, record, signals, view.windows, series,
-            view.windows.transform(series), view.noise, view.axes,
-        )  # fmt: skip
+        again = _bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
         power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / _REALISATIONS
     return np.maximum(view.windows.smoothed(power), 1e-18)
 
@@ -140,10 +207,10 @@ def _noisier(view: View, random: np.random.Generator) -> Flight:
     own_rate = 1.0 / float(np.median(np.diff(record.time)))
     columns = dict(record.columns)
     for sensor, names in _NOISE.items():
-        rate = view.flight.imu_rate if sensor in {"accel", "gyro"} else view.flight.air_rate
+        rate = view.flight.imu_rate if sensor in {"accel", "gyro", "attitude"} else view.flight.air_rate
         spread = sigmas[sensor] * np.sqrt(own_rate / min(rate, own_rate))
         for name in names:
-            if name not in view.flight.filled:
+            if name in columns and name not in view.flight.filled:
                 columns[name] = columns[name] + spread * random.standard_normal(len(record))
     columns |= _jittered(view, random)
     return replace(view.flight, record=replace(record, columns=columns))
@@ -160,4 +227,4 @@ def _jittered(view: View, random: np.random.Generator) -> dict[str, Array]:
     return {s: np.interp(record.time + off, record.time, record[s]) for s in moved}
 
 
-__all__ = ["COEFFICIENTS", "View", "view_of"]
+__all__ = ["CHANNELS", "COEFFICIENTS", "View", "view_of"]

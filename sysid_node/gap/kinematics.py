@@ -1,0 +1,152 @@
+"""What air data and attitude should have read, given what the inertial instruments measured: no aerodynamics in it.
+
+Forces and moments say little of what lives near zero frequency, and an instrument's error passes there as an error of
+the derivatives. The motion's kinematics know no derivatives: specific force and rates, integrated, must give the
+airspeed, flow angles and attitude that were measured (flight path reconstruction: Klein & Morelli (2006), ch. 10). An
+observer keeps the integral from drifting: each prediction is corrected by a share of its error before the next, so that
+what is compared are innovations, and the errors' history counts once. How fast it forgets depends on the air: in
+turbulence the last reading says more about the wind than an integral over seconds.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.flight.record import FlightRecord
+from sysid_node.sim.atmosphere import GRAVITY
+from sysid_node.sim.body import Vector
+from sysid_node.sim.chain import Chain
+from sysid_node.sim.effects import air_data_lag, imu_lever_arm, imu_misalignment
+from sysid_node.sim.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.stations import airflow, sensors
+from sysid_node.sim.timing import shift_cubic
+
+#: Columns of ``reconstruct``: m/s and rad.
+READINGS = ("V", "alpha", "beta", "phi", "theta", "psi")
+
+#: Time after which the observer forgets the attitude, s; no wind moves it.
+_ATTITUDE_FADING = 4.0
+
+
+class Motion(NamedTuple):
+    """What the instruments read, N samples at a constant rate, by the messages' stamps."""
+
+    force: Scalar  # (N, 3) specific force, m/s^2
+    rates: Scalar  # (N, 3) rad/s
+    turning: Scalar  # (N, 3) rad/s^2
+    air: Scalar  # (N, 3) V m/s, alpha, beta rad
+    attitude: Scalar  # (N, 3) phi, theta, psi rad, without jumps
+
+
+class _Sample(NamedTuple):
+    """One sample of what the sensors' effects leave of it."""
+
+    force: Vector  # at the CG
+    rates: Vector
+    velocity: Vector  # relative to the air, at the CG, as the probe has it
+    attitude: Vector
+
+
+class _State(NamedTuple):
+    velocity: Vector
+    attitude: Vector
+    probe: Scalar  # (3,) what the lagged probe holds
+    truth: Scalar  # (3,) the flow at the probe
+
+
+def motion_of(record: FlightRecord) -> Motion | None:
+    """A record's signals, with the rates' derivatives; None without attitude."""
+    if not all(np.isfinite(record[name]).all() for name in READINGS[3:]):
+        return None
+
+    def columns(*names: str) -> Scalar:
+        return jnp.asarray(np.column_stack([record[name] for name in names]))
+
+    return Motion(
+        columns("ax", "ay", "az"),
+        columns("p", "q", "r"),
+        columns("p_rate", "q_rate", "r_rate"),
+        columns(*READINGS[:3]),
+        jnp.unwrap(columns(*READINGS[3:]), axis=0),
+    )
+
+
+def reconstruct(
+    layout: Layout, model: Model, theta: Scalar, motion: Motion, fading: Scalar | float, step: Scalar
+) -> Scalar:
+    """Readings (N, 6), columns ``READINGS``, that parameters (P,) expect, each from the samples before it; pure."""
+    chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
+    samples = _undone(chain, motion)
+    first = jax.tree.map(lambda series: series[0], samples)
+    flow = _at_probe(chain, first.velocity, first.rates)
+    start = _State(first.velocity, first.attitude, flow, flow)
+    pairs = (jax.tree.map(lambda series: jnp.concatenate([series[:1], series[:-1]]), samples), samples)
+    _, rows = jax.lax.scan(lambda state, pair: _advance(chain, fading, state, *pair), start, pairs)
+    air, attitude = rows[:, :3], rows[:, 3:]
+    late_air, late_imu = (chain.effects[name]["delay"] / step for name in ("air_data_delay", "imu_delay"))
+    return jnp.concatenate([shift_cubic(air, late_air), shift_cubic(attitude, late_imu)], axis=1)
+
+
+def _undone(chain: Chain, motion: Motion) -> _Sample:
+    """The motion that the readings tell of, at the time of the samples."""
+    effects, step = chain.effects, chain.step
+    late_imu, late_air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
+    force, rates, turning, attitude = (
+        Vector(*shift_cubic(series, -late_imu).T)
+        for series in (motion.force, motion.rates, motion.turning, motion.attitude)
+    )
+    rates, turning = sensors.rates_from(effects, rates), _unscaled(effects, turning, ("p", "q", "r"))
+    bias = effects["imu_bias"]
+    felt = _unscaled(effects, force.minus(Vector(bias["ax"], bias["ay"], bias["az"])), ("ax", "ay", "az"))
+    arm = sensors.imu_arm(chain.model, effects, chain.body)
+    at_cg = imu_lever_arm.transfer(felt, rates, turning, arm.times(-1.0))
+    reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(motion.air, -late_air).T), 1)
+    flow = sensors.before_lag(effects, reading, jnp.asarray(jnp.gradient(reading, axis=0)) / step)
+    probe = sensors.air_data_arm(chain.model, effects, chain.body)
+    velocity = airflow.velocity_of(*flow.T).minus(rates.cross(probe))
+    return _Sample(at_cg, rates, velocity, attitude)
+
+
+def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str, str]) -> Vector:
+    """A vector without scale errors and misalignment."""
+    scale = effects["imu_scale"]
+    true = Vector(*(part / (1.0 + scale[name]) for part, name in zip(reading, names, strict=True)))
+    return imu_misalignment.undo(effects["imu_misalignment"], true)
+
+
+def _advance(
+    chain: Chain, fading: Scalar | float, state: _State, before: _Sample, now: _Sample
+) -> tuple[_State, Scalar]:
+    """Predicts the readings (6,) of now, then corrects."""
+    h = chain.step
+    k1 = _rates_of_change(state.velocity, state.attitude, before)
+    middle = (state.velocity.plus(k1[0].times(h)), state.attitude.plus(k1[1].times(h)))
+    k2 = _rates_of_change(*middle, now)
+    velocity = state.velocity.plus(k1[0].plus(k2[0]).times(0.5 * h))
+    attitude = state.attitude.plus(k1[1].plus(k2[1]).times(0.5 * h))
+    truth = _at_probe(chain, velocity, now.rates)
+    probe = air_data_lag.advance(chain.effects["air_data_lag"], state.probe, state.truth, truth, h)
+    reading = jnp.stack([*sensors.air_data(chain.effects, *probe), *attitude])
+    velocity = velocity.plus(now.velocity.minus(velocity).times(h / (fading + h)))
+    attitude = attitude.plus(now.attitude.minus(attitude).times(h / _ATTITUDE_FADING))
+    return _State(velocity, attitude, probe, truth), reading
+
+
+def _rates_of_change(velocity: Vector, attitude: Vector, sample: _Sample) -> tuple[Vector, Vector]:
+    """Of velocity (m/s^2) and Euler angles (rad/s)."""
+    sin_roll, cos_roll = jnp.sin(attitude.x), jnp.cos(attitude.x)
+    sin_pitch, cos_pitch = jnp.sin(attitude.y), jnp.cos(attitude.y)
+    down = Vector(-sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch)
+    p, q, r = sample.rates
+    heading = (q * sin_roll + r * cos_roll) / cos_pitch
+    turning = Vector(p + heading * sin_pitch, q * cos_roll - r * sin_roll, heading)
+    return sample.force.plus(down.times(GRAVITY)).minus(sample.rates.cross(velocity)), turning
+
+
+def _at_probe(chain: Chain, velocity: Vector, rates: Vector) -> Scalar:
+    """Airspeed, alpha, beta (3,) where the probe sits."""
+    return jnp.stack(sensors.at_probe(velocity, rates, sensors.air_data_arm(chain.model, chain.effects, chain.body)))
