@@ -23,7 +23,8 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.bag import read_streams
 from sysid_node.online import estimator
 from sysid_node.online.alignment import align_streams
-from sysid_node.online.estimates import estimate, present
+from sysid_node.online.estimates import estimate
+from sysid_node.online.present import present
 from sysid_node.online.settings import METHODS, Settings
 
 Array = NDArray[np.float64]

@@ -43,8 +43,8 @@ class Method:
 
 
 METHODS = {
-    "sls_rft": Method("sls_rft", Settings()),
-    "plain": Method("plain least squares", Settings(), compensated=False),
+    "sls_rft": Method("sls_rft", Settings(method="sls_rft")),
+    "plain": Method("plain least squares", Settings(method="sls_rft"), compensated=False),
     "iv_rft": Method("iv_rft", Settings(method="iv_rft")),
 }
 

@@ -47,15 +47,16 @@ def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxilia
 
 
 def with_instruments(model: Auxiliary, lines: Array) -> Array:
-    """(2F, W) the transformed lines (2F, T), and behind them the instruments'."""
-    F, T = model.gains.shape[0], lines.shape[1]
-    deflections = np.empty((F, model.gains.shape[2]), dtype=complex)
-    deflections.real, deflections.imag = lines[:F, model.controls], lines[F:, model.controls]
-    made = (model.gains @ deflections[:, :, None])[:, :, 0]
-    every = np.empty((2 * F, T + made.shape[1]))
-    every[:, :T] = lines
-    every[:F, T:] = made.real
-    every[F:, T:] = made.imag
+    """(..., 2F, W) the transformed lines (..., 2F, T), and behind them the instruments'."""
+    (F, made, controls), T = model.gains.shape, lines.shape[-1]
+    deflections = np.empty((*lines.shape[:-2], F, controls, 1), dtype=complex)
+    deflections.real[..., 0] = lines[..., :F, model.controls]
+    deflections.imag[..., 0] = lines[..., F:, model.controls]
+    answers = (model.gains @ deflections)[..., 0]
+    every = np.empty((*lines.shape[:-1], T + made))
+    every[..., :T] = lines
+    every[..., :F, T:] = answers.real
+    every[..., F:, T:] = answers.imag
     return every
 
 

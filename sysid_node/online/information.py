@@ -97,13 +97,14 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
 
 
 def about_mean(transform: Array, model: Auxiliary | None) -> Array:
-    """(2F, W) lines of a transform (2F + 1, T) whose signals are taken about their means, and of instruments made so.
+    """(..., 2F, W) lines of transforms (..., 2F + 1, T) whose signals are taken about their means, and of instruments.
 
     Nuisances are kept. The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
     """
-    share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
-    share[OFFSET : OFFSET + 3] = 0.0
-    lines: Array = transform[:-1] - np.dot(transform[:-1, OFFSET, None], share[None])
+    share = transform[..., -1, :] / np.maximum(transform[..., -1, OFFSET, None], 1e-12)
+    share[..., OFFSET : OFFSET + 3] = 0.0
+    lines: Array = transform[..., :-1, OFFSET, None] * share[..., None, :]
+    np.subtract(transform[..., :-1, :], lines, out=lines)
     return lines if model is None else with_instruments(model, lines)
 
 
@@ -116,12 +117,16 @@ def project(lines: Array) -> Array:
 
 
 def inverse2(gram: Array) -> Array:
-    """Inverse of a symmetric 2 x 2 matrix; of its first element alone where the second column brings nothing."""
-    a, b, d = float(gram[0, 0]), float(gram[0, 1]), float(gram[1, 1])
-    det = a * d - b * b
-    if det > 1e-12 * a * d:
-        return np.array([[d, -b], [-b, a]]) / det
-    return np.array([[1.0 / a if a > 0.0 else 0.0, 0.0], [0.0, 0.0]])
+    """(..., 2, 2) inverses of symmetric matrices; of the first element alone where the second column brings nothing."""
+    inverses = np.empty(gram.shape)
+    for at in np.ndindex(gram.shape[:-2]):
+        (a, b), (_, d) = gram[at].tolist()
+        det = a * d - b * b
+        if det > 1e-12 * a * d:
+            inverses[at] = (d / det, -b / det), (-b / det, a / det)
+        else:
+            inverses[at] = (1.0 / a if a > 0.0 else 0.0, 0.0), (0.0, 0.0)
+    return inverses
 
 
 def noise_covariance(lines: Spectrum, begin: float, end: float) -> Array:
@@ -154,11 +159,11 @@ def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
 
 
 def products(transform: Array, model: Auxiliary | None) -> Array:
-    """(W, W) Gram matrix of the clean lines of a transform (2F + 1, T), constant and drift projected out of it."""
+    """(..., W, W) Gram matrices of transforms' (..., 2F + 1, T) clean lines, constant and drift projected out."""
     lines = about_mean(transform, model)
-    gram: Array = lines.T @ lines
-    border = gram[:, _N]
-    gram -= border @ inverse2(border[_N]) @ border.T
+    gram: Array = lines.swapaxes(-1, -2) @ lines
+    border = gram[..., _N]
+    gram -= border @ inverse2(border[..., _N, :]) @ border.swapaxes(-1, -2)
     return gram
 
 

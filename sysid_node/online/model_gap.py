@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sysid_node.online.estimates import present
+from sysid_node.online.present import present
 from sysid_node.online.prior import beliefs
 from sysid_node.online.state import State
 
@@ -26,20 +26,21 @@ class CoefficientGap(NamedTuple):
 def model_gap(state: State) -> list[CoefficientGap]:
     """Gap of every coefficient whose equation can be formed; empty before there are estimates."""
     current, renewed = present(state), state.renewed
-    if current is None or renewed is None or not current.solution.usable:
+    if current is None or renewed is None or not current.solution.usable[0]:
         return []
     plan = state.plan
     values, precisions = beliefs(state.model.aircraft, plan)
     start, _, stop = state.model.settings.frequencies
     per_energy = 2.0 * (stop - start) / max(float(renewed.total.traces.sum()), 1e-12)
+    gram, variance, theta = current.gram[0], current.variance[0], current.solution.theta[0]
     gaps = []
     for c, coefficient in enumerate(plan.coefficients):
         mine, y = plan.unknowns(c), int(plan.outputs[c])
         v = np.zeros(plan.width)
         v[y], v[plan.columns[mine]] = 1.0, -values[mine, c]
-        energy, motion = max(float(v @ current.gram @ v), 0.0), float(current.gram[y, y])
-        spread = np.sqrt(np.maximum(current.variance[mine, c], 0.0) + _tolerances(precisions[mine, c]))
-        deviations = np.abs(current.solution.theta[mine, c] - values[mine, c]) / np.maximum(spread, 1e-300)
+        energy, motion = max(float(v @ gram @ v), 0.0), float(gram[y, y])
+        spread = np.sqrt(np.maximum(variance[mine, c], 0.0) + _tolerances(precisions[mine, c]))
+        deviations = np.abs(theta[mine, c] - values[mine, c]) / np.maximum(spread, 1e-300)
         worst = int(np.argmax(deviations))
         noise = math.sqrt(2.0 * (stop - start) * float(renewed.uncertainty.density[c]))
         relative = math.sqrt(energy / motion) if motion > 0.0 else math.nan

@@ -99,43 +99,55 @@ def trusting(full: Plan, strength: Array) -> Plan:
 
 @dataclass
 class Solution:
-    """Solution of all coefficients' normal equations. ``usable`` is False where they are singular."""
+    """Solution of all coefficients' normal equations, or of several: then all have a further axis in front.
+
+    ``usable`` is False where the equations are singular.
+    """
 
     theta: Array  # (P, C), zero where an unknown does not belong
     inverse: Array  # (P, P) of Z'A (of A'A in least squares)
     residual: Array  # (C,) sum of squares
-    usable: bool
+    usable: NDArray[np.bool_]  # ()
 
 
 def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
-    """Solve (Z'A - bias) theta = Z'y - bias from a summed Gram matrix (W, W); ``bias`` is from ``bias_of``.
+    """Solve (Z'A - bias) theta = Z'y - bias from summed Gram matrices (..., W, W); ``bias`` is from ``bias_of``.
 
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
     """
-    P = plan.columns.size
-    gathered = gram.take(plan.entries)
+    P, several = plan.columns.size, gram.shape[:-2]
+    flat = gram.reshape(*several, -1)
+    gathered = flat.take(plan.entries, axis=-1)
     gathered *= plan.counted
-    normal, cross = gathered[0], gathered[-1]
+    normal, cross = gathered[..., 0, :, :], gathered[..., -1, :, :]
     if bias is not None:
         cross = cross - bias
+    solved, usable = np.empty((*several, P, P + plan.outputs.size)), np.empty(several, dtype=bool)
+    for at in np.ndindex(several):
+        solved[at], usable[at] = _factorised(plan, cross[at])
+    theta = solved[..., P:]
+    # |y - A theta|^2, with the noise in it
+    misfit = theta.swapaxes(-1, -2) @ normal[..., :P, :]
+    misfit -= normal[..., P:, :]
+    misfit -= normal[..., P:, :]
+    misfit *= theta.swapaxes(-1, -2)
+    squares = flat.take(plan.square, axis=-1)
+    residual = np.maximum(squares + misfit.sum(axis=-1), ROUNDING * squares)
+    return Solution(theta, solved[..., :P], residual, usable)
+
+
+def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
+    """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), zero and False where there are none."""
     solved, fault = _factorise(plan, cross)
     if fault:
         # a regressor that has not moved, or that moved as others did: its own estimate is lost, not all of them
+        P = plan.columns.size
         ridged = cross.copy()
         ridged[:P] += plan.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
         solved, fault = _factorise(plan, ridged)
-    squares = gram.take(plan.square)
     if fault or not math.isfinite(solved[0, 0]):
-        return Solution(np.zeros_like(plan.mine), np.zeros((P, P)), squares, False)
-    theta = solved[:, P:]
-    # |y - A theta|^2, with the noise in it
-    misfit = theta.T @ normal[:P]
-    misfit -= normal[P:]
-    misfit -= normal[P:]
-    misfit *= theta.T
-    least = ROUNDING * squares
-    squares += misfit.sum(axis=1)
-    return Solution(theta, solved[:, :P], np.maximum(squares, least), True)
+        return np.zeros_like(solved), False
+    return solved, True
 
 
 def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
@@ -230,10 +242,11 @@ def student_95(freedom: Array) -> Array:
     return np.asarray(stdtrit(np.maximum(freedom, 1.0), 0.975))
 
 
-def rivals(plan: Plan, solution: Solution) -> list[str]:
-    """Of each unknown (P,) the regressor of the same equation whose estimate is most correlated with its own."""
-    spread = np.sqrt(np.abs(solution.inverse.diagonal()))
+def rivals(plan: Plan, solution: Solution) -> Index:
+    """(..., P) of each unknown the one of the same equation whose estimate is most correlated with its own."""
+    spread = np.sqrt(np.abs(solution.inverse.diagonal(axis1=-2, axis2=-1)))
     # each row's own spread is common to all of it
-    correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
+    correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)[..., None, :]
     correlation *= plan.same - plan.unit
-    return [plan.regressors[i] for i in correlation.argmax(axis=1).tolist()]
+    rival: Index = correlation.argmax(axis=-1)
+    return rival

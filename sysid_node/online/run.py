@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator, signals, transform
-from sysid_node.online.estimates import estimate
+from sysid_node.online.estimates import estimates_at
 from sysid_node.online.renewal import renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.state import State
@@ -33,28 +35,51 @@ def run(
 
     ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them; ``progress`` hears the time (s).
     """
-    state = estimator.init(aircraft, settings)
-    results: list[Estimates] = []
+    results = _Results(estimator.init(aircraft, settings))
     due = np.unique(np.searchsorted(time, publish_times, side="left"))
     for begin in range(0, time.size, CHUNK):
         end = min(begin + CHUNK, time.size)
+        chunk = _prepare(results.state, time[begin:end], samples[begin:end])
         stops = due[(due >= begin) & (due < end)] - begin
-        chunk = _prepare(state, time[begin:end], samples[begin:end])
-        done = 0
-        for stop in (stops + 1).tolist():
-            _advance(state, chunk, done, stop)
-            results.append(estimate(state, float(time[begin + stop - 1])))
-            done = stop
-        _advance(state, chunk, done, end - begin)
+        if results.state.renewed is None or (results.state.thrust_known and chunk.powerless.any()):
+            # what is missing is told from moment to moment
+            for first, stop in pairwise(dict.fromkeys([0, *(stops + 1).tolist(), end - begin])):
+                _advance(results, chunk, first, stop, stops[stops + 1 == stop])
+                results.finish()
+        else:
+            _advance(results, chunk, 0, end - begin, stops)
         if progress is not None:
             progress(float(time[end - 1]))
-    return results
+    results.finish()
+    return results.estimates
+
+
+class _Results:
+    """Collects the moments at which estimates are wanted; all since the last renewal are solved for at once."""
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        self.estimates: list[Estimates] = []
+        self._lines: list[Array] = []
+        self._times: list[tuple[float, float]] = []
+
+    def want(self, now: float) -> None:
+        """The estimates as they stand ``now`` (s)."""
+        self._lines.append(transform.current(self.state.transform))
+        self._times.append((self.state.transform.last, now))
+
+    def finish(self) -> None:
+        """Solve for what is wanted so far, before what the solution leans on changes."""
+        if self._lines:
+            self.estimates += estimates_at(self.state, self._lines, *zip(*self._times, strict=True))
+            self._lines, self._times = [], []
 
 
 @dataclass(frozen=True)
 class _Chunk:
     """Consecutive usable samples (n,), each with the interval that ends in it. Times in s."""
 
+    given: Array  # (N,) of all samples given
     kept: NDArray[np.intp]  # (N + 1,) usable samples among the first of those given
     missing: NDArray[np.intp]  # (N,) what ``leave_out`` counts, -1 where a sample is usable or too early to count
     powerless: NDArray[np.bool_]  # (N,) samples without a thrust
@@ -70,16 +95,15 @@ class _Chunk:
 def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     """What ``update`` computes of each sample by itself, for many."""
     usable, missing, powerless = _usable(state, time, samples)
-    kept = np.concatenate([[0], np.cumsum(usable)])
+    given, kept = time, np.concatenate([[0], np.cumsum(usable)])
     time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]
     thrust = estimator.THRUST
     columns[thrust] = np.where(np.abs(columns[thrust]) < estimator.LIMIT, columns[thrust], 0.0)
     grid = state.transform.grid
     if not time.size:
         empty = np.empty((0, state.model.layout.transformed))
-        return _Chunk(
-            kept, missing, powerless, time, time, empty, empty, np.empty((0, 2, grid.rows)), time, state.previous
-        )
+        kernels = np.empty((0, 2, grid.rows))
+        return _Chunk(given, kept, missing, powerless, time, time, empty, empty, kernels, time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -96,7 +120,8 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     areas, slants = estimator.over_interval(state.model.layout, steps[:, None], before, values, gain)
     kernels = transform.weights_of_many(grid, begins + 0.5 * steps, steps)
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
-    return _Chunk(kept, missing, powerless, time, begins, areas, slants, kernels, columns[estimator.INTERVAL], last)
+    intervals = columns[estimator.INTERVAL]
+    return _Chunk(given, kept, missing, powerless, time, begins, areas, slants, kernels, intervals, last)
 
 
 def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.bool_]]:
@@ -130,34 +155,51 @@ def _hasty(state: State, time: Array, rows: NDArray[np.intp]) -> list[int]:
     return hasty
 
 
-def _advance(state: State, chunk: _Chunk, first: int, stop: int) -> None:
-    """Take in the given samples first..stop (exclusive)."""
+def _advance(results: _Results, chunk: _Chunk, first: int, stop: int, wanted: NDArray[np.intp]) -> None:
+    """Take in the given samples first..stop (exclusive); estimates are ``wanted`` after some of them."""
+    state = results.state
     for column in chunk.missing[first:stop][chunk.missing[first:stop] >= 0].tolist():
         estimator.leave_out(state, column)
     if chunk.powerless[first:stop].any():
         state.thrust_known = False
-    _integrate(state, chunk, int(chunk.kept[first]), int(chunk.kept[stop]))
-
-
-def _integrate(state: State, chunk: _Chunk, begin: int, end: int) -> None:
-    """Take in the usable samples begin..end (exclusive)."""
+    stops = deque(zip(chunk.kept[wanted + 1].tolist(), chunk.given[wanted].tolist(), strict=True))
+    begin, end = int(chunk.kept[first]), int(chunk.kept[stop])
     while begin < end:
-        if np.isnan(chunk.begins[begin]):
-            estimator.interrupt(state, float(chunk.time[begin]))
-            begin += 1
-            continue
-        # up to and including the sample that renews, short of the next gap
-        stop = min(int(np.searchsorted(chunk.time[begin:end], state.renew_at, side="left")) + 1 + begin, end)
-        gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
-        stop = begin + int(gaps[0]) if gaps.size else stop
-        part = slice(begin, stop)
-        intervals = chunk.begins[part], chunk.time[part]
-        transform.add_many(state.transform, chunk.kernels[part], *intervals, chunk.areas[part], chunk.slants[part])
-        state.samples += stop - begin
-        # one after the other, as ``update`` adds them
-        state.intervals = float(np.cumsum(np.append(state.intervals, chunk.intervals[part]))[-1])
-        if state.transform.last >= state.renew_at:
-            renew(state)
-        begin = stop
+        _want(results, stops, begin)
+        begin = _integrate(results, chunk, begin, end, stops)
+    _want(results, stops, end)
     if end == chunk.time.size:
         state.previous = chunk.last
+
+
+def _want(results: _Results, stops: deque[tuple[int, float]], begin: int) -> None:
+    """The estimates that are wanted before the usable sample ``begin``."""
+    while stops and stops[0][0] <= begin:
+        results.want(stops.popleft()[1])
+
+
+def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: deque[tuple[int, float]]) -> int:
+    """Take in usable samples from ``begin`` to what ends the stretch, at most ``end`` (exclusive), and return that."""
+    state = results.state
+    if np.isnan(chunk.begins[begin]):
+        results.finish()
+        estimator.interrupt(state, float(chunk.time[begin]))
+        return begin + 1
+    if state.transform.last >= state.renew_at:
+        results.finish()
+        renew(state)
+    # up to and including the sample after which is renewed, short of the next gap
+    stop = min(int(np.searchsorted(chunk.time[begin:end], state.renew_at, side="left")) + 1 + begin, end)
+    gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
+    stop = begin + int(gaps[0]) if gaps.size else stop
+    inside = [count for count, _ in stops if begin < count < stop]
+    for first, last in pairwise(dict.fromkeys([begin, *inside, stop])):
+        part = slice(first, last)
+        intervals = chunk.begins[part], chunk.time[part]
+        transform.add_many(state.transform, chunk.kernels[part], *intervals, chunk.areas[part], chunk.slants[part])
+        if last < stop:
+            _want(results, stops, last)
+    state.samples += stop - begin
+    # one after the other, as ``update`` adds them
+    state.intervals = float(np.cumsum(np.append(state.intervals, chunk.intervals[begin:stop]))[-1])
+    return stop

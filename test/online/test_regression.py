@@ -251,4 +251,4 @@ def test_a_rival_is_the_regressor_that_moved_alike() -> None:
     alpha, q, de = (PLAIN.columns[i] for i in PLAIN.unknowns(0))
     lines[:, q] = lines[:, de] + 0.05 * lines[:, alpha] + 0.01 * np.random.default_rng(1).normal(size=ROWS)
     names = regression.rivals(PLAIN, regression.solve(PLAIN, lines.T @ lines))
-    assert [names[i] for i in PLAIN.unknowns(0)][1:] == ["de", "q"]
+    assert [PLAIN.regressors[names[i]] for i in PLAIN.unknowns(0)][1:] == ["de", "q"]

@@ -1,0 +1,131 @@
+"""Whether an estimate is to be believed, and what speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online import regression
+from sysid_node.online.present import Present
+from sysid_node.online.regression import student_95
+from sysid_node.online.state import Grounds, Renewed, State
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+ENOUGH_FREEDOM = 6.0  # degrees of freedom under which an interval is not trusted
+HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apart at all
+COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
+STALE = 0.5  # s without a new sample
+SETTLING = 1.0  # s after an abrupt change in which "changed" is said
+POOR = 0.7  # share of a coefficient's motion left unexplained beyond which no estimate of it is valid
+BURIED = 3.0  # times its sensor's noise energy that a regressor must move
+
+
+def grounds(state: State, renewed: Renewed) -> Grounds:
+    """What the judgement of all estimates rests on until the next renewal."""
+    table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
+    start, _, stop = state.model.settings.frequencies
+    # one weak instrument, and its whole equation is solved by least squares, which gusts may bias
+    firm = (np.where(plan.mine > 0.0, renewed.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
+    sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost)[table.coefficient]
+    spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
+    return Grounds(
+        sound=sound & ~spoilt,
+        spoilt=spoilt,
+        quantiles=student_95(freedom)[table.coefficient],
+        fits=list(
+            zip(
+                np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density).tolist(),
+                freedom.tolist(),
+                [round(renewed.total.samples)] * len(plan.coefficients),
+                strict=True,
+            )
+        ),
+    )
+
+
+def judge(
+    state: State,
+    renewed: Renewed,
+    grounds: Grounds,
+    current: Present,
+    values: Array,
+    errors: Array,
+    nows: Sequence[float],
+) -> list[tuple[str, ...]]:
+    """Of K moments why each of the D estimates ``values`` (K, D) is not to be believed, or "ok"."""
+    table = state.model.table
+    motion = current.gram.reshape(len(values), -1).take(table.motion, axis=1)
+    inflation = current.diagonal.take(table.unknown, axis=1) * motion
+    good = (errors <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
+    slope = ~table.offset
+    buried = slope & (motion < np.maximum(BURIED * renewed.total.bias.take(table.motion), regression.TINY))
+    hidden = buried | (slope & (inflation > HOPELESS))
+    poor = _poor(state, current)[:, table.coefficient]
+    good &= ~(hidden | _lost_with(state, hidden) | poor)
+    if not state.thrust_known:
+        good &= ~table.needs_thrust
+    everywhere = [
+        _whole(state, *moment) for moment in zip(current.time.tolist(), nows, current.solution.usable, strict=True)
+    ]
+    if good.all() and not any(everywhere):
+        return [("ok",) * len(table.names)] * len(values)
+    reasons = _reasons(state, renewed, grounds, current, inflation, buried, poor)
+    reasons[good] = "ok"
+    return [(w,) * len(table.names) if w else tuple(r) for w, r in zip(everywhere, reasons.tolist(), strict=True)]
+
+
+def _lost_with(state: State, hidden: Flags) -> Flags:
+    """(K, D) offsets that hold what a hidden slope of their coefficient does."""
+    table = state.model.table
+    if not hidden.any():
+        return np.zeros_like(hidden)
+    of = table.coefficient == np.arange(len(state.plan.coefficients))[:, None]  # (C, D)
+    return np.asarray((hidden @ of.T)[:, table.coefficient] & table.offset)
+
+
+def _reasons(
+    state: State,
+    renewed: Renewed,
+    grounds: Grounds,
+    current: Present,
+    inflation: Array,
+    buried: Flags,
+    poor: Flags,
+) -> NDArray[np.object_]:
+    """(K, D) what speaks against each: ``inflation`` of its variance, a regressor ``buried`` in noise, and more."""
+    table, c = state.model.table, state.model.table.coefficient
+    reasons = np.full(poor.shape, "converging", dtype=object)
+    # what is found later counts more
+    reasons[poor] = "outside model"
+    collinear = (inflation > COLLINEAR) & ~table.offset
+    if collinear.any():
+        rivals = regression.rivals(state.plan, current.solution)[:, table.unknown]
+        names = np.array([f"collinear with {name}" for name in state.plan.regressors], dtype=object)
+        reasons[collinear] = names[rivals[collinear]]
+    reasons[buried] = "not excited"
+    reasons[:, grounds.spoilt] = [f"{renewed.timing.blamed[i]} not on time" for i in c[grounds.spoilt].tolist()]
+    reasons[:, (renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = "converging"
+    if not state.thrust_known:
+        reasons[:, table.needs_thrust] = "thrust not measured"
+    reasons[:, renewed.lost[c]] = "outside model"
+    return reasons
+
+
+def _poor(state: State, current: Present) -> Flags:
+    """(K, C) whether the model leaves most of a coefficient's motion unexplained: then its interval means nothing."""
+    motion = current.gram.reshape(len(current.time), -1).take(state.plan.square, axis=1)
+    poor: Flags = (current.solution.residual > POOR * motion) & (motion > regression.TINY)
+    return poor
+
+
+def _whole(state: State, last: float, now: float, usable: bool) -> str:
+    """What holds of all estimates of one moment alike, if anything does."""
+    if now - last > STALE:
+        return "stale input"
+    if last - state.changed_at < SETTLING:
+        return "changed"
+    return "" if usable else "not excited"
