@@ -1,0 +1,78 @@
+"""From commands to deflections: delay, a servo of second order, and the effects of the actuators' station."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+from .motion import Effects
+
+
+class Actuators:
+    """All surfaces and the motor. ``servo`` Hz is the natural frequency of every surface's servo, damping 0.7."""
+
+    def __init__(
+        self, trim: Mapping[str, float], limits: Mapping[str, float], effects: Effects, step: float, servo: float
+    ) -> None:
+        self._effects, self._limits, self._step = effects, limits, step
+        self._omega = 2.0 * math.pi * servo
+        late = effects.get("command_delay", {}).get("delay", 0.0) / step
+        self._whole, self._part = int(late), late - int(late)
+        self._history = deque([dict(trim)] * (self._whole + 2), maxlen=self._whole + 2)
+        clipped = {n: max(-limits[n], min(limits[n], trim[n])) for n in limits}
+        self._servo = {n: (x, 0.0) for n, x in clipped.items()}
+        self._lagged, self._linked, self._position = dict(clipped), dict(clipped), dict(clipped)
+        self._motor = trim["thrust"]
+
+    def move(self, command: Mapping[str, float], time: float) -> tuple[dict[str, float], float]:
+        """One step on: the deflections (rad) that count, and the thrust (N)."""
+        self._history.append(dict(command))
+        newer, older = self._history[1], self._history[0]
+        arriving = {n: newer[n] + self._part * (older[n] - newer[n]) for n in newer}
+        return {n: self._surface(n, arriving[n], time) for n in self._limits}, self._thrust(arriving["thrust"])
+
+    def _surface(self, name: str, command: float, time: float) -> float:
+        limit, effects = self._limits[name], self._effects
+        wanted = self._servo_step(name, max(-limit, min(limit, command)))
+        tau = effects.get("actuator_lag", {}).get("time_constant", 0.0)
+        share = 1.0 - math.exp(-self._step / tau) if tau else 1.0
+        self._lagged[name] += share * (wanted - self._lagged[name])
+        play = 0.5 * effects.get("actuator_backlash", {}).get(name, 0.0)
+        off = self._lagged[name] - self._linked[name]
+        self._linked[name] += math.copysign(max(abs(off) - play, 0.0), off)
+        rate = effects.get("actuator_rate_limit", {}).get("rate", math.inf)
+        reach = self._linked[name] - self._position[name]
+        self._position[name] += math.copysign(min(abs(reach), rate * self._step), reach)
+        x = self._position[name] + effects.get("actuator_bias", {}).get(name, 0.0)
+        jam, loss = effects.get("stuck_surface", {}), effects.get("control_effectiveness_loss", {})
+        if name in jam and time >= jam["onset"]:
+            x = jam[f"{name}_position"]
+        if name in loss and time >= loss["onset"]:
+            x *= 1.0 - loss[name]
+        return x * (1.0 - effects.get("control_nonlinearity", {}).get(name, 0.0) * x * x)
+
+    def _servo_step(self, name: str, wanted: float) -> float:
+        """Second order, semi-implicit Euler."""
+        x, v = self._servo[name]
+        v += self._step * (self._omega**2 * (wanted - x) - 1.4 * self._omega * v)
+        x += self._step * v
+        self._servo[name] = x, v
+        return x
+
+    def _thrust(self, command: float) -> float:
+        tau = self._effects.get("motor_lag", {}).get("time_constant", 0.0)
+        share = 1.0 - math.exp(-self._step / tau) if tau else 1.0
+        self._motor += share * (max(command, 0.0) - self._motor)
+        return self._motor * (1.0 + self._effects.get("thrust_scale", {}).get("error", 0.0))
+
+
+def servo_lag(servo: float) -> float:
+    """The first-order lag (s) that a servo of this frequency looks like: 2 * 0.7 / omega."""
+    return 1.4 / (2.0 * math.pi * servo)
+
+
+def late_by(servo: float, effects: Effects, names: Sequence[str]) -> float:
+    """Seconds by which a surface is late in all, as far as lags and delays of these effects make it."""
+    keys = {"command_delay": "delay", "actuator_lag": "time_constant", "actuator_stamp_delay": "delay"}
+    return servo_lag(servo) + sum(effects[n][keys[n]] for n in names if n in effects and n in keys)

@@ -1,0 +1,136 @@
+"""What is right of a diagnosis, by the label of its case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .drawing import INHERENT
+
+#: Probability from which an effect counts as blamed.
+BLAMED = 0.9
+
+#: Most effects that a set named together may hold.
+TOGETHER = 3
+
+_WITHIN, _ONSET = 0.15, 2.0  # share by which a parameter may be off; seconds of an onset
+
+#: Parameters that only shape an effect, or that the drawn value does not determine.
+_SHAPES = frozenset({"alpha_star", "frequency", "slope", "onset", "damping"})
+
+_TIMES = frozenset({"command_delay.delay", "actuator_lag.time_constant"})
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One case: its label, what was said, and what of it is right. None: does not apply."""
+
+    label: Mapping[str, Any]
+    verdict: str
+    named: tuple[tuple[str, ...], ...]  # by cause: the effect, then those it cannot be told from
+    stated: tuple[tuple[float, bool], ...]  # probabilities, and whether that effect is there
+    right: bool
+    every: bool | None  # of two effects: both named
+    parameters: tuple[tuple[str, float, float, float], ...]  # name, true, found, standard error
+    sized: bool | None  # all of them within 15 % or within the 95 % interval
+    onset: float | None  # s off
+    gap: Mapping[str, Any]
+
+    @property
+    def kind(self) -> str:
+        """none, one, two or unlisted."""
+        return str(self.label["kind"])
+
+    @property
+    def first(self) -> str:
+        """What the diagnosis blames first, or its verdict."""
+        return self.named[0][0] if self.named else self.verdict
+
+    @property
+    def closed(self) -> float:
+        """Share of what could be closed on the held-out flight that was."""
+        return float(self.gap["shrink_percent"]) / 100.0
+
+
+def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:
+    """A case by its label and its gap.json."""
+    truth = set(label["effects"])
+    named = tuple((c["effect"], *c["indistinguishable_from"][: TOGETHER - 1]) for c in said["causes"])
+    there = truth | (set(INHERENT) if label["plant"] == "c172p" else set())
+    stated = tuple((float(c["probability"]), c["effect"] in there) for c in said["causes"])
+    parameters = tuple(_parameters(label, said))
+    right, every = _right(label, said["verdict"], named, truth)
+    return Judged(
+        label=label,
+        verdict=said["verdict"],
+        named=named,
+        stated=stated,
+        right=right,
+        every=every,
+        parameters=parameters,
+        sized=all(_close(*p) for p in parameters) if parameters else None,
+        onset=_onset(label, said),
+        gap=said["gap"],
+    )
+
+
+def _right(
+    label: Mapping[str, Any], verdict: str, named: tuple[tuple[str, ...], ...], truth: set[str]
+) -> tuple[bool, bool | None]:
+    """Whether the verdict (none, unlisted) or the first name is right; of two effects, whether both are named."""
+    if label["kind"] == "none":
+        inherent = label["plant"] == "c172p" and all(set(n) & set(INHERENT) for n in named)
+        return verdict == "no_gap" or bool(named and inherent), None
+    if label["kind"] == "unlisted":
+        return verdict == "unknown_effect", None
+    first = [n for n in named if label["plant"] != "c172p" or not set(n) & (set(INHERENT) - truth)][:1]
+    found = {effect for n in named for effect in n}
+    return bool(first and set(first[0]) & truth), truth <= found if len(truth) > 1 else None
+
+
+def _parameters(label: Mapping[str, Any], said: Mapping[str, Any]) -> list[tuple[str, float, float, float]]:
+    """Those of the true effects that are blamed by their own name."""
+    rows = []
+    for cause in said["causes"]:
+        for key, true in label["effects"].get(cause["effect"], {}).items():
+            full = f"{cause['effect']}.{key}"
+            found = cause["parameters"]
+            if key == "rate" and "inverse_rate" in found:
+                value, error = found["inverse_rate"]
+                rows.append((full, 1.0 / true, value, error))
+            elif key in found and key not in _SHAPES and not (cause["effect"] == "stuck_surface" and key == "rudder"):
+                value, error = found[key]
+                more = label["servo_lag"] if full in _TIMES and value > true else 0.0
+                rows.append((full, min(true + more, value) if more else true, value, error))
+    return rows
+
+
+def _close(name: str, true: float, found: float, error: float) -> bool:
+    return abs(found - true) <= max(_WITHIN * abs(true), 1.96 * error)
+
+
+def _onset(label: Mapping[str, Any], said: Mapping[str, Any]) -> float | None:
+    """Seconds by which the onset of a true effect is off, where it has one within the flight and was blamed."""
+    for cause in said["causes"]:
+        true = label["effects"].get(cause["effect"], {}).get("onset", -1.0)
+        if true > 0.0 and "onset" in cause["parameters"]:
+            return abs(float(cause["parameters"]["onset"][0]) - true)
+    return None
+
+
+def line(judged: Judged) -> str:
+    """A case in one line."""
+    label, gap = judged.label, judged.gap
+    truth = " + ".join(f"{n} {_short(v)}" for n, v in label["effects"].items()) or "none"
+    said = "; ".join("/".join(names) + f" {p:.2f}" for names, (p, _) in zip(judged.named, judged.stated, strict=True))
+    sizes = ", ".join(f"{n} {t:.3g}: {f:.3g}+-{e:.2g}" for n, t, f, e in judged.parameters)
+    gaps = " ".join(f"{gap[k]:.3f}" for k in ("before", "after", "noise_floor"))
+    mark = "right" if judged.right else "WRONG"
+    where = f"{label['plant']} {label['turbulence']} {label['programme']}"
+    return f"{mark} [{where}] {truth} -> {judged.verdict}: {said or '-'} | {sizes} | gap {gaps}"
+
+
+def _short(values: Mapping[str, float]) -> str:
+    return ",".join(f"{k}={v:.3g}" for k, v in values.items() if math.isfinite(v))

@@ -1,0 +1,117 @@
+"""Scores over cases, with the uncertainty that their number leaves."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+from evaluation.pages import table
+from scipy.stats import beta
+
+from .judging import BLAMED, Judged
+
+_ALPHA = 0.05
+_EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.99, 1.01)  # of the bins of stated probability
+_FOREIGN = "c172p"  # the plant whose tables no aircraft file holds
+
+
+def interval(right: int, of: int) -> tuple[float, float]:
+    """95 % interval of a share: Clopper and Pearson (1934), Biometrika 26."""
+    low = float(beta.ppf(_ALPHA / 2, right, of - right + 1)) if right else 0.0
+    high = float(beta.ppf(1 - _ALPHA / 2, right + 1, of - right)) if right < of else 1.0
+    return low, high
+
+
+def page(cases: Sequence[Judged]) -> str:
+    """The section of the documentation."""
+    if not cases:
+        return "No case was diagnosed."
+    own = [c for c in cases if c.label["plant"] != _FOREIGN]
+    foreign = [c for c in cases if c.label["plant"] == _FOREIGN]
+    columns = {"all": cases, "own plants": own, _FOREIGN: foreign}
+    rows = [[what, *(_share(flags(c)) for c in columns.values()), wanted] for what, flags, wanted in _SCORES]
+    parts = [
+        f"{len(cases)} cases, {len(own)} of the own plants, {len(foreign)} of {_FOREIGN}; in brackets 95 % intervals.",
+        table(("", *columns, "wanted"), rows),
+        "Probabilities as stated, and the share of them that is right:",
+        table(("stated", "mean stated", "right", "causes"), calibration([s for c in cases for s in c.stated])),
+        "By effect: cases with it, how many were right, and what was said first in the others.",
+        table(("effect", "plant", "cases", "right", "else"), _confusion(cases)),
+    ]
+    return "\n\n".join(parts)
+
+
+def _share(flags: Iterable[bool]) -> str:
+    """As a count, with the interval of the share."""
+    known = list(flags)
+    if not known:
+        return "-"
+    low, high = interval(sum(known), len(known))
+    return f"{sum(known)} of {len(known)} ({100 * low:.0f}-{100 * high:.0f} %)"
+
+
+_Cases = Sequence[Judged]
+
+
+def _one(cases: _Cases, air: str) -> list[bool]:
+    return [c.right for c in cases if c.kind == "one" and c.label["turbulence"] == air]
+
+
+def _named(cases: _Cases) -> list[Judged]:
+    return [c for c in cases if c.kind in ("one", "two") and c.right]
+
+
+def _of_kind(cases: _Cases, kind: str) -> list[Judged]:
+    return [c for c in cases if c.kind == kind]
+
+
+#: What is scored: in words, of which cases which are right, and what is wanted.
+_SCORES = (
+    ("one effect, still air: named first, or in a set of three", lambda c: _one(c, "none"), "90 %"),
+    ("the same, light turbulence", lambda c: _one(c, "light"), "80 %"),
+    ("the same, moderate turbulence", lambda c: _one(c, "moderate"), ""),
+    ("two effects: both named", lambda c: [bool(x.every) for x in _of_kind(c, "two")], "70 %"),
+    ("of those named: parameters within 15 % or their intervals",
+     lambda c: [x.sized for x in _named(c) if x.sized is not None], "90 %"),
+    ("of those with an onset: within 2 s", lambda c: [x.onset <= 2.0 for x in _named(c) if x.onset is not None], "all"),
+    ("no effect: no_gap", lambda c: [x.right for x in _of_kind(c, "none")], "95 %"),
+    ("not in the list: unknown_effect", lambda c: [x.right for x in _of_kind(c, "unlisted")], "80 %"),
+    ("not in the list: a listed effect blamed above 0.9",
+     lambda c: [any(p > BLAMED for p, _ in x.stated) for x in _of_kind(c, "unlisted")], "under 5 %"),
+    ("of those named: 90 % of the closable gap closed", lambda c: [x.closed >= 0.9 for x in _named(c)], "90 %"),
+)  # fmt: skip
+
+
+def calibration(stated: Sequence[tuple[float, bool]]) -> list[list[str]]:
+    """Rows of bins, and the expected calibration error: Naeini, Cooper & Hauskrecht (2015), AAAI."""
+    rows, error = [], 0.0
+    for low, high in pairwise(_EDGES):
+        own = [pair for pair in stated if low <= pair[0] < high]
+        if own:
+            said, right = (sum(column) / len(own) for column in zip(*own, strict=True))
+            error += abs(said - right) * len(own) / len(stated)
+            rows.append([f"{low:g} to {min(high, 1.0):g}", f"{said:.2f}", f"{right:.2f}", str(len(own))])
+    return [*rows, ["expected calibration error", "", f"{error:.2f}", str(len(stated))]]
+
+
+def _confusion(cases: _Cases) -> list[list[str]]:
+    rows = []
+    for effect in sorted({e for c in cases for e in _effects(c)}):
+        for plant in ("own", _FOREIGN):
+            own = [c for c in cases if effect in _effects(c) and (c.label["plant"] == _FOREIGN) == (plant == _FOREIGN)]
+            if own:
+                missed = Counter(c.first for c in own if not _found(effect, c))
+                others = ", ".join(f"{name} {count}" for name, count in missed.most_common())
+                rows.append([effect, plant, str(len(own)), str(sum(_found(effect, c) for c in own)), others])
+    return rows
+
+
+def _effects(case: Judged) -> tuple[str, ...]:
+    return tuple(case.label["effects"]) or ("none",)
+
+
+def _found(effect: str, case: Judged) -> bool:
+    if case.kind in ("none", "unlisted"):
+        return case.right
+    return any(effect in names for names in case.named)
