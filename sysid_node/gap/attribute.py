@@ -6,8 +6,11 @@ matters; then a backward check. Significant is not enough: a clock's odd millise
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,7 +19,7 @@ from sysid_node.gap.candidates import TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
-from sysid_node.gap.spectra import Complex
+from sysid_node.gap.spectra import power_of
 from sysid_node.gap.structure import Structure, instrumented, structure_of
 from sysid_node.gap.view import View
 
@@ -37,6 +40,12 @@ MATERIAL, MATERIAL_OF_ALL = 0.25, 0.08
 NOTICED = 0.01
 
 Progress = Callable[[float, str], None]
+
+#: Cost of a candidate at a first look, and the values from which its fit starts.
+Look = tuple[float, Candidate, tuple[float, ...]]
+
+_Work = TypeVar("_Work")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -101,19 +110,33 @@ def _share_of(progress: Progress, count: int) -> Progress:
 
 def stage(current: Trial, candidates: Sequence[Candidate], nuisances: Nuisances, progress: Progress) -> list[Trial]:
     """The candidates upon what is known so far, the most probable first."""
-    looked: list[tuple[float, Candidate, tuple[float, ...]]] = []
     fresh = with_candidates(current.fit, current.fit.candidates, nuisances, ())
     problem = Projected(fresh, bounded=False)
-    for i, candidate in enumerate(candidates):
-        progress(0.6 * i / len(candidates), candidate.label)
-        looked.append(_first_look(fresh, problem, candidate))
-    looked.sort(key=lambda look: look[0])
-    trials = []
-    for i, (_, candidate, start) in enumerate(looked[:_POLISHED]):
-        progress(0.6 + 0.4 * i / _POLISHED, candidate.label)
+
+    def look(candidate: Candidate) -> Look:
+        return _first_look(fresh, problem, candidate)
+
+    def finish(look: Look) -> Trial:
+        _, candidate, start = look
         fit = with_candidates(current.fit, [*current.fit.candidates, candidate], nuisances, start)
-        trials.append(_trial(polish(fit), candidate))
+        return _trial(polish(fit), candidate)
+
+    looked = _spread(look, candidates, lambda s: progress(0.5 * s, "a first look at every effect"))
+    looked.sort(key=lambda look: look[0])
+    trials = _spread(finish, looked[:_POLISHED], lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"))
     return sorted(trials, key=lambda t: -t.evidence.total)
+
+
+def _spread(
+    work: Callable[[_Work], _Result], over: Sequence[_Work], progress: Callable[[float], None]
+) -> list[_Result]:
+    """The work on each, in their order; on as many threads as there are processors, which XLA and LAPACK leave free."""
+    done = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for result in pool.map(work, over):
+            done.append(result)
+            progress(len(done) / len(over))
+    return done
 
 
 def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
@@ -141,23 +164,17 @@ def power_left(evidence: Evidence) -> Array:
     return np.asarray(sum(power_of(r) for r in evidence.residuals))
 
 
-def power_of(residual: Complex) -> Array:
-    """Power (12,) of a residual (W, L, 12); the mean, which has no imaginary part, counts half."""
-    power = (np.abs(residual) ** 2).sum(axis=0)
-    return np.asarray(power.sum(axis=0) - 0.5 * power[0])
-
-
 def _trial(fit: Fit, added: Candidate | None) -> Trial:
     return Trial(fit, cross_validated(fit), added)
 
 
-def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> tuple[float, Candidate, tuple[float, ...]]:
+def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
     """The cost that one Gauss-Newton step from the best start leaves, with the weights as they are."""
     if not candidate.indices:
         widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
         return polish(widened, rounds=1, reweigh=False).cost, candidate, ()
     low, high = bounds(fit.views[0].simulator, candidate.indices)
-    best: tuple[float, Candidate, tuple[float, ...]] = (np.inf, candidate, candidate.starts[0])
+    best: Look = (np.inf, candidate, candidate.starts[0])
     for start in candidate.starts:
         look = problem.looking(candidate.indices)
         values = np.array(start)

@@ -1,7 +1,7 @@
 """How far the gap shrinks: the simulator's error on flight not fitted, before and after, beside what noise leaves.
 
-The error of a coefficient is the root of its residual's power over its own power, between the first line and 4 Hz, in
-windows of ``spectra.LENGTH`` seconds whose mean is left out; all coefficients that were moved count alike.
+The error of a channel is the root of its residual's power, up to 4 Hz, over the power of its motion about the mean, in
+windows of ``spectra.LENGTH`` seconds; all channels that were moved count alike.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.evidence import Evidence, groups_of
-from sysid_node.gap.spectra import Complex
+from sysid_node.gap.spectra import Complex, power_of
 from sysid_node.gap.structure import Structure
-from sysid_node.gap.view import View
-from sysid_node.sim.prediction import COEFFICIENTS
+from sysid_node.gap.view import CHANNELS, View
 
-#: A coefficient counts where its own power is so many times the sensors' noise.
+#: A channel counts where its own power is so many times the sensors' noise.
 _MOVED = 4.0
 
 _DRAWS = 2000
@@ -27,7 +26,7 @@ _DRAWS = 2000
 
 @dataclass(frozen=True)
 class Gap:
-    """Root-mean-square errors as shares of what was measured, overall and by coefficient."""
+    """Root-mean-square errors as shares of what was measured, overall and by channel."""
 
     before: float
     tolerances: float  # with derivatives and biases fitted within their tolerances, no effect
@@ -39,14 +38,14 @@ class Gap:
 
 
 def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, after: Evidence, left: Structure) -> Gap:
-    """The gap on flights not fitted, from their residuals (W, L, 6) as the file has it, then as fitted."""
+    """The gap on flights not fitted, from their residuals (W, L, 12) as the file has it, then as fitted."""
     groups = [(i, group) for i, view in enumerate(views) for group in groups_of(view)]
-    measured = _powers([v.measured for v in views], groups)
-    noise = np.array([len(g) * views[i].noise[1:, :6].sum(axis=0) for i, g in groups])
+    measured = np.array([(np.abs(views[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
+    noise = np.array([len(g) * (views[i].noise.sum(axis=0) - 0.5 * views[i].noise[0]) for i, g in groups])
     stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
-    floor = np.maximum(noise, stages[2] * (1.0 - np.clip(left.share[:6], 0.0, 1.0)))
-    counted = views[0].axes[:6] & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
-    table = np.stack([*stages, np.minimum(floor, stages[1])])  # (4, groups, 6)
+    floor = np.maximum(noise, stages[2] * (1.0 - np.clip(left.share, 0.0, 1.0)))
+    counted = views[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
+    table = np.stack([*stages, np.minimum(floor, stages[1])])  # (4, groups, 12)
 
     def errors(weight: Array) -> Array:
         """Overall errors (4,) at weights (G,) of the groups."""
@@ -59,7 +58,7 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
     shrinks = [_shrink(errors(d.astype(float))) for d in draws]
     own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
     names = ("before", "tolerances", "after", "noise_floor")
-    channels = {c: dict(zip(names, own[:, k].tolist(), strict=True)) for k, c in enumerate(COEFFICIENTS) if counted[k]}
+    channels = {c: dict(zip(names, own[:, k].tolist(), strict=True)) for k, c in enumerate(CHANNELS) if counted[k]}
     low, high = np.percentile(shrinks, [2.5, 97.5]).tolist()
     before_, fitted, after_, floor_ = overall.tolist()
     return Gap(before_, fitted, after_, floor_, _shrink(overall), (low, high), channels)
@@ -72,5 +71,5 @@ def _shrink(errors: Array) -> float:
 
 
 def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:
-    """Power (G, 6) by group, above the mean."""
-    return np.array([(np.abs(amplitudes[i][g][:, 1:, :6]) ** 2).sum(axis=(0, 1)) for i, g in groups])
+    """Power (G, 12) by group."""
+    return np.array([power_of(amplitudes[i][g]) for i, g in groups])

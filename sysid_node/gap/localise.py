@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.attribute import Attribution, power_of
+from sysid_node.gap.attribute import Attribution
 from sysid_node.gap.fit import Fit
-from sysid_node.gap.spectra import EDGES, Complex
+from sysid_node.gap.spectra import EDGES, Complex, power_of
 from sysid_node.gap.view import CHANNELS, View
 
 #: Share of the power that a band, a time or a regime holds when it is named.

@@ -79,3 +79,9 @@ class Windows:
         bands = self.bands
         means = np.stack([power[bands == b].mean(axis=0) for b in range(bands.max() + 1)])
         return np.asarray(means[bands])
+
+
+def power_of(residual: Complex) -> Array:
+    """Power (12,) of a residual (W, L, 12); the mean, which has no imaginary part, counts half."""
+    power = (np.abs(residual) ** 2).sum(axis=0)
+    return np.asarray(power.sum(axis=0) - 0.5 * power[0])

@@ -110,10 +110,13 @@ def _priors(fit: Fit) -> tuple[Array, Array]:
 
 def _basis(view: View, weight: Array) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by coefficient that was measured."""
-    all_of_them, commands = (view.windows.transform(table) for table in instruments(view))
+    of_forces, of_readings = instruments(view)
     found = {}
     for axis in np.flatnonzero(view.axes):
-        spectra = all_of_them if axis < len(COEFFICIENTS) else commands
+        table = of_forces if axis < len(COEFFICIENTS) else of_readings
+        if not table.size:
+            continue
+        spectra = view.windows.transform(table)
         own = weight[:, axis : axis + 1]
         rows = real_rows(spectra, np.repeat(own, spectra.shape[2], axis=1))
         matrix = rows.reshape(rows.shape[0] * own.shape[0], -1)
@@ -123,27 +126,31 @@ def _basis(view: View, weight: Array) -> dict[int, Array]:
 
 
 def instruments(view: View) -> tuple[Array, Array]:
-    """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread; those that owe nothing to
-    gusts of any kind, which are in every reading of the air data."""  # fmt: skip
-    given, record = _deliberate(view), view.record
+    """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread.
+
+    And those that owe nothing to gusts of any kind, which are in every reading of the air data; there may be none.
+    """
+    (given, free), record = _deliberate(view), view.record
     columns = [_lagged(given[:, i], lag, view.simulator.step) for i in range(given.shape[1]) for lag in _LAGS]
     columns += [series for i in range(given.shape[1]) for series in (given[:, i] ** 2, given[:, i] ** 3)]
     alpha, beta, speed = (record[n] - record[n].mean() for n in ("alpha", "beta", "V"))
-    return _standard([*columns, alpha**2, np.abs(beta), speed * alpha]), _standard(columns)
+    return _standard([*columns, alpha**2, np.abs(beta), speed * alpha]), _standard(columns if free else [])
 
 
 def _standard(columns: list[Array]) -> Array:
+    if not columns:
+        return np.empty((0, 0))
     table = np.column_stack(columns)
     table = table - table.mean(axis=0)
     spread = table.std(axis=0)
     return np.asarray(table[:, spread > 1e-12] / spread[spread > 1e-12])
 
 
-def _deliberate(view: View) -> Array:
-    """What a pilot or a test program does with the commands (N, m).
+def _deliberate(view: View) -> tuple[Array, bool]:
+    """What a pilot or a test program does with the commands (N, m), and whether it is free of gusts.
 
-    Where a command steps, its steps, forgotten after some seconds: between them it moves with the autopilot, hence with
-    the gusts. Where it has none (a multisine), the command itself.
+    Commands that step: their steps, forgotten after some seconds; between them they move with the autopilot, hence with
+    the gusts. Where none steps (a multisine), the commands themselves.
     """
     commands = view.commands
     changes = np.diff(commands, axis=0, prepend=commands[:1])
@@ -152,7 +159,7 @@ def _deliberate(view: View) -> Array:
     steps = lfilter([1.0], [1.0, -decay], kept, axis=0)
     usual = lfilter([1.0], [1.0, -decay], changes, axis=0)
     stepped = steps.std(axis=0) > _STEPPED * usual.std(axis=0)
-    return np.where(stepped, steps, commands - commands.mean(axis=0))
+    return (steps[:, stepped], True) if stepped.any() else (commands - commands.mean(axis=0), False)
 
 
 def _lagged(series: Array, lag: float, step: float) -> Array:

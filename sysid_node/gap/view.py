@@ -36,8 +36,8 @@ LONGEST, SHORTEST_MEMORY = 4.0, 0.05
 #: Band in which gusts are told from noise, Hz.
 _GUSTS = (0.3, 2.0)
 
-#: Directions in which a prediction is differentiated at once.
-_LANES = 8
+#: Directions in which a prediction is differentiated at once: of few, and of many.
+_FEW, _MANY = 2, 8
 
 #: Flights are padded to multiples of so many samples: each length is another program to compile.
 _BLOCK = 500
@@ -120,9 +120,10 @@ class View:
     def slopes(self, theta: Array, indices: list[int]) -> Complex:
         """d predicted / d parameters of these indices, (W, L, 12, K)."""
         s, blocks = self.simulator, []
-        for first in range(0, len(indices), _LANES):
-            some = indices[first : first + _LANES]
-            directions = np.zeros((_LANES, len(theta)))
+        lanes = _FEW if len(indices) <= 2 * _FEW else _MANY
+        for first in range(0, len(indices), lanes):
+            some = indices[first : first + lanes]
+            directions = np.zeros((lanes, len(theta)))
             directions[np.arange(len(some)), some] = 1.0
             changes = _changes(s.layout, s.model, jnp.asarray(theta), directions, self.given)
             blocks.append(np.asarray(changes)[: len(some), : len(self.record)])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sysid_node.gap.diagnose import Diagnosis, document, structured
+from sysid_node.gap.view import CHANNELS
 from sysid_node.report import figures
 from sysid_node.report.figures import BLUE, GREEN, MUTED, PURPLE, VERMILION, Figure
 from sysid_node.report.thin import thin_curve
@@ -16,6 +17,17 @@ from sysid_node.sim import EFFECTS
 from sysid_node.sim.layout import Layout
 from sysid_node.sim.prediction import COEFFICIENTS
 
+#: What is compared, in words.
+_WORDS = {
+    **COEFFICIENT_WORDS,
+    "V": "airspeed",
+    "alpha": "angle of attack",
+    "beta": "sideslip",
+    "phi": "roll angle",
+    "theta": "pitch angle",
+    "psi": "heading",
+}
+
 _OTHERS = ("#E69F00", "#56B4E9", "#CC79A7", "#999999")
 
 
@@ -23,7 +35,7 @@ def paragraph(found: Diagnosis) -> str:
     """What was found, for a pilot."""
     gap = found.gap
     worst = max(gap.per_channel, key=lambda c: gap.per_channel[c]["before"], default="")
-    off = f"The simulator's {COEFFICIENT_WORDS.get(worst, 'response')} is {_percent(gap, worst)} off"
+    off = f"The simulator's {_WORDS.get(worst, 'response')} is {_percent(gap, worst)} off"
     whose = "flight held out" if found.held_out else "parts of the flight that were not fitted"
     falls = (
         f"on {whose} the error over all axes falls from {number(gap.before, 2)} to {number(gap.after, 2)} of the "
@@ -97,8 +109,8 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
             {
                 "type": "bar",
                 "name": station,
-                "x": list(COEFFICIENTS),
-                "y": [shares.get(c, 0.0) for c in COEFFICIENTS],
+                "x": list(CHANNELS),
+                "y": [shares.get(c, 0.0) for c in CHANNELS],
                 "marker": {"color": MUTED if station == "noise" else colour},
             }
         )
@@ -129,7 +141,7 @@ def flight(found: Diagnosis) -> Mapping[str, Any]:
     point[carried] = fit.points[0][carried]
     before, after = view.predicted_series(neutral), view.predicted_series(point)
     panels = []
-    for k in np.flatnonzero(view.axes):
+    for k in np.flatnonzero(view.axes[: len(COEFFICIENTS)]):
         offset = [float(x[:, k].mean() - view.series[:, k].mean()) for x in (before, after)]
         time, *curves = thin_curve(
             view.record.time, view.series[:, k], before[:, k] - offset[0], after[:, k] - offset[1]
@@ -140,7 +152,7 @@ def flight(found: Diagnosis) -> Mapping[str, Any]:
             for c, (n, colour, dash) in zip(curves, styles, strict=True)
         ]
         layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(COEFFICIENTS[k])}
-        words = COEFFICIENT_WORDS[COEFFICIENTS[k]]
+        words = _WORDS[COEFFICIENTS[k]]
         panels.append((symbol(COEFFICIENTS[k]), words, Figure(f"{words}: measured and simulated", traces, layout)))
     return {"panels": panels, "held_out": found.held_out}
 
@@ -175,7 +187,7 @@ def shape(found: Diagnosis) -> Mapping[str, Any]:
         "xaxis": figures.axis(f"{missing.signal}, {missing.unit}"),
         "yaxis": figures.axis(f"missing {missing.axis}"),
     }
-    words = f"The missing {COEFFICIENT_WORDS[missing.axis]} against {missing.signal}"
+    words = f"The missing {_WORDS[missing.axis]} against {missing.signal}"
     return {
         "figure": Figure(words, [trace], layout, 300),
         "words": f"{words}; the bins explain {number(100 * missing.explained, 2)} % of it",
