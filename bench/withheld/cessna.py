@@ -316,6 +316,11 @@ class Cessna:
         self.start()
         self.trim["thrust"] = self._machine.thrust
 
+    @property
+    def mass(self) -> float:
+        """All of it, kg."""
+        return float(self._machine.fdm["inertia/mass-slugs"]) * _SLUG
+
     def start(self) -> Instant:
         """Back to the trim."""
         at = self._at

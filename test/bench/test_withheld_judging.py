@@ -1,0 +1,108 @@
+"""What the scorer calls right, case by case. Truth: the rules of docs/gap_scoreboard.md, and textbook intervals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from withheld.drawing import LISTED, SETS, draw
+from withheld.judging import judge
+from withheld.scoreboard import calibration, interval, page
+
+from sysid_node.sim import EFFECTS
+
+GAP = {"shrink_percent": 95.0, "before": 0.5, "after": 0.1, "noise_floor": 0.08}
+
+
+def _label(kind: str, effects: dict[str, dict[str, float]], plant: str = "cdrw") -> dict[str, Any]:
+    return {"kind": kind, "effects": effects, "plant": plant, "turbulence": "none", "servo_lag": 0.007}
+
+
+def _said(verdict: str, *causes: tuple[str, float, dict[str, list[float]], list[str]]) -> dict[str, Any]:
+    keys = ("effect", "probability", "parameters", "indistinguishable_from")
+    return {"verdict": verdict, "gap": GAP, "causes": [dict(zip(keys, c, strict=True)) for c in causes]}
+
+
+def test_one_effect_is_right_where_it_is_named_first_or_among_three() -> None:
+    label = _label("one", {"command_delay": {"delay": 0.06}})
+    rivals = ["actuator_lag", "command_delay", "imu_delay"]
+    assert judge(label, _said("explained", ("command_delay", 0.9, {"delay": [0.06, 0.01]}, []))).right
+    assert judge(label, _said("ambiguous", ("actuator_stamp_delay", 0.5, {"delay": [0.06, 0.01]}, rivals))).right
+    assert not judge(
+        label, _said("ambiguous", ("cg_shift", 0.5, {"x": [0.06, 0.01]}, ["a", "b", "command_delay"]))
+    ).right
+    assert not judge(label, _said("no_gap")).right
+
+
+def test_parameters_are_right_within_their_share_or_interval() -> None:
+    label = _label("one", {"mass_error": {"error": 0.2}})
+    for found, error, right in ((0.225, 0.001, True), (0.25, 0.001, False), (0.25, 0.03, True)):
+        said = _said("explained", ("mass_error", 0.9, {"error": [found, error]}, []))
+        assert judge(label, said).sized is right
+
+
+def test_a_rate_is_compared_by_its_reciprocal_and_a_lag_with_the_servos_own() -> None:
+    rate = judge(
+        _label("one", {"actuator_rate_limit": {"rate": 0.5}}),
+        _said("explained", ("actuator_rate_limit", 0.9, {"inverse_rate": [2.1, 0.01]}, [])),
+    )
+    assert rate.parameters == (("actuator_rate_limit.rate", 2.0, 2.1, 0.01),)
+    lag = judge(
+        _label("one", {"actuator_lag": {"time_constant": 0.04}}),
+        _said("explained", ("actuator_lag", 0.9, {"time_constant": [0.05, 0.001]}, [])),
+    )
+    assert lag.parameters[0][1] == pytest.approx(0.047)
+
+
+def test_both_of_two_effects_must_be_named() -> None:
+    label = _label("two", {"mass_error": {"error": 0.2}, "cg_shift": {"x": 0.02}})
+    first = ("mass_error", 0.9, {"error": [0.2, 0.01]}, [])
+    assert judge(label, _said("explained", first)).every is False
+    assert judge(label, _said("explained", first, ("drag_rise", 0.5, {}, ["cg_shift"]))).every is True
+
+
+def test_none_and_unlisted_are_right_by_their_verdicts() -> None:
+    blamed = ("mass_error", 0.95, {"error": [0.2, 0.01]}, [])
+    assert judge(_label("none", {}), _said("no_gap")).right
+    assert not judge(_label("none", {}), _said("explained", blamed)).right
+    assert judge(_label("unlisted", {"slosh": {"share": 0.1}}), _said("unknown_effect")).right
+    assert not judge(_label("unlisted", {"slosh": {"share": 0.1}}), _said("explained", blamed)).right
+
+
+def test_what_c172p_always_has_may_be_named_too() -> None:
+    inherent = ("propwash", 0.9, {"gain": [3.0, 0.1]}, [])
+    true = ("mass_error", 0.9, {"error": [0.2, 0.01]}, [])
+    assert judge(_label("none", {}, "c172p"), _said("explained", inherent)).right
+    assert judge(_label("one", {"mass_error": {"error": 0.2}}, "c172p"), _said("explained", inherent, true)).right
+    assert not judge(_label("one", {"mass_error": {"error": 0.2}}), _said("explained", inherent, true)).right
+
+
+def test_an_onset_within_the_flight_is_measured() -> None:
+    label = _label("one", {"control_effectiveness_loss": {"elevator": 0.5, "onset": 20.0}})
+    found = {"elevator": [0.5, 0.02], "onset": [21.5, 0.3]}
+    assert judge(label, _said("explained", ("control_effectiveness_loss", 0.9, found, []))).onset == pytest.approx(1.5)
+
+
+def test_the_interval_of_a_share_is_clopper_and_pearsons() -> None:
+    """Published: 8 of 10 gives 0.4439 to 0.9748; none of 10 gives 0 to 0.3085."""
+    assert interval(8, 10) == pytest.approx((0.4439, 0.9748), abs=1e-4)
+    assert interval(0, 10) == pytest.approx((0.0, 0.3085), abs=1e-4)
+
+
+def test_calibration_is_the_mean_distance_of_the_bins() -> None:
+    """Ten stated 0.95 of which eight are right, ten stated 0.6 of which six are: (0.15 + 0) / 2."""
+    stated = [(0.95, i < 8) for i in range(10)] + [(0.6, i < 6) for i in range(10)]
+    assert calibration(stated)[-1][2] == "0.07" or calibration(stated)[-1][2] == "0.08"
+
+
+def test_a_page_is_made_of_few_cases_and_of_none() -> None:
+    case = judge(_label("none", {}), _said("no_gap"))
+    assert "1 of 1" in page([case])
+    assert page([]) == "No case was diagnosed."
+
+
+def test_every_effect_that_is_drawn_is_the_simulators_and_the_sets_differ() -> None:
+    assert set(LISTED) <= set(EFFECTS)
+    assert draw("development", 7) == draw("development", 7)
+    assert any(draw("development", n) != draw("final", n) for n in range(3))
+    assert len(set(SETS.values())) == len(SETS)
