@@ -37,6 +37,9 @@ _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
 #: Least share of its movement that a stuck surface has lost.
 _JAMMED = 0.95
 
+#: A mode that rings more slowly than any airframe's would pass for whatever a gust does.
+_RINGING, _STIFFEST = ("structural_mode", "frequency"), 3.0
+
 #: How much larger than its plausible scale a parameter may well be (1 sigma of its prior).
 GENEROUS = 3.0
 
@@ -78,6 +81,7 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     # A surface half stuck is one that has lost half its effect: only a jam is called one.
     jams = [e == "stuck_surface" and p.switch for e, p in table]
     lower = [_JAMMED if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
+    lower = [_STIFFEST if (e, p.name) == _RINGING else low for low, (e, p) in zip(lower, table, strict=True)]
     return np.array(lower), np.array([p.upper for _, p in table])
 
 
@@ -118,7 +122,7 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         name = "delay" if effect.endswith("delay") else "time_constant"
         yield name, (0.02, 0.07)
     if effect == "structural_mode":
-        yield "frequency", (2.5, 5.0, 9.0)
+        yield "frequency", (3.5, 5.0, 9.0)
     if effect == "ground_effect":
         yield "height", (0.5, 3.0)
 

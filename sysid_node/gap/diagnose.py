@@ -29,6 +29,9 @@ _TOLD_APART = 0.8
 #: Share of the remainder on some axis that must be structure to matter, and its standard deviations above chance.
 _STRUCTURED, _DEVIATIONS = 0.35, 6.0
 
+#: Standard deviations above chance below which coherence is taken as chance.
+_CHANCE = 4.0
+
 #: Share of the structure that the effects must remove for them to be the explanation.
 _EXPLAINED = 0.5
 
@@ -148,14 +151,14 @@ def structured(attribution: Attribution) -> bool:
 
 def explained(attribution: Attribution) -> float:
     """Share of the structure, above what derivatives and biases explain, that the effects remove."""
-    before, left = attribution.before, attribution.left
-    whole = float(before.coherent.sum())
-    return float(np.clip(1.0 - left.coherent.sum() / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+    before, left = (np.where(s.deviations > _CHANCE, s.coherent, 0.0) for s in (attribution.before, attribution.left))
+    whole = float(before.sum())
+    return float(np.clip(1.0 - left.sum() / whole, 0.0, 1.0)) if whole > 0.0 else float(left.sum() == 0.0)
 
 
 def probability(attribution: Attribution, cause: Cause) -> float:
-    """Of a cause, less where much structure is left that no listed effect explains."""
-    return cause.probability * (explained(attribution) if structured(attribution) else 1.0)
+    """Of a cause, less by the share of the structure that is left and no listed effect explains."""
+    return cause.probability * explained(attribution)
 
 
 def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:

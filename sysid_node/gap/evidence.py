@@ -54,17 +54,19 @@ def cross_validated(fit: Fit) -> Evidence:
     assert fit.information is not None
     scores: list[float] = []
     residuals: list[Complex] = []
-    for view, power, rows, full in zip(fit.views, fit.power, fit.rows, fit.slopes, strict=True):
+    grams = [np.einsum("wru,wrv->wuv", J * fit.loose, J * fit.loose, optimize=True) for J in fit.slopes]
+    whole = [gram.sum(axis=0) for gram in grams]
+    elsewhere = [fit.prior_information + sum(w for k, w in enumerate(whole) if k != i) for i in range(len(whole))]
+    for i, (view, power, rows, full) in enumerate(zip(fit.views, fit.power, fit.rows, fit.slopes, strict=True)):
         slopes = full * fit.loose
         residual = amplitudes(rows, weights(view.windows, power))
         unseen = residual.copy()
         for group in groups_of(view):
             aside = np.arange(max(group[0] - 1, 0), min(group[-1] + 2, view.windows.count))
-            J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
-            information = _without_shapes(fit) - J.T @ J
-            information = information + 1e-9 * np.diag(np.diag(fit.information))
-            step = -solve(information, J.T @ r)
             others = np.setdiff1d(np.arange(view.windows.count), aside)
+            J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
+            information = elsewhere[i] + grams[i][others].sum(axis=0)
+            step = -solve(information, J.T @ r)
             own_power = residual_power(view, residual[others]) if others.size > 2 else power
             score, part = _predictive(view, power, own_power, rows[group], slopes[group], step, information)
             scores.append(score)

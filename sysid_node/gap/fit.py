@@ -94,6 +94,13 @@ class Fit:
         return now, sigma, limit
 
     @property
+    def prior_information(self) -> Array:
+        """Of all unknowns (unknowns, unknowns), before any flight."""
+        _, spread, _ = self.stacked
+        _, sigma = prior(self.views[0].simulator, self.indices)
+        return np.diag(np.concatenate([sigma, spread]) ** -2.0)
+
+    @property
     def prior_score(self) -> float:
         """Log probability of where everything stands under its prior, up to a constant: nats, zero at best."""
         now, sigma, _ = self.stacked
@@ -305,8 +312,6 @@ def moved(fit: Fit, step: Array) -> Fit:
 def linearised(fit: Fit) -> Fit:
     """The fit with its residual, slopes and information where it stands, for evidence and errors."""
     own, chosen = list(fit.nuisances.indices), list(fit.indices)
-    _, spread, _ = fit.stacked
-    _, sigma = prior(fit.views[0].simulator, fit.indices)
     rows, slopes = [], []
     for i, (view, point, power) in enumerate(zip(fit.views, fit.points, fit.power, strict=True)):
         weight = weights(view.windows, power)
@@ -314,7 +319,7 @@ def linearised(fit: Fit) -> Fit:
         raw = real_rows(view.slopes(point, [*chosen, *own]), weight)
         wide = _placed(raw[..., len(chosen) :].reshape(-1, len(own)), fit.nuisances, i, len(fit.views))
         slopes.append(np.concatenate([raw[..., : len(chosen)], wide.reshape(*raw.shape[:2], -1)], axis=2))
-    information = np.diag(np.concatenate([sigma, spread]) ** -2.0)
+    information = fit.prior_information
     for block in slopes:
         flat = block.reshape(-1, block.shape[2])
         information += flat.T @ flat

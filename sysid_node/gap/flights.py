@@ -26,8 +26,8 @@ RATE = 50.0
 #: so that a linear chain is compared with itself.
 _CORNER = 11.0
 
-#: Shortest flight that can be compared, s.
-SHORTEST = 12.0
+#: Shortest flight that can be compared, s: three windows that hold a short period each.
+SHORTEST = 6.0
 
 _LATERAL = ("ay", "p", "r", "beta")
 

@@ -30,6 +30,9 @@ _CLOCKS = {
     "air_data_delay": ("air_data_delay", "imu_delay"),
 }
 
+#: Share of the airspeed from which on the air's motion counts.
+_GUSTY = 0.01
+
 #: Noise of the aircraft file that a bias may be as large as.
 _BIASES = {
     **{f"imu_bias.{n}": "accel" for n in ("ax", "ay", "az")},
@@ -74,13 +77,25 @@ def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
+    sigma |= _turning_air(aircraft, view)
     limit = {name: LIMIT * s for name, s in sigma.items()}
     for clock, rate in zip(_CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
     names = view.simulator.names
-    shared = np.array([name.startswith(("derivative_error", *_CLOCKS)) for name in sigma])
+    shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *_CLOCKS)) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
+
+
+def _turning_air(aircraft: Aircraft, view: View) -> dict[str, float]:
+    """In gusts: the air that rises also turns, which works like a derivative with the rate of alpha, up to -C_q.
+
+    The pitching gust of a wing as long as the gusts are short: q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2).
+    """
+    if view.gusts < _GUSTY * view.record["V"].mean():
+        return {}
+    damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
+    return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}
 
 
 _LATERAL = frozenset({"CY", "Cl", "Cn"})

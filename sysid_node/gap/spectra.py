@@ -18,6 +18,9 @@ Complex = NDArray[np.complex128]
 #: Length of a window, s: two periods of the lowest band's middle, short enough that drift stays in its mean.
 LENGTH = 8.0
 
+#: Lengths of a window that fit into the shortest flight.
+LEAST = 3.0
+
 #: Highest line, Hz: beyond it, vanes and rigid-body dynamics have little to say.
 HIGHEST = 4.0
 
@@ -39,7 +42,7 @@ class Windows:
     @classmethod
     def over(cls, samples: int, rate: float, length: float = LENGTH) -> Windows:
         """As many as fit into so many samples."""
-        size = 2 * round(0.5 * min(length * rate, samples / 1.5))
+        size = 2 * round(0.5 * min(length * rate, samples / LEAST))
         return cls(rate, size, max(1, (samples - size) // (size // 2) + 1))
 
     @property
@@ -76,7 +79,7 @@ class Windows:
 
     def smoothed(self, power: Array) -> Array:
         """Power (L, A) averaged within each band."""
-        bands = self.bands
+        _, bands = np.unique(self.bands, return_inverse=True)
         means = np.stack([power[bands == b].mean(axis=0) for b in range(bands.max() + 1)])
         return np.asarray(means[bands])
 

@@ -1,10 +1,11 @@
 """What the remainder owes to the controls and the flow, whatever the cause: a test that knows no physics.
 
 Rotating gusts, which no vane sees, are in every remainder, and the aircraft answers them: so least squares passes part
-of them off as derivatives. But no pilot's command foretells a gust. The steps in the commands, through lags, and even
-products of flow angles and airspeed therefore serve as instruments: the unknowns are fitted anew to what of the
-remainder is coherent with these, and what then stays coherent is structure (the test of over-identifying restrictions:
-Hansen (1982), Econometrica 50(4)). The rest is noise, which no model of the aircraft beats.
+of them off as derivatives. But no pilot's command foretells a gust. The steps in the commands, through lags, even
+products of flow angles and airspeed, and what is weighted by the time since the flight's middle therefore serve as
+instruments: the unknowns are fitted anew to what of the remainder is coherent with these, and what then stays coherent
+is structure (the test of over-identifying restrictions: Hansen (1982), Econometrica 50(4)). The rest is noise, which no
+model of the aircraft beats.
 """
 
 from __future__ import annotations
@@ -133,8 +134,11 @@ def instruments(view: View) -> tuple[Array, Array]:
     (given, free), record = _deliberate(view), view.record
     columns = [_lagged(given[:, i], lag, view.simulator.step) for i in range(given.shape[1]) for lag in _LAGS]
     columns += [series for i in range(given.shape[1]) for series in (given[:, i] ** 2, given[:, i] ** 3)]
-    alpha, beta, speed = (record[n] - record[n].mean() for n in ("alpha", "beta", "V"))
-    return _standard([*columns, alpha**2, np.abs(beta), speed * alpha]), _standard(columns if free else [])
+    moved = {n: record[n] - record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
+    even = [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
+    late = record.time - record.time.mean()  # weather that does not change averages out of what is weighted by time
+    growing = [late * series for series in (*moved.values(), *given.T)]
+    return _standard([*columns, *even, *growing]), _standard(columns if free else [])
 
 
 def _standard(columns: list[Array]) -> Array:

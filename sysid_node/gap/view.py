@@ -98,6 +98,7 @@ class View:
     measured: Complex  # (W, L, 12)
     noise: Array  # (L, 12) power that the sensors' noise leaves in measured minus predicted
     axes: NDArray[np.bool_]  # (12,): what was measured
+    gusts: float = 0.0  # rms of the air's motion across the flight path, m/s
 
     @property
     def commands(self) -> Array:
@@ -138,8 +139,12 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
     axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
     calm = _measured_noise(_bare(simulator, flight, record, windows, axes, LONGEST), seed)
+    calm = replace(calm, gusts=_gusts(calm))
     fading = _fading(calm)
-    return calm if fading == LONGEST else _measured_noise(_bare(simulator, flight, record, windows, axes, fading), seed)
+    if fading == LONGEST:
+        return calm
+    shorter = _bare(simulator, flight, record, windows, axes, fading)
+    return _measured_noise(replace(shorter, gusts=calm.gusts), seed)
 
 
 def _measured_noise(view: View, seed: int) -> View:
@@ -152,6 +157,16 @@ def _bare(
     """A view that does not know its noise."""
     given, series = _given(simulator, record, fading)
     return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
+
+
+def _gusts(calm: View) -> float:
+    """Root-mean-square motion of the air across the flight path (m/s): flow angles that no motion accounts for."""
+    vanes = len(COEFFICIENTS) + np.flatnonzero(calm.axes[len(COEFFICIENTS) :][1:3]) + 1
+    if not vanes.size:
+        return 0.0
+    residual = (np.abs(calm.residual(calm.simulator.neutral())) ** 2).mean(axis=0)[1:, vanes]
+    power = np.maximum(residual - calm.noise[1:, vanes], 0.0).sum(axis=0) * 2.0 / calm.windows.size
+    return float(calm.record["V"].mean() * np.sqrt(power.mean()))
 
 
 def _fading(calm: View) -> float:
