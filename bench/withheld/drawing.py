@@ -156,6 +156,8 @@ def _sized(name: str, plant: str, random: np.random.Generator, more: float) -> V
     if name == "control_effectiveness_loss":
         values["onset"] = float(random.choice([-10.0, random.uniform(*_ONSET)]))
         values = {k: min(v, 0.85) if k != "onset" else v for k, v in values.items()}
+    if name == "thrust_scale":  # an engine that gives next to nothing is no scale error
+        values = {k: float(np.clip(v, -0.6, 0.8)) for k, v in values.items()}
     if name == "actuator_rate_limit":
         values["rate"] /= more**2
     return {**values, "rudder": 1.0} if name == "stuck_surface" else values
