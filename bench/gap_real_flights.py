@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from evaluation.pages import publish, table
 from evaluation.real import aircraft as known
+from withheld.mattering import coefficients
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.model import Aircraft, Derivative
@@ -50,7 +51,7 @@ class Flight:
 
 FLIGHTS = {
     "hfb320": Flight(
-        "hfb320.csv", known.hfb320, (0.0, 60.0), (0.0, 0.0), True,
+        "hfb320.csv", known.hfb320, (0.0, 30.0), (30.0, 60.0), True,
         {"accel": 0.03, "gyro": 0.001, "airspeed": 0.1, "alpha": 0.001, "beta": 0.001, "attitude": 0.001},
     ),
     "thor": Flight(
@@ -64,8 +65,12 @@ FLIGHTS = {
 }  # fmt: skip
 
 
-def believed(aircraft: Aircraft, flight: Flight) -> Aircraft:
-    """The belief with tolerances, and moments of inertia where the published ones are not complete."""
+def believed(aircraft: Aircraft, flight: Flight, record: FlightRecord) -> Aircraft:
+    """The belief with tolerances, and moments of inertia where the published ones are not complete.
+
+    Offsets are nowhere published: they balance the mean of the part that is fitted.
+    """
+    aircraft = balanced(aircraft, record)
     derivatives = {
         n: Derivative(d.value, max(_SHARE * abs(d.value), _LEAST[n[:2]])) for n, d in aircraft.derivatives.items()
     }
@@ -73,6 +78,28 @@ def believed(aircraft: Aircraft, flight: Flight) -> Aircraft:
     if not math.isfinite(inertia.Ixx):  # of no account in a longitudinal motion, but the file must hold them
         inertia = replace(inertia, Ixx=inertia.Iyy, Izz=2.0 * inertia.Iyy)
     return replace(aircraft, derivatives=derivatives, inertia=inertia, noise=dict(flight.noise))
+
+
+def balanced(aircraft: Aircraft, record: FlightRecord) -> Aircraft:
+    """With the offsets (``CL_0`` and the like) that leave no mean in a record."""
+    names = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "V", "alpha", "beta")
+    seen = np.nan_to_num(np.column_stack([record[name] for name in names]))
+    controls = [np.nan_to_num(record[symbol]) for symbol in aircraft.control_symbols]
+    thrust = record["thrust"] if aircraft.throttle else np.zeros(len(record))
+    rate = 1.0 / float(np.median(np.diff(record.time)))
+    inertia = aircraft.inertia
+    known = replace(inertia, Ixx=np.nan_to_num(inertia.Ixx), Izz=np.nan_to_num(inertia.Izz))
+    whole = replace(aircraft, inertia=known)
+    found, x = coefficients(whole, seen, np.column_stack([*controls, thrust]), record["rho"], rate)
+    x["V"] = record["V"] / aircraft.reference.airspeed
+    derivatives = dict(aircraft.derivatives)
+    for i, coefficient in enumerate(("CL", "CD", "CY", "Cl", "Cm", "Cn")):
+        name = f"{coefficient}_0"
+        own = [(n.partition("_")[2], d.value) for n, d in derivatives.items() if n.startswith(f"{coefficient}_")]
+        if name in derivatives:
+            rest = found[:, i] - sum(value * x[regressor] for regressor, value in own if regressor != "0")
+            derivatives[name] = replace(derivatives[name], value=float(np.mean(rest)))
+    return replace(aircraft, derivatives=derivatives)
 
 
 def part(record: FlightRecord, flight: Flight, span: Part) -> FlightRecord:
@@ -89,8 +116,10 @@ def diagnose(folder: Path, flight: Flight) -> tuple[str, dict[str, Any] | None]:
     record = read_csv(folder / flight.file)
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
-        (place / "aircraft.yaml").write_text(dump_aircraft(believed(flight.aircraft(folder), flight)), encoding="utf-8")
-        write_csv(place / "fitted.csv", part(record, flight, flight.fitted))
+        fitted = part(record, flight, flight.fitted)
+        belief = believed(flight.aircraft(folder), flight, fitted)
+        (place / "aircraft.yaml").write_text(dump_aircraft(belief), encoding="utf-8")
+        write_csv(place / "fitted.csv", fitted)
         words = ["gap", "fitted.csv", "--aircraft", "aircraft.yaml", "--out", "out"]
         if flight.held[1] > flight.held[0]:
             write_csv(place / "held.csv", part(record, flight, flight.held))

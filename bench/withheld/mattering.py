@@ -78,7 +78,7 @@ def noisy(seen: Array, aircraft: Aircraft, rate: float, random: np.random.Genera
 
 
 def _explained(aircraft: Aircraft, seen: Array, commands: Array, density: Array, rate: float) -> Explained:
-    found, x = _coefficients(aircraft, seen, commands, density, rate)
+    found, x = coefficients(aircraft, seen, commands, density, rate)
     low = butter(4, _BAND, fs=rate, output="sos")
     left, shifts = np.empty_like(found), []
     for i, coefficient in enumerate(("CL", "CD", "CY", "Cl", "Cm", "Cn")):
@@ -95,12 +95,12 @@ def _explained(aircraft: Aircraft, seen: Array, commands: Array, density: Array,
     return Explained(left, np.array(shifts))
 
 
-def _coefficients(
+def coefficients(
     aircraft: Aircraft, seen: Array, commands: Array, density: Array, rate: float
 ) -> tuple[Array, dict[str, Array]]:
     """CL, CD, CY, Cl, Cm, Cn (N, 6) of readings and thrust by the aircraft file, and the regressors."""
     geometry, inertia = aircraft.geometry, aircraft.inertia
-    low = butter(4, 12.0, fs=rate, output="sos")
+    low = butter(4, min(12.0, 0.4 * rate), fs=rate, output="sos")
     rates, thrust = seen[:, 3:6], commands[:, -1]
     turning = np.gradient(sosfiltfilt(low, rates, axis=0), 1.0 / rate, axis=0)
     arm = np.array(aircraft.sensors.imu)
