@@ -37,7 +37,13 @@ _SURE = 0.95
 MATERIAL, MATERIAL_OF_ALL = 0.25, 0.08
 
 #: Error, as a share of the motion, that nobody would look for.
-NOTICED = 0.01
+NOTICED = 0.05
+
+#: Times that the causes stand against their rivals, at most.
+_SWEEPS = 4
+
+#: Nats by which another explanation must be better to take the place of one.
+_CLEARLY = 1.0
 
 Progress = Callable[[float, str], None]
 
@@ -64,6 +70,7 @@ class Cause:
     candidate: Candidate
     probability: float
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
+    rivals: tuple[Trial, ...] = ()  # what was tried in its stead
 
 
 @dataclass(frozen=True)
@@ -95,10 +102,10 @@ def attribute(views: Sequence[View], nuisances: Nuisances, progress: Progress) -
         if not better:
             break
         chosen = better[0]
-    progress(0.8, "what is left over")
-    chosen = _backward(base, chosen, nuisances)
+    progress(0.8, "whether another effect would do as well")
+    chosen, places = _refined(base, chosen, stages, nuisances)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
-    causes = _causes(base, chosen, stages, candidates, nuisances, progress)
+    causes = tuple(sorted((_cause(chosen, place) for place in places), key=lambda cause: -cause.probability))
     corrected = instrumented(instrumented(chosen.fit))
     return Attribution(base, chosen, corrected, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
 
@@ -188,56 +195,64 @@ def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
     return best
 
 
-def _backward(base: Trial, chosen: Trial, nuisances: Nuisances) -> Trial:
-    """Without those effects that the others have made needless."""
-    while len(chosen.fit.candidates) > 1:
-        fewer = [_without(base, chosen, c, nuisances) for c in chosen.fit.candidates]
-        best = max(fewer, key=lambda trial: trial.evidence.total)
-        if accepted(base, best, chosen):
-            return chosen
-        chosen = best
-    return chosen
+@dataclass(frozen=True)
+class Place:
+    """A cause's place in the explanation: what is left without it, and all that was tried in its stead."""
+
+    candidate: Candidate
+    without: Trial
+    rivals: tuple[Trial, ...]
 
 
-def _without(base: Trial, chosen: Trial, gone: Candidate, nuisances: Nuisances) -> Trial:
-    """The chosen set, one effect less, fitted anew."""
-    if len(chosen.fit.candidates) == 1:
-        return base
-    kept = [c for c in chosen.fit.candidates if c is not gone]
-    return _trial(polish(with_candidates(chosen.fit, kept, nuisances, ())), None)
+def _refined(
+    base: Trial, chosen: Trial, stages: Sequence[list[Trial]], nuisances: Nuisances
+) -> tuple[Trial, tuple[Place, ...]]:
+    """The explanation after every cause has stood against its rivals, given the others.
+
+    The first effect was chosen before the others were known: another may take its place now, or none may be needed.
+    """
+    pool = list({t.added.label: t.added for trials in stages for t in trials if t.added}.values())
+    for _ in range(_SWEEPS):
+        places = tuple(_place(base, chosen, c, stages[0], pool, nuisances) for c in chosen.fit.candidates)
+        better = _replacement(base, chosen, places)
+        if better is None:
+            break
+        chosen = better
+    return chosen, tuple(p for p in places if p.candidate in chosen.fit.candidates)
 
 
-def _causes(
-    base: Trial, chosen: Trial, stages: Sequence[list[Trial]], candidates: Sequence[Candidate],
-    nuisances: Nuisances, progress: Progress,
-) -> tuple[Cause, ...]:  # fmt: skip
-    """Each effect of the chosen set against all others in its place."""
-    causes = []
-    for candidate in chosen.fit.candidates:
-        progress(0.85, f"alternatives to {candidate.label}")
-        others = [c for c in chosen.fit.candidates if c is not candidate]
-        if not others:
-            rivals, without = stages[0], base
-        elif len(others) + 1 == len(stages) - 1 and stages[len(others)][0].fit is chosen.fit:
-            rivals, without = stages[len(others)], _without(base, chosen, candidate, nuisances)
-        else:
-            without = _without(base, chosen, candidate, nuisances)
-            rest = [c for c in candidates if c.effect not in without.fit.effects]
-            rivals = stage(without, rest, nuisances, lambda s, t: None)
-        causes.append(_cause(candidate, chosen, without, rivals))
-    return tuple(sorted(causes, key=lambda cause: -cause.probability))
+def _place(
+    base: Trial, chosen: Trial, candidate: Candidate, first: list[Trial], pool: list[Candidate], nuisances: Nuisances
+) -> Place:
+    others = [c for c in chosen.fit.candidates if c is not candidate]
+    if not others:
+        return Place(candidate, base, tuple(first))
+    without = _trial(polish(with_candidates(chosen.fit, others, nuisances, ())), None)
+    rest = [c for c in pool if c.effect not in without.fit.effects]
+    return Place(candidate, without, tuple(stage(without, rest, nuisances, lambda s, t: None)))
 
 
-def _cause(candidate: Candidate, chosen: Trial, without: Trial, rivals: Sequence[Trial]) -> Cause:
+def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial | None:
+    """A better explanation: one effect less, or another in its place; None where there is none."""
+    needless = [p.without for p in places if len(places) > 1 and not accepted(base, p.without, chosen)]
+    if needless:
+        return max(needless, key=lambda trial: trial.evidence.total)
+    rivals = [t for p in places for t in p.rivals if accepted(base, p.without, t)]
+    best = max(rivals, key=lambda trial: trial.evidence.total, default=chosen)
+    return best if best.evidence.total > chosen.evidence.total + _CLEARLY else None
+
+
+def _cause(chosen: Trial, place: Place) -> Cause:
     """Its probability, summed over the ways in which its effect could act, and who else could be to blame."""
-    own = [chosen, *(t for t in rivals if t.added is not None and t.added.label != candidate.label)]
-    shares = probabilities([*(t.evidence.scores for t in own), without.evidence.scores])
+    candidate = place.candidate
+    own = [chosen, *(t for t in place.rivals if t.added is not None and t.added.label != candidate.label)]
+    shares = probabilities([*(t.evidence.scores for t in own), place.without.evidence.scores])
     by_effect: dict[str, float] = {}
     labels = [candidate.effect, *(t.added.effect for t in own[1:] if t.added)]
     for effect, share in zip(labels, shares[: len(own)], strict=True):
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
-    return Cause(candidate, by_effect[candidate.effect], tuple(rivals_left))
+    return Cause(candidate, by_effect[candidate.effect], tuple(rivals_left), place.rivals)
 
 
 def _ranked(base: Trial, trials: Sequence[Trial]) -> tuple[tuple[str, float], ...]:

@@ -120,7 +120,7 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
     if effect in TIMES:
         name = "delay" if effect.endswith("delay") else "time_constant"
-        yield name, (0.02, 0.07)
+        yield name, (0.02, 0.07, 0.2)
     if effect == "structural_mode":
         yield "frequency", (3.5, 5.0, 9.0)
     if effect == "ground_effect":

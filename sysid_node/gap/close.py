@@ -6,7 +6,7 @@ windows of ``spectra.LENGTH`` seconds; all channels that were moved count alike.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,25 +43,35 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
     measured = np.array([(np.abs(views[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
     noise = np.array([len(g) * (views[i].noise.sum(axis=0) - 0.5 * views[i].noise[0]) for i, g in groups])
     stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
-    floor = np.maximum(noise, stages[2] * (1.0 - np.clip(left.share, 0.0, 1.0)))
     counted = views[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
-    table = np.stack([*stages, np.minimum(floor, stages[1])])  # (4, groups, 12)
 
-    def errors(weight: Array) -> Array:
-        """Overall errors (4,) at weights (G,) of the groups."""
+    def errors(weight: Array, share: Array) -> Array:
+        """Overall errors (4,) at weights (G,) of the groups, where such a share (12,) of the remainder is structure."""
+        floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - share)), stages[1])
+        table = np.stack([*stages, floor])  # (4, groups, 12)
         shares = (table * weight[:, None]).sum(axis=1) / np.maximum((measured * weight[:, None]).sum(axis=0), 1e-300)
         return np.asarray(np.sqrt(shares[:, counted].mean(axis=1))) if counted.any() else np.zeros(4)
 
-    all_equal = np.ones(len(groups))
-    overall = errors(all_equal)
-    draws = np.random.default_rng(0).multinomial(len(groups), all_equal / len(groups), _DRAWS)
-    shrinks = [_shrink(errors(d.astype(float))) for d in draws]
+    all_equal, structured = np.ones(len(groups)), np.clip(left.share, 0.0, 1.0)
+    overall = errors(all_equal, structured)
+    shrinks = _shrinks(errors, left, len(groups))
+    floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - structured)), stages[1])
+    table = np.stack([*stages, floor])
     own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
     names = ("before", "tolerances", "after", "noise_floor")
     channels = {c: dict(zip(names, own[:, k].tolist(), strict=True)) for k, c in enumerate(CHANNELS) if counted[k]}
     low, high = np.percentile(shrinks, [2.5, 97.5]).tolist()
     before_, fitted, after_, floor_ = overall.tolist()
     return Gap(before_, fitted, after_, floor_, _shrink(overall), (low, high), channels)
+
+
+def _shrinks(errors: Callable[[Array, Array], Array], left: Structure, groups: int) -> list[float]:
+    """Shrinkage in bootstraps of the groups, the structure left as uncertain as chance makes it."""
+    random = np.random.default_rng(0)
+    draws = random.multinomial(groups, np.ones(groups) / groups, _DRAWS)
+    shares = (left.deviations + random.standard_normal((_DRAWS, left.chance.size))) * left.chance
+    shares = np.clip(shares / np.maximum(left.total, 1e-300), 0.0, 1.0)
+    return [_shrink(errors(d.astype(float), share)) for d, share in zip(draws, shares, strict=True)]
 
 
 def _shrink(errors: Array) -> float:

@@ -18,6 +18,7 @@ from sysid_node.gap.evidence import Evidence, held_out
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.flights import RATE, Flight
 from sysid_node.gap.localise import Shape
+from sysid_node.gap.next_flight import propose
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.structure import instrumented
 from sysid_node.gap.view import CHANNELS, View, view_of
@@ -42,7 +43,10 @@ _NAMED = 0.03
 _TELLING = 6.0
 
 #: Travel below which no surface counts as moved, rad.
-_TRAVEL = 0.015
+_TRAVEL = 0.004
+
+#: What to fly where no pair of effects is in doubt.
+_LARGER = "3-2-1-1 on each surface in turn, larger and at two airspeeds, in still air"
 
 #: Ratio of measured to expected mean lift beyond which a flight is another aircraft's.
 _LIFT = 2.5
@@ -195,6 +199,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "window_s": found.views[0].windows.length,
             "held_out": found.held_out,
         },
+        "air_motion": max(view.gusts for view in found.views),
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
         "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],
@@ -215,18 +220,39 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "parameters": parameters(found.attribution.corrected, cause),
         "probability": probability(found.attribution, cause),
         "gap_after": found.gap.after,
-        "indistinguishable_from": [effect for effect, p in cause.alternatives if p > _NAMED],
+        "indistinguishable_from": _named(cause),
     }
 
 
 def _next_flight(verdict: str, attribution: Attribution) -> str:
     """What to fly, by what is in doubt."""
-    if verdict in {"unsupported", "no_gap", "unknown_effect"} or not attribution.causes:
-        return "" if verdict == "no_gap" else "3-2-1-1 on each surface in turn, at two airspeeds, in still air"
-    rivals = {e for c in attribution.causes for e, p in c.alternatives if p > _NAMED}
-    if not rivals:
+    if verdict == "no_gap":
         return ""
-    return f"the same manoeuvres at twice and half the amplitude and rate, to part {', '.join(sorted(rivals))}"
+    pairs = [(cause.candidate, rival.fit) for cause in attribution.causes for rival in _confused(cause)]
+    if not pairs:
+        return "" if verdict == "explained" else _LARGER
+    best = propose(attribution.chosen.fit, pairs)
+    if best is None:
+        return _LARGER
+    parted = sorted({e for cause in attribution.causes for e in (cause.candidate.effect, *_named(cause))})
+    return (
+        f"{best.words}, in still air: parts {', '.join(parted)} by {best.separation:.3g} standard deviations or more, "
+        f"the manoeuvres flown by {best.flown:.3g}"
+    )
+
+
+def _named(cause: Cause) -> list[str]:
+    """Effects that are named beside a cause."""
+    return [effect for effect, p in cause.alternatives if p > _NAMED]
+
+
+def _confused(cause: Cause) -> list[Trial]:
+    """The best trial of each effect that is named beside a cause."""
+    best: dict[str, Trial] = {}
+    for trial in cause.rivals:
+        if trial.added is not None and trial.added.effect in _named(cause):
+            best.setdefault(trial.added.effect, trial)
+    return list(best.values())
 
 
 __all__ = ["Diagnosis", "Trial", "diagnose", "document"]

@@ -40,6 +40,7 @@ class Structure:
     coherent: Array
     total: Array
     deviations: Array  # how many standard deviations the coherent power lies above chance
+    chance: Array  # such a standard deviation, in noise levels
 
     @property
     def share(self) -> Array:
@@ -60,7 +61,8 @@ def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
             total[axis] += float(np.sum(series**2))
             size[axis] += directions.shape[1]
     beyond = coherent - size
-    return Structure(np.maximum(beyond, 0.0), total, beyond / np.sqrt(2.0 * np.maximum(size, 1.0)))
+    chance = np.sqrt(2.0 * np.maximum(size, 1.0))
+    return Structure(np.maximum(beyond, 0.0), total, beyond / chance, chance)
 
 
 def instrumented(fit: Fit) -> Fit:

@@ -31,7 +31,7 @@ CHANNELS = (*COEFFICIENTS, *READINGS)
 _LONGITUDINAL = frozenset({"CL", "CD", "Cm", "V", "alpha", "theta"})
 
 #: Memory of the observer of the air, at most and at least, s.
-LONGEST, SHORTEST_MEMORY = 4.0, 0.05
+LONGEST, SHORTEST_MEMORY = 4.0, 0.15
 
 #: Band in which gusts are told from noise, Hz.
 _GUSTS = (0.3, 2.0)
@@ -145,6 +145,12 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
         return calm
     shorter = _bare(simulator, flight, record, windows, axes, fading)
     return _measured_noise(replace(shorter, gusts=calm.gusts), seed)
+
+
+def view_like(view: View, record: FlightRecord) -> View:
+    """Another record of the same length, seen as this one: with its noise and its observer."""
+    bare = _bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
+    return replace(bare, noise=view.noise)
 
 
 def _measured_noise(view: View, seed: int) -> View:
