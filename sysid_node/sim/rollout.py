@@ -73,8 +73,8 @@ def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state
     time = jnp.arange(inputs.commands.shape[0]) * chain.step
     gusts = airflow.gusts(chain.model, chain.effects, inputs.gusts, inputs.turbulence, time)
     coming = (_next(inputs.commands), _next(gusts), time + chain.step, inputs.noise)
-    carry, surfaces = _start(chain, initial, inputs.commands[0], gusts[0], pilot_state)
-    _, rows = jax.lax.scan(lambda c, new: _step(chain, pilot, c, *new), carry, coming)
+    carry, surfaces = begin(chain, initial, inputs.commands[0], gusts[0], pilot_state)
+    _, rows = jax.lax.scan(lambda c, new: advance(chain, pilot, c, *new), carry, coming)
     readings, states, coefficients, moved = rows
     stamped = clock.stamp(chain.effects, _continuous_angles(readings), chain.step)
     outputs = sensors.noisy(chain.model, chain.effects, stamped, inputs.noise)
@@ -82,7 +82,7 @@ def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state
     return Flight(outputs, states, surfaces, commands, coefficients)
 
 
-def _step(
+def advance(
     chain: Chain, pilot: Pilot, carry: Carry, planned: Scalar, gusts: Scalar, time: Scalar, noise: Scalar
 ) -> tuple[Carry, tuple[Scalar, ...]]:
     """Reads the instruments now, then moves on to ``time``, that of the next sample.
@@ -159,7 +159,7 @@ def _at_probe(chain: Chain, motion: Motion) -> Scalar:
     return jnp.stack(sensors.at_probe(motion.air.velocity, motion.air.rates, arm))
 
 
-def _start(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[Carry, Scalar]:
+def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[Carry, Scalar]:
     """Everything settled on the first sample's command and flow, and the surfaces (controls + 1,) there."""
     actuators = actuator.start(chain.model, planned[:-1])
     motor = propulsion.commanded(chain.model, planned[-1])

@@ -1,0 +1,166 @@
+"""The adaptive controller against the fixed baseline. `python bench/closed_loop.py --page docs/closed_loop.md`
+
+Simulator, online estimator, exciter and controller in one process, calling what the nodes call. Something fails at
+30 s; the tracking error is that of the true attitude from the reference model's, over the seconds from 10 s after the
+failure on, excitation included. `--draws 200` flies as many random failures, noises and turbulences, each with and
+without adaptation, and keeps its results in a file as they come; `--exciter` counts the seconds of excitation that
+stopping early saves.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from evaluation.closed_loop import EXCITATION, Flown, Sortie, aft, baseline, fly, icing
+from evaluation.pages import publish, table
+from numpy.typing import NDArray
+
+from sysid_node.sim.live import Air
+from sysid_node.sim.picture import Panel, draw
+
+Array = NDArray[np.float64]
+
+FAILURES: dict[str, tuple[str, ...]] = {
+    "nothing wrong": (),
+    "elevator at 40 % of its effect": ("control_effectiveness_loss:elevator=0.6",),
+    "CG aft: statically unstable by 3 % of the chord": aft(-0.03),
+    "aileron at 50 % of its effect": ("control_effectiveness_loss:aileron=0.5",),
+    "ice all over (Bragg)": icing(1.0),
+    "ice, 2.5 times that": icing(2.5),
+}
+ONSET, SETTLED, END = 30.0, 40.0, 60.0  # s
+DRAW = (20.0, 45.0)  # s, onset and end of a random flight
+FIXED = 60.0  # s of excitation when nobody looks
+ASKED = ("Cm_de", "Cm_alpha")
+
+
+def failures(turbulence: str, flights: int) -> str:
+    """The table of failures: mean of several flights."""
+    rows = []
+    for name, effects in FAILURES.items():
+        pairs = [both(Sortie(effects, ONSET, END, Air(turbulence, seed=seed + 1))) for seed in range(flights)]
+        fixed, adapted = (np.array([flown.error(SETTLED, END) for flown in side]) for side in zip(*pairs, strict=True))
+        before, after = np.rad2deg(fixed.mean(axis=0)), np.rad2deg(adapted.mean(axis=0))
+        share = np.hypot(*adapted.T[:2]) / np.hypot(*fixed.T[:2])
+        cells = [f"{b:.2f} / {a:.2f}" for b, a in zip(before, after, strict=True)]
+        rows.append([name, *cells, f"{share.mean():.2f}", f"{share.max():.2f}", pairs[0][1].cautions[0]])
+    heads = ("pitch: baseline / adapted, deg", "roll", "sideslip", "adapted over baseline", "worst", "pitch gains")
+    return table((f"turbulence: {turbulence}", *heads), rows)
+
+
+def both(sortie: Sortie) -> tuple[Flown, Flown]:
+    """Without and with adaptation."""
+    return fly(baseline(sortie)), fly(sortie)
+
+
+def random_sortie(seed: int) -> Sortie:
+    """A failure, an air, noise and set-points at random."""
+    draw = np.random.default_rng(seed)
+    kinds: list[Sequence[str]] = [
+        (),
+        (f"control_effectiveness_loss:elevator={draw.uniform(0.1, 0.7):.3f}",),
+        (f"control_effectiveness_loss:aileron={draw.uniform(0.1, 0.7):.3f}",),
+        (f"control_effectiveness_loss:rudder={draw.uniform(0.1, 0.7):.3f}",),
+        aft(draw.uniform(-0.04, 0.06)),
+        icing(draw.uniform(0.3, 3.0)),
+    ]
+    effects = tuple(kinds[draw.integers(len(kinds))])
+    turbulence = ("none", "light", "moderate")[draw.integers(3)]
+    air = Air(turbulence, noise=draw.uniform(0.5, 2.0), seed=seed)
+    excitation = EXCITATION if draw.random() < 0.75 else replace(EXCITATION, longest=1.0)
+    return Sortie(effects, *DRAW, air, excitation=excitation, asked=draw.uniform(0.3, 1.3))
+
+
+def draws(count: int, results: Path) -> str:
+    """Fly what is not yet in the file of results, and sum up."""
+    known = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
+    for seed in range(len(known) + 1, count + 1):
+        sortie = random_sortie(seed)
+        fixed, adapted = both(sortie)
+        row = {
+            "seed": seed,
+            "effects": sortie.effects,
+            "turbulence": sortie.air.turbulence,
+            "lost": [fixed.lost, adapted.lost],
+            "errors": [flown.error(DRAW[0] + 10.0, DRAW[1]).tolist() for flown in (fixed, adapted)],
+        }
+        known.append(row)
+        with results.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+    return _summary(known[:count])
+
+
+def _summary(rows: Sequence[dict[str, list[list[float]]]]) -> str:
+    cells = []
+    for turbulence in ("none", "light", "moderate"):
+        chosen = [row for row in rows if str(row["turbulence"]) == turbulence]
+        lost = np.isfinite(np.array([row["lost"] for row in chosen], dtype=float))
+        errors = np.array([row["errors"] for row in chosen], dtype=float)
+        with np.errstate(invalid="ignore"):
+            share = np.hypot(errors[:, 1, 0], errors[:, 1, 1]) / np.hypot(errors[:, 0, 0], errors[:, 0, 1])
+        share = share[np.isfinite(share)]
+        quantiles = [f"{q:.2f}" for q in np.quantile(share, [0.05, 0.5, 0.95])]
+        counts = [lost[:, 0].sum(), lost[:, 1].sum(), (lost[:, 1] & ~lost[:, 0]).sum()]
+        cells.append([turbulence, str(len(chosen)), *(str(int(n)) for n in counts), *quantiles])
+    heads = ("flights", "lost by the baseline", "lost adapted", "... that the baseline kept")
+    return table(("turbulence", *heads, "adapted over baseline: 5 %", "median", "95 %"), cells)
+
+
+def exciter(flights: int) -> str:
+    """The table of excitation time."""
+    rows = []
+    for turbulence in ("none", "light"):
+        for amplitude in (0.02, 0.04):
+            spec = f"multisine:elevator,aileron,rudder:amplitude={amplitude}:length=15:low=0.15:high=1.9"
+            settings = replace(EXCITATION, manoeuvre=(spec,), derivatives=ASKED, accuracy=0.05, watch=False)
+            took = []
+            for seed in range(flights):
+                flown = fly(Sortie((), 1e9, FIXED + 4.0, Air(turbulence, seed=seed + 1), False, settings))
+                ends = [event.time for event in flown.events if event.text.startswith("known")]
+                took.append(ends[0] - flown.events[0].time if ends else FIXED)
+            known = sum(t < FIXED for t in took)
+            row = (np.median(took), max(took), FIXED - np.mean(took))
+            rows.append([turbulence, f"{amplitude:g}", f"{known} of {flights}", *(f"{x:.1f}" for x in row)])
+    heads = ("amplitude, rad", "known within 60 s", "after s: median", "longest", "saved on average, s")
+    return table(("turbulence", *heads), rows)
+
+
+def picture(path: Path) -> None:
+    """Pitch around the elevator's failure, adapted beside the baseline."""
+    panels = []
+    for name, axis in (("elevator at 40 % of its effect", 0), ("aileron at 50 % of its effect", 1)):
+        fixed, adapted = both(Sortie(FAILURES[name], ONSET, END, Air(seed=1)))
+        off = [np.rad2deg((flown.attitude - flown.wanted)[:, axis]) for flown in (fixed, adapted)]
+        panels.append(Panel(f"{name}: {('pitch', 'roll')[axis]} error, deg", fixed.time, *off))
+    path.write_text(draw(panels, "tracking error, baseline grey, adapted blue"), encoding="utf-8")
+
+
+def main() -> None:
+    """Print the tables, or put them in the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flights", type=int, default=4, help="for each row (default: 4)")
+    parser.add_argument("--draws", type=int, default=0, help="fly so many random failures instead")
+    parser.add_argument("--results", type=Path, default=Path("out/closed_loop_draws.jsonl"), help="of the draws")
+    parser.add_argument("--exciter", action="store_true", help="count seconds of excitation instead")
+    parser.add_argument("--picture", type=Path, help="SVG file to draw instead")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    if args.picture:
+        picture(args.picture)
+    elif args.draws:
+        args.results.parent.mkdir(parents=True, exist_ok=True)
+        publish("bench/closed_loop.py --draws", draws(args.draws, args.results), args.page)
+    elif args.exciter:
+        publish("bench/closed_loop.py --exciter", exciter(args.flights), args.page)
+    else:
+        tables = [failures(turbulence, args.flights) for turbulence in ("none", "light")]
+        publish("bench/closed_loop.py", "\n\n".join(tables), args.page)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""From estimates to the gains that are flown: gates, margins over the corners of the intervals, bounded movement.
+
+A derivative is used where its estimate is valid, its interval tight and its equation holds; the others stay as they are
+flown. The regulator's gains for them are flown only if every corner of the used intervals is stable with margins; else
+those of a more cautious regulator, and else what was flown before. The corners are looked at a few at every step, so
+that no command is late for them. Gains and derivatives then move in a straight line, at a bounded rate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.control.axis import Axis
+from sysid_node.control.margins import margins
+from sysid_node.control.settings import Settings
+from sysid_node.control.types import Belief
+
+Array = NDArray[np.float64]
+
+#: Corners of at most so many derivatives' intervals (those that move the motion most) are looked at, so many a step.
+CORNERED, A_STEP = 8, 16
+
+#: Weights on the surfaces that are tried in turn, in that of the baseline.
+CAUTIONS = (1.0, 2.0, 4.0, 8.0, 16.0)
+
+#: s between two checks of an axis.
+PERIOD = 0.5
+
+
+class Flown(NamedTuple):
+    """What the law flies on: derivatives (D,) for the feedforward, gains (m, n) for the feedback."""
+
+    values: Array
+    gains: Array
+
+
+@dataclass
+class Check:
+    """Gains under test: the corners (N, D) of the intervals, how many have passed, and with how much caution."""
+
+    values: Array  # (D,)
+    corners: Array
+    gains: Array
+    passed: int = 0
+    caution: int = 0
+
+
+@dataclass
+class Adaptation:
+    """Of one axis."""
+
+    axis: Axis
+    flown: Flown
+    target: Flown
+    check: Check | None = None
+    checked_at: float = -math.inf  # s
+    used: tuple[str, ...] = ()  # derivatives whose estimates are in the target
+    verdict: str = "baseline"
+    accepted: int = 0
+    refused: int = 0
+
+
+def init(axis: Axis) -> Adaptation:
+    """Flying the baseline."""
+    baseline = Flown(axis.believed, axis.baseline)
+    return Adaptation(axis, baseline, baseline)
+
+
+def fall_back(state: Adaptation, why: str) -> None:
+    """Head for the baseline."""
+    state.check, state.used, state.verdict = None, (), why
+    state.target = Flown(state.axis.believed, state.axis.baseline)
+
+
+def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Settings, now: float) -> None:
+    """Begin the check of what new estimates ask for, if none is under way and the last is long enough ago."""
+    if state.check is not None or now - state.checked_at < PERIOD:
+        return
+    values, half, used = state.target.values.copy(), np.zeros(len(state.axis.derivatives)), []
+    for i, name in enumerate(state.axis.derivatives):
+        belief = beliefs.get(name)
+        if belief is not None and _usable(belief, settings.tightness * state.axis.sizes[i], settings.explained):
+            values[i], half[i] = belief.value, 0.5 * (belief.upper - belief.lower)
+            used.append(name)
+    if not used:
+        return
+    try:
+        gains = state.axis.gains(values, CAUTIONS[0])
+    except np.linalg.LinAlgError:
+        return
+    state.check, state.checked_at = Check(values, _corners(state.axis, values, half), gains), now
+    state.used = tuple(used)
+
+
+def advance(state: Adaptation, settings: Settings, step: float) -> None:
+    """Look at some corners, and move for ``step`` (s) towards the target."""
+    if state.check is not None:
+        _look(state, state.check, settings)
+    state.flown = _moved(state.axis, state.flown, state.target, settings.gain_rate * step)
+
+
+def _usable(belief: Belief, half: float, explained: float) -> bool:
+    """Whether an estimate may be used; NaN never is.
+
+    In a closed loop an estimate is biased by the share of the surfaces' motion that answers to disturbances (Ljung,
+    "System Identification", 2nd ed. (1999), sect. 13.4), which its interval does not know of: hence ``explained``.
+    """
+    tight = math.isfinite(belief.value) and 0.5 * (belief.upper - belief.lower) <= half
+    return belief.valid and tight and belief.explained >= explained
+
+
+def _corners(axis: Axis, values: Array, half: Array) -> Array:
+    """(N, D) the corners of the intervals that matter most, each other derivative at its value."""
+    widest = np.argsort(-half * axis.signals)[:CORNERED]
+    chosen = widest[half[widest] > 0.0]
+    signs = np.array(list(product((-1.0, 1.0), repeat=chosen.size)))
+    corners = np.tile(values, (len(signs), 1))
+    corners[:, chosen] += signs * half[chosen]
+    return np.vstack([values, corners])
+
+
+def _look(state: Adaptation, check: Check, settings: Settings) -> None:
+    """The next few corners with the gains under test."""
+    corners = check.corners[check.passed : check.passed + A_STEP]
+    found = margins(state.axis.model(corners), check.gains, state.axis.delay)
+    if not found.enough(settings.gain_margin, settings.phase_margin).all():
+        _be_more_cautious(state, check)
+        return
+    check.passed += len(corners)
+    if check.passed == len(check.corners):
+        state.target, state.check = Flown(check.values, check.gains), None
+        state.accepted += 1
+        caution = CAUTIONS[check.caution]
+        state.verdict = "adapted" if caution == 1.0 else f"adapted, caution {caution:g}"
+
+
+def _be_more_cautious(state: Adaptation, check: Check) -> None:
+    check.caution, check.passed = check.caution + 1, 0
+    if check.caution == len(CAUTIONS):
+        state.check, state.refused, state.verdict = None, state.refused + 1, "kept: no margins at the corners"
+        return
+    check.gains = state.axis.gains(check.values, CAUTIONS[check.caution])
+
+
+def _between(start: Flown, end: Flown, share: float) -> Flown:
+    return Flown(*(a + share * (b - a) for a, b in zip(start, end, strict=True)))
+
+
+def _moved(axis: Axis, flown: Flown, target: Flown, most: float) -> Flown:
+    """Towards the target by at most ``most`` of the baseline's gains, or of a derivative's size."""
+    size = np.abs(axis.baseline).max(axis=0)  # (n,) by what each state is fed back
+    gains = np.abs(target.gains - flown.gains).max(axis=0) / np.maximum(size, 0.1 * size.max())
+    length = max(float(np.max(np.abs(target.values - flown.values) / axis.sizes)), float(gains.max()))
+    return target if length <= most else _between(flown, target, most / length)

@@ -1,0 +1,135 @@
+"""An axis of control: its linear model, its baseline gains, and the gains that suit another aircraft.
+
+A linear quadratic regulator scheduled on the identified model, the indirect self-tuning regulator of Astrom &
+Wittenmark, "Adaptive Control", 2nd ed. (1995), ch. 3 and 4: the regulator's weights stay, its model is the identified
+one. The weight on the surfaces counts the accelerations that they make, not their angles, so that a surface that has
+lost half its effect gets twice the gain, and where the estimates are the file's the gains are the baseline's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.control import plant, regulator
+from sysid_node.control.plant import Linear, Scales, Values
+
+Array = NDArray[np.float64]
+
+#: Deviations that count alike, rad, rad/s, rad s: alpha, q, theta, its integral; beta, p, r, phi, its integral.
+_PITCH = (math.inf, 1.0, 0.2, 0.2)
+_LATERAL = (0.3, 2.0, 0.5, 0.3, 0.6)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """D derivatives, n states (motion, the integral of an attitude, the surfaces), m surfaces."""
+
+    name: str
+    derivatives: tuple[str, ...]
+    believed: Array  # (D,) the file's values
+    sizes: Array  # (D,) what an error counts against: the file's value, or twice its tolerance where that is more
+    signals: Array  # (D,) plausible size of each derivative's regressor
+    moments: slice  # motion's equations that the surfaces govern
+    motion: Callable[[Values], Linear]  # without the surfaces' lag
+    lag: float  # s, of the surfaces
+    delay: float  # s, of the commands
+    Q: Array  # (n,) weight on the states
+    weight: float  # on the surfaces
+
+    @cached_property
+    def baseline(self) -> Array:
+        """Gains (m, n) of the file's aircraft."""
+        return self.gains(self.believed, 1.0)
+
+    @cached_property
+    def effect(self) -> Array:
+        """(m, m) accelerations that the file's surfaces make."""
+        return np.asarray(self.motion(self.named(self.believed)).B[self.moments])
+
+    def named(self, values: Array) -> dict[str, Array]:
+        """(..., D) values by name."""
+        return {name: values[..., i] for i, name in enumerate(self.derivatives)}
+
+    def model(self, values: Array) -> Linear:
+        """The aircraft of derivatives (..., D), surfaces included."""
+        return plant.behind_actuators(self.motion(self.named(values)), self.lag)
+
+    def gains(self, values: Array, caution: float) -> Array:
+        """Gains (m, n) for an aircraft of derivatives (D,), with ``caution`` times the baseline's weight on surfaces.
+
+        Raises LinAlgError where there are none.
+        """
+        share = np.linalg.solve(self.effect, self.motion(self.named(values)).B[self.moments])
+        return regulator.gains(self.model(values), self.Q, caution * self.weight * share.T @ share)
+
+
+def axes(aircraft: Aircraft, lag: float, delay: float) -> tuple[Axis, Axis]:
+    """Pitch and lateral axis at the reference condition. Raises InputError where the file or the aircraft cannot."""
+    plant.check(aircraft)
+    reference = aircraft.reference
+    scales = Scales.of(aircraft, reference.airspeed, reference.air_density)
+    alpha, _ = level_flight(aircraft, 1.0)
+
+    def pitch(values: Values) -> Linear:
+        return plant.with_integral(plant.with_attitude(plant.longitudinal(values, scales)), 2)
+
+    def lateral(values: Values) -> Linear:
+        return plant.with_integral(plant.lateral(values, scales, alpha), 3)
+
+    return (
+        _axis("pitch", aircraft, plant.LONGITUDINAL, slice(1, 2), pitch, _PITCH, lag, delay),
+        _axis("lateral", aircraft, plant.LATERAL, slice(1, 3), lateral, _LATERAL, lag, delay),
+    )
+
+
+def _axis(
+    name: str,
+    aircraft: Aircraft,
+    derivatives: tuple[str, ...],
+    moments: slice,
+    motion: Callable[[Values], Linear],
+    allowed: tuple[float, ...],
+    lag: float,
+    delay: float,
+) -> Axis:
+    known = tuple(d for d in derivatives if d in aircraft.derivatives)
+    beliefs = [aircraft.derivatives[d] for d in known]
+    values = np.array([belief.value for belief in beliefs])
+    whole = plant.behind_actuators(motion(dict(zip(known, values.tolist(), strict=True))), lag)
+    Q = np.zeros(whole.A.shape[-1])
+    Q[: len(allowed)] = 1.0 / np.array(allowed) ** 2
+    return Axis(
+        name=name,
+        derivatives=known,
+        believed=values,
+        sizes=np.array([max(abs(b.value), 2.0 * (b.tolerance or 0.0), 1e-6) for b in beliefs]),
+        signals=np.array([_SIGNALS[d.partition("_")[2]] for d in known]),
+        moments=moments,
+        motion=motion,
+        lag=lag,
+        delay=delay,
+        Q=Q,
+        weight=regulator.least_weight(whole, Q, delay),
+    )
+
+
+#: Plausible sizes of regressors in a manoeuvre: rad, and non-dimensional rates.
+_SIGNALS = {"alpha": 0.05, "beta": 0.05, "p": 0.04, "q": 0.01, "r": 0.02, "de": 0.05, "da": 0.05, "dr": 0.05}
+
+
+def level_flight(aircraft: Aircraft, pressure: float) -> tuple[float, float]:
+    """Alpha and elevator (rad) of level flight, by the file, at a share of the reference dynamic pressure."""
+    d = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
+    reference = aircraft.reference
+    load = 0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S * pressure
+    lift = aircraft.mass * plant.GRAVITY / load - d.get("CL_0", 0.0)
+    matrix = np.array([[d["CL_alpha"], d.get("CL_de", 0.0)], [d["Cm_alpha"], d["Cm_de"]]])
+    alpha, elevator = np.linalg.solve(matrix, [lift, -d.get("Cm_0", 0.0)])
+    return float(alpha), float(elevator)

@@ -1,0 +1,79 @@
+"""The adaptive controller: ``init``, ``hear`` whenever estimates come, ``step`` for every command.
+
+    state = init(aircraft, settings)
+    hear(state, time, beliefs)                            # {"Cm_de": Belief(...), ...}
+    command = step(state, sensed, set_points)             # rad, N
+
+Without estimates, with old ones, or where a sensor is silent, it flies the gains of the aircraft file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.control import adaptation, law
+from sysid_node.control.adaptation import Adaptation
+from sysid_node.control.axis import axes
+from sysid_node.control.law import LONGEST_STEP, Law
+from sysid_node.control.settings import Settings
+from sysid_node.control.types import Belief, Command, Sensed, SetPoints
+
+NO_EXCITATION = (0.0, 0.0, 0.0)
+FIRST_STEP = 0.005  # s
+
+
+@dataclass
+class State:
+    """All that the controller remembers."""
+
+    settings: Settings
+    axes: tuple[Adaptation, Adaptation]  # pitch, lateral
+    law: Law
+    time: float = math.nan  # s, of the last step
+    heard: float = -math.inf  # s, of the last estimates
+    stale: str = "no estimates yet"  # why the baseline is flown; empty where estimates are used
+
+
+def init(aircraft: Aircraft, settings: Settings) -> State:
+    """A controller that flies the baseline. Raises InputError where the aircraft's file or actuators do not do."""
+    pitch, lateral = (adaptation.init(axis) for axis in axes(aircraft, settings.actuator_lag, settings.delay))
+    return State(settings, (pitch, lateral), law.init(aircraft, settings))
+
+
+def hear(state: State, time: float, beliefs: Mapping[str, Belief]) -> None:
+    """Estimates that came at a time (s) of the sensors' clock."""
+    state.heard = time
+    if not state.settings.adapt:
+        return
+    state.stale = ""
+    for axis in state.axes:
+        adaptation.consider(axis, beliefs, state.settings, time)
+
+
+def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION) -> Command:
+    """The command at ``sensed.time``; ``excitation`` (rad) of elevator, aileron and rudder comes on top."""
+    passed = sensed.time - state.time
+    duration = min(passed, LONGEST_STEP) if passed > 0.0 else FIRST_STEP
+    state.time = sensed.time
+    _fall_back(state, sensed)
+    for axis in state.axes:
+        adaptation.advance(axis, state.settings, duration)
+    pitch, lateral = state.axes
+    flown = ((pitch.axis, pitch.flown), (lateral.axis, lateral.flown))
+    return law.step(state.law, sensed, points, flown, excitation, duration)
+
+
+def _fall_back(state: State, sensed: Sensed) -> None:
+    """Head for the baseline where estimates are old or a sensor is silent."""
+    silent = [name for name, value in sensed._asdict().items() if not math.isfinite(value)]
+    age = sensed.time - state.heard
+    if silent:
+        state.stale = f"{silent[0]} not measured"
+    elif age > state.settings.stale_after:
+        state.stale = f"no estimates for {age:.1f} s" if math.isfinite(age) else "no estimates yet"
+    if state.stale:
+        for axis in state.axes:
+            adaptation.fall_back(axis, f"baseline: {state.stale}")

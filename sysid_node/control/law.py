@@ -1,0 +1,197 @@
+"""The control law: feedforward by inversion of the moments' equations, feedback of the motion's errors, within limits.
+
+    u = trim + G^-1 (reference's accelerations - f(reference's motion)) - K (motion - reference's motion)
+
+The feedforward is dynamic inversion along the reference with the derivatives that are flown (Lombaerts, Huisman, Chu,
+Mulder & Joosten, "Nonlinear reconfiguring flight control based on online physical model identification", J. Guidance
+32(3), 2009); the motion is compared with the reference as late as the actuators are (Johnson & Calise's hedging).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.control import reference
+from sysid_node.control.adaptation import Flown
+from sysid_node.control.axis import Axis, level_flight
+from sysid_node.control.plant import GRAVITY, Scales
+from sysid_node.control.reference import Behind, Reference, Wanted
+from sysid_node.control.settings import Settings
+from sysid_node.control.types import Command, Sensed, SetPoints
+
+Array = NDArray[np.float64]
+
+LONGEST_STEP = 0.1  # s
+SPEED_GAIN, SPEED_INTEGRAL = 0.6, 0.1  # 1/s, 1/s^2: of the airspeed loop
+SPEED_FILTER = 1.0  # s, of the airspeed that gains are scheduled by
+PRESSURES = (0.4, 2.5)  # dynamic pressure over the reference one, within which gains are scheduled
+
+
+@dataclass
+class Law:
+    """What the law remembers."""
+
+    aircraft: Aircraft
+    settings: Settings
+    limits: Array  # (3,) rad
+    most_thrust: float  # N
+    behind: Behind
+    reference: Reference | None = None
+    airspeed: float = math.nan  # m/s, filtered
+    density: float = math.nan
+    integrals: Array = field(default_factory=lambda: np.zeros(2))  # of theta's and phi's errors, rad s
+    thrust: float = 0.0  # N, of the airspeed's integral
+    command: Array | None = None  # (3,) rad, the last
+    surfaces: Array = field(default_factory=lambda: np.zeros(3))  # rad, what feedback has moved them by
+    coming: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback on its way to the actuators
+    wanted: Wanted | None = None  # the reference that the motion is compared with
+
+
+def init(aircraft: Aircraft, settings: Settings) -> Law:
+    """Nothing flown yet."""
+    throttle = aircraft.throttle
+    weight = aircraft.mass * GRAVITY
+    limits = np.array([aircraft.controls[c].limit or settings.command_limit for c in ("elevator", "aileron", "rudder")])
+    most = 0.0 if throttle is None else throttle.max_thrust or 2.0 * weight
+    return Law(aircraft, settings, limits, most, Behind(settings.actuator_lag, settings.delay))
+
+
+def step(
+    law: Law,
+    sensed: Sensed,
+    points: SetPoints,
+    flown: tuple[tuple[Axis, Flown], tuple[Axis, Flown]],
+    excitation: Sequence[float],
+    step: float,
+) -> Command:
+    """The command of this instant, ``step`` (s) after the last one; ``excitation`` (3,) rad comes on top."""
+    scales = _condition(law, sensed, points, step)
+    pressure = _pressure(law)
+    level, trim = level_flight(law.aircraft, pressure)
+    speed = law.aircraft.reference.airspeed
+    points = reference.limited(points, level, speed, law.settings)
+    if law.reference is None:
+        law.reference = Reference(_finite(sensed.theta, level), _finite(sensed.phi, 0.0))
+    pitch, side = (dict(zip(axis.derivatives, f.values.tolist(), strict=True)) for axis, f in flown)
+    flight = reference.Flight(law.airspeed, level, scales.force * side.get("CY_beta", 0.0), law.settings.bandwidth)
+    wanted = reference.advance(law.reference, points, step, flight)
+    forward = _feedforward(law.reference, wanted, pitch, side, scales, step)
+    late = law.wanted = reference.follow(law.behind, sensed.time, wanted, step)
+    errors = _errors(law, sensed, late, level)
+    back = np.concatenate([f.gains @ e for (_, f), e in zip(flown, errors, strict=True)]) / pressure
+    planned = np.array([trim, 0.0, 0.0]) + forward + np.asarray(excitation, dtype=float)
+    command, held = _limited(law, planned - back, step)
+    _follow_surfaces(law, sensed.time, command - planned, step)
+    _integrate(law, errors, held, step)
+    elevator, aileron, rudder = command.tolist()
+    return Command(elevator, aileron, rudder, _thrust(law, sensed, points, late, level, step))
+
+
+def _condition(law: Law, sensed: Sensed, points: SetPoints, step: float) -> Scales:
+    """The flight condition, filtered; where the airspeed is not measured, the last, or what is asked for."""
+    known = law.aircraft.reference
+    if math.isnan(law.airspeed):
+        law.airspeed = _finite(sensed.airspeed, _finite(points.airspeed, known.airspeed))
+        law.density = known.air_density
+    if math.isfinite(sensed.airspeed):
+        law.airspeed += min(step / SPEED_FILTER, 1.0) * (sensed.airspeed - law.airspeed)
+    law.airspeed = min(max(law.airspeed, 0.5 * known.airspeed), 2.0 * known.airspeed)
+    if 0.1 < sensed.density < 2.0:
+        law.density = sensed.density
+    return Scales.of(law.aircraft, law.airspeed, law.density)
+
+
+def _pressure(law: Law) -> float:
+    """Dynamic pressure over the reference one."""
+    known = law.aircraft.reference
+    share = law.density * law.airspeed**2 / (known.air_density * known.airspeed**2)
+    return min(max(share, PRESSURES[0]), PRESSURES[1])
+
+
+def _feedforward(
+    ref: Reference, wanted: Wanted, pitch: dict[str, float], side: dict[str, float], scales: Scales, step: float
+) -> Array:
+    """(3,) rad: the surfaces whose moments make the reference's accelerations, and the angle of attack that follows."""
+    rate = wanted.q + wanted.turn
+    q = rate * scales.chord
+    elevator = wanted.q_rate / scales.pitch - pitch["Cm_alpha"] * ref.alpha - pitch["Cm_q"] * q
+    elevator /= pitch["Cm_de"]
+    lift = pitch["CL_alpha"] * ref.alpha + pitch.get("CL_q", 0.0) * q + pitch.get("CL_de", 0.0) * elevator
+    ref.alpha += step * (rate - scales.force * lift)
+    ref.alpha = min(max(ref.alpha, -0.2), 0.2)
+    p, r = wanted.p * scales.span, wanted.r * scales.span
+    moment = np.linalg.solve(scales.lateral, [wanted.p_rate, wanted.r_rate])
+    rest = [
+        side.get(f"{c}_beta", 0.0) * wanted.beta + side.get(f"{c}_p", 0.0) * p + side.get(f"{c}_r", 0.0) * r
+        for c in ("Cl", "Cn")
+    ]
+    effect = [[side.get(f"{c}_{s}", 0.0) for s in ("da", "dr")] for c in ("Cl", "Cn")]
+    aileron, rudder = np.linalg.solve(effect, moment - rest)
+    return np.array([elevator, aileron, rudder])
+
+
+def _errors(law: Law, sensed: Sensed, late: Wanted, level: float) -> tuple[Array, Array]:
+    """Of alpha, q, theta, its integral; of beta, p, r, phi, its integral; and what feedback has moved surfaces by.
+
+    What is not measured has no error.
+    """
+    pitch = (sensed.alpha - level - late.alpha, sensed.q - late.q - late.turn, sensed.theta - late.theta)
+    side = (sensed.beta - late.beta, sensed.p - late.p, sensed.r - late.r, sensed.phi - late.phi)
+    first, second = (np.nan_to_num(np.array(x), nan=0.0, posinf=0.0, neginf=0.0) for x in (pitch, side))
+    return (
+        np.concatenate([first, law.integrals[:1], law.surfaces[:1]]),
+        np.concatenate([second, law.integrals[1:], law.surfaces[1:]]),
+    )
+
+
+def _follow_surfaces(law: Law, time: float, feedback: Array, step: float) -> None:
+    """Move the surfaces' model behind the delay and the lag of the actuators."""
+    law.coming.append((time, feedback))
+    while len(law.coming) > 1 and law.coming[1][0] <= time - law.settings.delay:
+        law.coming.popleft()
+    law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (law.coming[0][1] - law.surfaces)
+
+
+def _limited(law: Law, asked: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
+    """The command (3,) within amplitude and rate, and which of it was held back."""
+    within = np.clip(asked, -law.limits, law.limits)
+    if law.command is not None:
+        reach = law.settings.command_rate * step
+        within = np.clip(within, law.command - reach, law.command + reach)
+    law.command = within
+    return within, np.abs(within - asked) > 1e-9
+
+
+def _integrate(law: Law, errors: tuple[Array, Array], held: NDArray[np.bool_], step: float) -> None:
+    """Errors of theta and phi add up while their surface has travel left: no winding up."""
+    for i, (error, stuck) in enumerate(zip((errors[0][2], errors[1][3]), held[:2], strict=True)):
+        if not stuck:
+            law.integrals[i] = min(max(law.integrals[i] + step * error, -1.0), 1.0)
+
+
+def _thrust(law: Law, sensed: Sensed, points: SetPoints, late: Wanted, level: float, step: float) -> float:
+    """N: level flight's drag, the climb's weight, and what the airspeed's error asks for."""
+    if law.most_thrust == 0.0:
+        return 0.0
+    d = {name: derivative.value for name, derivative in law.aircraft.derivatives.items()}
+    load = 0.5 * law.density * law.airspeed**2 * law.aircraft.geometry.S
+    weight = law.aircraft.mass * GRAVITY
+    drag = d.get("CD_0", 0.0) + d.get("CD_alpha", 0.0) * level + d.get("CD_k", 0.0) * (weight / load) ** 2
+    error = _finite(points.airspeed - sensed.airspeed, 0.0)
+    asked = load * drag + weight * math.sin(late.theta - level - late.alpha) + law.thrust
+    asked += SPEED_GAIN * law.aircraft.mass * error
+    given = min(max(asked, 0.0), law.most_thrust)
+    if given == asked:
+        law.thrust += SPEED_INTEGRAL * law.aircraft.mass * error * step
+    return given
+
+
+def _finite(value: float, otherwise: float) -> float:
+    return value if math.isfinite(value) else otherwise

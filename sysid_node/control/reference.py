@@ -1,0 +1,124 @@
+"""The motion that is asked of the aircraft: set-points through reference models, as a trajectory that it can fly.
+
+Second-order models of pitch and roll, a first-order one of sideslip; yaw rate and angle of attack follow from the turn
+and from the aircraft's own equations (explicit model following: Stevens, Lewis & Johnson (2016), sect. 5.6).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from sysid_node.control.plant import GRAVITY
+from sysid_node.control.settings import Settings
+from sysid_node.control.types import SetPoints
+
+DAMPING = 0.9
+MOST_RATE, MOST_ACCELERATION = 1.5, 8.0  # rad/s, rad/s^2
+
+
+class Wanted(NamedTuple):
+    """The reference motion at one instant, rad, rad/s; accelerations rad/s^2. ``alpha`` from level flight's."""
+
+    theta: float
+    q: float
+    phi: float
+    p: float
+    r: float
+    alpha: float
+    beta: float
+    q_rate: float = 0.0
+    p_rate: float = 0.0
+    r_rate: float = 0.0
+    turn: float = 0.0  # pitch rate of the turn, rad/s
+
+
+class Flight(NamedTuple):
+    """What the reference depends on."""
+
+    airspeed: float  # m/s
+    level: float  # rad, angle of attack of level flight
+    side: float  # 1/s, qbar S CY_beta / (m V)
+    bandwidth: float  # rad/s
+
+
+@dataclass
+class Reference:
+    """What the models remember, rad and rad/s; ``alpha`` from level flight's."""
+
+    theta: float
+    phi: float = 0.0
+    q: float = 0.0
+    p: float = 0.0
+    beta: float = 0.0
+    alpha: float = 0.0
+
+
+@dataclass
+class Behind:
+    """The reference as late as the actuators make the aircraft: what its motion is compared with."""
+
+    lag: float  # s
+    delay: float  # s
+    coming: deque[tuple[float, Wanted]] = field(default_factory=deque)
+    now: Wanted | None = None
+
+
+def limited(points: SetPoints, level: float, speed: float, settings: Settings) -> SetPoints:
+    """Set-points that may be flown; ``level`` pitch (rad) and reference ``speed`` (m/s) stand for NaN."""
+
+    def within(value: float, otherwise: float, most: float) -> float:
+        return otherwise if math.isnan(value) else min(max(value, -most), most)
+
+    return SetPoints(
+        within(points.roll, 0.0, settings.largest_roll),
+        within(points.pitch, level, settings.largest_pitch),
+        within(points.sideslip, 0.0, settings.largest_sideslip),
+        speed if math.isnan(points.airspeed) else min(max(points.airspeed, 0.75 * speed), 1.4 * speed),
+        within(points.pitch_rate, math.nan, MOST_RATE),
+    )
+
+
+def advance(state: Reference, points: SetPoints, step: float, flight: Flight) -> Wanted:
+    """The motion one ``step`` (s) on, but for alpha, which follows from the elevator: the caller moves it."""
+    w, level, airspeed = flight.bandwidth, flight.level, flight.airspeed
+    q_rate = _pitch_acceleration(state, points, w)
+    p_rate = _toward(w * w * (points.roll - state.phi) - 2.0 * DAMPING * w * state.p, MOST_ACCELERATION)
+    beta_rate = w * (points.sideslip - state.beta)
+    state.q = _toward(state.q + q_rate * step, MOST_RATE)
+    state.p = _toward(state.p + p_rate * step, MOST_RATE)
+    state.theta += state.q * step
+    state.phi += state.p * step
+    state.beta += beta_rate * step
+    sin, cos = math.sin(level), math.cos(level)
+    pull = GRAVITY / airspeed * cos
+    r = (flight.side * state.beta + sin * state.p + pull * math.sin(state.phi) - beta_rate) / cos
+    r_rate = (flight.side * beta_rate + sin * p_rate + pull * math.cos(state.phi) * state.p) / cos
+    turn = GRAVITY / airspeed * math.tan(state.phi) * math.sin(state.phi)
+    p = state.p - r * math.tan(level)
+    return Wanted(state.theta, state.q, state.phi, p, r, state.alpha, state.beta, q_rate, p_rate, r_rate, turn)
+
+
+def _pitch_acceleration(state: Reference, points: SetPoints, w: float) -> float:
+    if math.isnan(points.pitch_rate):
+        return _toward(w * w * (points.pitch - state.theta) - 2.0 * DAMPING * w * state.q, MOST_ACCELERATION)
+    return _toward(2.0 * w * (points.pitch_rate - state.q), MOST_ACCELERATION)
+
+
+def _toward(value: float, most: float) -> float:
+    return min(max(value, -most), most)
+
+
+def follow(state: Behind, time: float, wanted: Wanted, step: float) -> Wanted:
+    """The reference ``wanted`` now (s), behind delay and lag."""
+    state.coming.append((time, wanted))
+    while len(state.coming) > 1 and state.coming[1][0] <= time - state.delay:
+        state.coming.popleft()
+    late = state.coming[0][1]
+    if state.now is None:
+        state.now = late
+    share = 1.0 - math.exp(-step / state.lag)
+    state.now = Wanted(*(a + share * (b - a) for a, b in zip(state.now, late, strict=True)))
+    return state.now

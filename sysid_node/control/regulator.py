@@ -1,0 +1,39 @@
+"""Gains for a linear model: the linear quadratic regulator, and how much the surfaces' travel may cost.
+
+Stevens, Lewis & Johnson (2016), sect. 5.3 and 5.4: attitude errors with their integrals, weights by Bryson's rule.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_continuous_are
+
+from sysid_node.control.margins import margins
+from sysid_node.control.plant import Linear
+from sysid_node.errors import InputError
+
+Array = NDArray[np.float64]
+
+#: Margins that the baseline leaves: 12 dB and 60 deg, so that adapted gains have room above 6 dB and 45 deg.
+GAIN_MARGIN, PHASE_MARGIN = 10.0 ** (12.0 / 20.0), np.deg2rad(60.0)
+_WEIGHTS = np.logspace(-3.0, 6.0, 91)  # among which the weight on the surfaces is sought
+
+
+def gains(plant: Linear, Q: Array, R: Array) -> Array:
+    """K (m, n) of u = -K x that minimises the integral of x'Qx + u'Ru; Q (n,) the diagonal. LinAlgError: none does."""
+    P = solve_continuous_are(plant.A, plant.B, np.diag(Q), R)
+    return np.asarray(np.linalg.solve(R, plant.B.T @ P))
+
+
+def least_weight(plant: Linear, Q: Array, delay: float) -> float:
+    """The least weight on the surfaces' squares that leaves good margins: as fast as is safe. InputError: none does."""
+    eye = np.eye(plant.B.shape[-1])
+    for weight in _WEIGHTS.tolist():
+        found = margins(plant, gains(plant, Q, weight * eye), delay)
+        if bool(found.enough(GAIN_MARGIN, PHASE_MARGIN)):
+            return float(weight)
+    raise InputError(
+        f"no gains leave 12 dB and 60 deg with a delay of {delay:g} s: the aircraft of the file is not stable enough, "
+        "or its actuators are too slow"
+    )

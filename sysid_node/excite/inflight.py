@@ -1,0 +1,213 @@
+"""Excitation while somebody else flies: small deflections on top of the commands, until enough is known.
+
+    state = init(aircraft, settings)
+    start(state, time)
+    deflections = step(state, time, flight)        # (controls,) rad, at every command
+    hear(state, time, precision)                   # whenever estimates come
+
+It stops by itself when the derivatives asked for are known well enough, and begins again when they no longer are, if
+told to watch. It stops at once, with all surfaces back in the middle, where a limit is passed or a sensor is silent.
+What it did, and for how long, is in ``events``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.excite.spec import draw_manoeuvre, parse_segments
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.80665
+RATE = 200.0  # Hz, at which the manoeuvre is drawn
+PATIENCE = 2.0  # s of excitation after which estimates that rest on older data are begun anew
+AGAIN = 0.5  # s for which a derivative must be badly known before it is excited again
+EVENTS = 1000  # the last so many are kept
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is flown, what for, and within which limits. Raises InputError on impossible values."""
+
+    manoeuvre: tuple[str, ...] = ("multisine:elevator,aileron,rudder:amplitude=0.02:length=15:low=0.15:high=1.9",)
+    derivatives: tuple[str, ...] = ("Cm_alpha", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
+    accuracy: float = 0.05  # half an interval over the derivative's size
+    longest: float = 60.0  # s, after which it stops whatever is known
+    watch: bool = False  # begin again when a derivative is no longer known
+    largest_amplitude: float = 0.1  # rad
+    largest_roll: float = 0.9  # rad
+    largest_pitch: float = 0.5  # rad
+    least_airspeed: float = 0.7  # of the reference
+    most_airspeed: float = 1.5
+    least_load_factor: float = 0.0
+    most_load_factor: float = 3.0
+
+    def __post_init__(self) -> None:
+        for name, (lower, upper) in RANGES.items():
+            value = getattr(self, name)
+            if not lower <= value <= upper:
+                raise InputError(f"setting {name} = {value!r}: expected {lower:g} to {upper:g}")
+
+
+#: Allowed values, both ends included.
+RANGES: Mapping[str, tuple[float, float]] = {
+    "accuracy": (0.001, 10.0),
+    "longest": (1.0, 3600.0),
+    "largest_amplitude": (0.0, 0.5),
+    "largest_roll": (0.05, 1.5),
+    "largest_pitch": (0.05, 1.5),
+    "least_airspeed": (0.3, 1.0),
+    "most_airspeed": (1.0, 3.0),
+    "least_load_factor": (-5.0, 1.0),
+    "most_load_factor": (1.0, 10.0),
+}
+
+
+class Flight(NamedTuple):
+    """What the limits are about; NaN = not measured."""
+
+    roll: float  # rad
+    pitch: float  # rad
+    airspeed: float  # m/s
+    load_factor: float
+
+
+class Event(NamedTuple):
+    """Something that was done at a time (s)."""
+
+    time: float
+    text: str
+
+
+@dataclass
+class State:
+    """An exciter's memory."""
+
+    aircraft: Aircraft
+    settings: Settings
+    table: Array  # (N, controls) rad at RATE
+    events: list[Event] = field(default_factory=list)
+    begun: float = math.nan  # s; NaN = not exciting
+    missing: tuple[str, ...] = ()  # derivatives not known well enough
+    unknown_since: float = math.nan
+    armed: bool = False  # watching
+    fresh_from: float = math.nan  # s, from which the estimates' data are
+
+    @property
+    def active(self) -> bool:
+        """Whether surfaces are moved, or about to be."""
+        return not math.isnan(self.begun)
+
+
+def init(aircraft: Aircraft, settings: Settings) -> State:
+    """Nothing moves. Raises InputError on a manoeuvre or a derivative that the aircraft does not have."""
+    unknown = [name for name in settings.derivatives if name not in aircraft.derivatives]
+    if unknown:
+        raise InputError(f"derivatives: aircraft {aircraft.name!r} has no {', '.join(unknown)}")
+    segments = parse_segments(settings.manoeuvre, aircraft)
+    end = max(segment.end for segment in segments)
+    drawn = draw_manoeuvre(segments, aircraft, RATE, end)
+    table = np.column_stack([drawn.deflections[name] for name in aircraft.controls])
+    if np.abs(table).max() > settings.largest_amplitude:
+        raise InputError(
+            f"manoeuvre {drawn.spec!r}: moves {np.abs(table).max():.3g} rad, more than the largest amplitude "
+            f"{settings.largest_amplitude:g}; lower it"
+        )
+    return State(aircraft, settings, table, missing=settings.derivatives)
+
+
+def start(state: State, time: float) -> None:
+    """Begin at a time (s). Raises InputError where it is under way already."""
+    if state.active:
+        raise InputError("excitation is under way; stop it first")
+    state.begun, state.fresh_from, state.armed = time, time, state.settings.watch
+    _log(state, time, "begun")
+
+
+def stop(state: State, time: float, why: str) -> None:
+    """End at a time (s), and do not begin again by itself."""
+    if state.active:
+        _end(state, time, why)
+    state.armed = False
+
+
+def hear(state: State, time: float, precision: Mapping[str, float], changed: bool = False) -> bool:
+    """Estimates at a time (s): half of each interval over its derivative's size, infinite where it is not valid.
+
+    ``changed``: whoever estimates says that the aircraft has changed, and has forgotten what was before. Returns
+    whether he should be told to: something is no longer known, and he has not noticed through a while of excitation.
+    """
+    accuracy = state.settings.accuracy
+    state.missing = tuple(n for n in state.settings.derivatives if not precision.get(n, math.inf) <= accuracy)
+    if changed:
+        state.fresh_from = time
+    if state.active:
+        if not state.missing:
+            _end(state, time, "known")
+        return _stuck(state, time)
+    # what was known well enough once need not be better: only what is not known at all is flown for again
+    lost = [n for n in state.settings.derivatives if not math.isfinite(precision.get(n, math.inf))]
+    state.unknown_since = (time if math.isnan(state.unknown_since) else state.unknown_since) if lost else math.nan
+    if state.armed and time - state.unknown_since >= AGAIN:
+        state.begun = time
+        _log(state, time, f"begun again: {', '.join(lost)} no longer known")
+    return False
+
+
+def _stuck(state: State, time: float) -> bool:
+    """Whether estimates lean on data from long before excitation began; only once for each time that it does."""
+    if not state.active or time - state.begun < PATIENCE or state.fresh_from >= state.begun - PATIENCE:
+        return False
+    state.fresh_from = time
+    _log(state, time, "estimates begun anew")
+    return True
+
+
+def step(state: State, time: float, flight: Flight) -> Array:
+    """Deflections (controls,) rad on top of the commands at a time (s)."""
+    if state.active:
+        danger = _danger(state, flight)
+        if danger:
+            stop(state, time, f"aborted: {danger}")
+        elif time - state.begun > state.settings.longest:
+            stop(state, time, f"given up: {', '.join(state.missing)} not known")
+    if not state.active:
+        return np.zeros(state.table.shape[1])
+    row: Array = state.table[round(max(time - state.begun, 0.0) * RATE) % len(state.table)]
+    return row
+
+
+def _danger(state: State, flight: Flight) -> str:
+    """The limit that is passed or the sensor that is silent, if any."""
+    s, reference = state.settings, state.aircraft.reference.airspeed
+    limits = {
+        "roll": (-s.largest_roll, s.largest_roll),
+        "pitch": (-s.largest_pitch, s.largest_pitch),
+        "airspeed": (s.least_airspeed * reference, s.most_airspeed * reference),
+        "load_factor": (s.least_load_factor, s.most_load_factor),
+    }
+    for name, (lower, upper) in limits.items():
+        value = getattr(flight, name)
+        if not math.isfinite(value):
+            return f"{name.replace('_', ' ')} not measured"
+        if not lower <= value <= upper:
+            return f"{name.replace('_', ' ')} {value:.3g} beyond {lower:.3g} to {upper:.3g}"
+    return ""
+
+
+def _end(state: State, time: float, why: str) -> None:
+    _log(state, time, f"{why} after {time - state.begun:.1f} s")
+    state.begun = state.unknown_since = math.nan
+
+
+def _log(state: State, time: float, text: str) -> None:
+    state.events.append(Event(time, text))
+    del state.events[:-EVENTS]
