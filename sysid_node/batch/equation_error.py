@@ -22,7 +22,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
 #: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
-DEFAULT_LOWPASS = 5.0
+DEFAULT_LOWPASS = 3.0
 
 
 def equation_error(aircraft: Aircraft, records: Sequence[FlightRecord], low_pass: float = DEFAULT_LOWPASS) -> Fit:

@@ -21,7 +21,7 @@ import numpy as np
 
 from sysid_node.batch import kalman
 from sysid_node.batch.assess import assess
-from sysid_node.batch.likelihood import DEFAULT_SEARCH, Problem, Search, answer_with_own, maximise
+from sysid_node.batch.likelihood import Problem, Search, answer_with_own, maximise, whitened
 from sysid_node.batch.model import Dynamics, Manoeuvre, Model, check_manoeuvres
 from sysid_node.batch.result import Answer, Fit
 from sysid_node.batch.unknowns import Priors, Unknowns
@@ -30,6 +30,9 @@ from sysid_node.flight.record import Array
 
 #: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
 _NOISE_RANGE = 1e3
+
+#: The noises' own small likelihood makes the last digits dear; a hundredth of a standard error is enough.
+FILTER_SEARCH = Search(tolerance=1e-2)
 
 #: 1-sigma of the logarithm of a noise about its start value: a factor of twenty either way is no surprise.
 _NOISE_PRIOR = 3.0
@@ -41,17 +44,20 @@ def filter_error(
     *,
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
-    search: Search = DEFAULT_SEARCH,
+    correlated: bool = False,
+    search: Search = FILTER_SEARCH,
 ) -> Fit:
     """Estimates the free parameters and the process noise from all manoeuvres together.
 
+    ``correlated``: whether what the outputs' innovations have in common counts; it should where a disturbance shows in
+    several outputs at once, as a gust does, and must not where one output is derived from another.
     Each manoeuvre has the steady Kalman gain of its first sample's flight condition: cut a flight that changes speed
     much. ``extras`` of the result holds the noises' standard deviations: ``process_<state>`` (unit of the state per
     root second) and ``sensor_<output>``. Raises InputError as ``output_error`` does, and on outputs with gaps; a search
     that does not converge is returned, and says so.
     """
     check_manoeuvres(model, manoeuvres)
-    problem = _FilterError(Unknowns.of(model, manoeuvres, initial_states, biases))
+    problem = _FilterError(Unknowns.of(model, manoeuvres, initial_states, biases), correlated)
     z, iterations, complaint = maximise(problem, search)
     return assess("filter_error", problem, z, iterations, complaint, problem.noises(z))
 
@@ -79,9 +85,10 @@ def predict_filter(
 class _FilterError(Problem):
     """One-step predictions; z ends with the logarithms of process and measurement noise, 1 sigma."""
 
-    def __init__(self, unknowns: Unknowns) -> None:
+    def __init__(self, unknowns: Unknowns, correlated: bool = False) -> None:
         super().__init__(unknowns)
         _check_complete(unknowns)
+        self._correlated = correlated
         self._noise_start = _rough_noise(unknowns)
 
     def start(self) -> Array:
@@ -113,14 +120,26 @@ class _FilterError(Problem):
         vague = np.full(noises.size, _NOISE_PRIOR)
         return np.r_[index, noises], np.r_[mean, self._noise_start], np.r_[sigma, vague]
 
+    def noise(self, z: Array) -> Array:
+        """Of the innovations; where they may be ``correlated``, their whole covariance, kept regular."""
+        independent = super().noise(z)
+        if not self._correlated:
+            return independent
+        errors = whitened(np.concatenate([answer.residuals for answer in self.answers(z)]), independent)
+        correlation = errors.T @ errors / len(errors)
+        return np.asarray(independent @ np.linalg.cholesky(correlation + 1e-10 * np.eye(len(correlation))))
+
     def noises(self, z: Array) -> dict[str, float]:
         """Standard deviations of process and measurement noise, scaled so that the filter expects its innovations."""
         model, manoeuvre = self.unknowns.model, self.unknowns.manoeuvres[0]
         logs = z[self.unknowns.size :]
-        q, r = np.split(np.exp(2.0 * logs), [len(model.states)])
+        q = np.zeros(len(model.states))
+        q[list(_driven(model))], r = np.split(np.exp(2.0 * logs), [len(model.driven_states)])
         theta, x0 = self.unknowns.theta(z), self.unknowns.initial_state(z, 0)
-        expected = kalman.innovation_variance(model.dynamics, manoeuvre.step, manoeuvre.inputs[0], x0, theta, q, r)
-        scale = np.exp(np.mean(np.log(self.noise(z) / np.sqrt(np.asarray(expected)))))
+        expected = kalman.innovation_variance(
+            model.dynamics, manoeuvre.step, manoeuvre.inputs[0], x0, theta, jnp.asarray(q), jnp.asarray(r)
+        )
+        scale = np.exp(np.mean(np.log(np.linalg.norm(self.noise(z), axis=1) / np.sqrt(np.asarray(expected)))))
         return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
 
     def _columns(self, index: int, z: Array) -> list[int]:
@@ -131,12 +150,12 @@ class _FilterError(Problem):
 
     def _of(self, index: int, z: Array) -> tuple[Dynamics, Chosen, Array, Array, Array, Array, Array, Array]:
         u, m = self.unknowns, self.unknowns.manoeuvres[index]
-        chosen = (u.free, u.states, u.biases)
+        chosen = (u.free, u.states, u.biases, _driven(u.model))
         local = z[self._columns(index, z)]
         return u.model.dynamics, chosen, m.time, m.inputs, m.outputs, m.initial_state, u.model.start, local
 
 
-Chosen = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+Chosen = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
 
 def _predict(
@@ -151,15 +170,14 @@ def _predict(
 ) -> jax.Array:
     """Predicted outputs (N, ny) for what of z concerns this manoeuvre: parameters, its own unknowns, log noises.
 
-    ``chosen``: indices of the free parameters, of the free initial states, of the biased outputs.
+    ``chosen``: indices of the free parameters, free initial states, biased outputs and driven states.
     """
-    sizes = np.cumsum([*(len(part) for part in chosen), x0.size])
-    values, states, bias, log_q, log_r = jnp.split(local, sizes)
+    values, states, bias, log_q, log_r = jnp.split(local, np.cumsum([len(part) for part in chosen]))
     theta = theta.at[jnp.array(chosen[0], dtype=int)].set(values)
     x0 = x0.at[jnp.array(chosen[1], dtype=int)].set(states)
     offset = jnp.zeros(outputs.shape[1]).at[jnp.array(chosen[2], dtype=int)].set(bias)
-    q, r = jnp.exp(2.0 * log_q), jnp.exp(2.0 * log_r)
-    return kalman.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, r) + offset
+    q = jnp.eye(x0.size)[:, np.array(chosen[3])] @ jnp.exp(2.0 * log_q)  # XLA does not survive this as a scatter
+    return kalman.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, jnp.exp(2.0 * log_r)) + offset
 
 
 _predict_jit = jax.jit(_predict, static_argnums=(0, 1))
@@ -167,7 +185,7 @@ _predict_jacobian = jax.jit(jax.jacfwd(_predict, argnums=7), static_argnums=(0, 
 
 
 def _noise_names(model: Model) -> list[str]:
-    return [f"process_{name}" for name in model.states] + [f"sensor_{name}" for name in model.outputs]
+    return [f"process_{name}" for name in model.driven_states] + [f"sensor_{name}" for name in model.outputs]
 
 
 def _check_complete(unknowns: Unknowns) -> None:
@@ -194,7 +212,14 @@ def _rough_noise(unknowns: Unknowns) -> Array:
     size = np.abs(first.outputs).max(axis=0)
     sensor = np.maximum(np.sqrt(np.mean(second**2, axis=0) / 6.0), 1e-6 * (1.0 + size))
     moves = [
-        sensor[model.outputs.index(name)] if name in model.outputs else 1e-3 * (1.0 + abs(x))
-        for name, x in zip(model.states, first.initial_state, strict=True)
+        sensor[model.outputs.index(base)] if base in model.outputs else 1e-3 * (1.0 + abs(x))
+        for base, x in (
+            (name.removeprefix("gust_"), first.initial_state[model.states.index(name)]) for name in model.driven_states
+        )
     ]
     return np.asarray(np.log(np.concatenate([np.array(moves) / np.sqrt(first.step), sensor])))
+
+
+def _driven(model: Model) -> tuple[int, ...]:
+    """Indices of the states that process noise moves."""
+    return tuple(model.states.index(name) for name in model.driven_states)

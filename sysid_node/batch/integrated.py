@@ -12,6 +12,7 @@ from sysid_node.batch.equation_error import equation_error
 from sysid_node.batch.filter_error import filter_error, predict_filter
 from sysid_node.batch.manoeuvres import manoeuvre, segments, with_forces_at_cg
 from sysid_node.batch.model import Manoeuvre, Model
+from sysid_node.batch.models.gusts import SOON_FORGOTTEN
 from sysid_node.batch.models.rigid_body import AT_CG, OUTPUTS, STATES, rigid_body
 from sysid_node.batch.output_error import output_error, predict
 from sysid_node.batch.result import Answer, Fit
@@ -42,30 +43,41 @@ class Integrated:
     @classmethod
     def of(cls, method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings) -> Integrated:
         """Raises InputError where the model needs what was not measured."""
-        model, remarks = choose_model(aircraft, records, settings)
+        model, remarks = choose_model(aircraft, records, settings, gusts=method == "filter_error")
         started, remark = _started(model, aircraft, records)
         pieces = tuple(piece for record in records for piece in _pieces(method, model, aircraft, record, settings))
         return cls(method, aircraft, settings, started, pieces, (*remarks, *remark))
 
+    @property
+    def _started_states(self) -> tuple[str, ...]:
+        """States whose initial value is estimated: all but those that forget it within a fraction of a second."""
+        return tuple(name for name in self.model.states if name not in SOON_FORGOTTEN)
+
     def fit(self) -> Fit:
         """The estimation."""
-        estimate = output_error if self.method == "output_error" else filter_error
-        fit = estimate(self.model, self.pieces, initial_states=self.model.states, biases=self.settings.biases)
+        states, biases = self._started_states, self.settings.biases
+        if self.method == "filter_error":
+            fit = filter_error(self.model, self.pieces, initial_states=states, biases=biases, correlated=True)
+        else:
+            fit = output_error(self.model, self.pieces, initial_states=states, biases=biases)
         return replace(fit, answers=_joined(fit.answers), remarks=(*self.remarks, *fit.remarks))
 
     def answers(self, fit: Fit, record: FlightRecord) -> list[Answer]:
         """The fit's answer to another flight: open loop with its own initial states, or one sample ahead."""
         pieces = _pieces(self.method, self.model, self.aircraft, record, self.settings)
-        own = {"initial_states": self.model.states, "biases": self.settings.biases}
+        own = {"initial_states": self._started_states, "biases": self.settings.biases}
         if self.method == "filter_error":
             return _joined(predict_filter(self.model, pieces, fit.values, fit.extras, **own))
         return _joined(predict(self.model, pieces, fit.values, **own))
 
 
 def choose_model(
-    aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings
+    aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings, gusts: bool = False
 ) -> tuple[Model, tuple[str, ...]]:
-    """The rigid-body model that the aircraft file and the measurements allow, and what had to be left out."""
+    """The rigid-body model that the aircraft file and the measurements allow, and what had to be left out.
+
+    ``gusts``: with states for turbulence.
+    """
     remarks = []
     thrust = aircraft.throttle is None or all(record.measured("thrust") for record in records)
     states = settings.states or _possible_states(aircraft, thrust)
@@ -82,7 +94,7 @@ def choose_model(
     candidates = [*(name for name in STATES if name in states), *(a for a, c in _MODELLED_BY.items() if c in modelled)]
     measured = [name for name in candidates if all(record.measured(name) for record in records)]
     outputs = [name for name in measured if name in OUTPUTS]
-    model = rigid_body(aircraft, states, outputs, use_prior=settings.use_prior, thrust=needs_thrust)
+    model = rigid_body(aircraft, states, outputs, use_prior=settings.use_prior, thrust=needs_thrust, gusts=gusts)
     lost = [name for name in states if name not in outputs]
     if lost:
         remarks.append(f"{', '.join(lost)} not measured: known through the other outputs alone")

@@ -19,12 +19,12 @@ from sysid_node.batch.rollout import output, rk4_step
 _DOUBLINGS = 16
 
 
-def steady_covariance(transition: jax.Array, observation: jax.Array, q: jax.Array, r: jax.Array) -> jax.Array:
+def steady_covariance(transition: jax.Array, observation: jax.Array, Q: jax.Array, r: jax.Array) -> jax.Array:
     """Steady covariance (nx, nx) of the predicted state.
 
     Solves P = F (P - P C' (C P C' + R)^-1 C P) F' + Q by structure-preserving doubling (Anderson, Int. J. Control 28,
-    1978), which is smooth in F ``transition`` (nx, nx), C ``observation`` (ny, nx) and the variances ``q`` (nx,) and
-    ``r`` (ny,) on the diagonals of Q and R.
+    1978), which is smooth in F ``transition`` (nx, nx), C ``observation`` (ny, nx), ``Q`` (nx, nx) and the variances
+    ``r`` (ny,) on the diagonal of R.
     """
     identity = jnp.eye(transition.shape[0])
 
@@ -34,7 +34,7 @@ def steady_covariance(transition: jax.Array, observation: jax.Array, q: jax.Arra
         return a @ inverse @ a, g + a @ inverse @ g @ a.T, h + a.T @ h @ inverse @ a
 
     information = observation.T @ (observation / r[:, None])
-    h: jax.Array = jax.lax.fori_loop(0, _DOUBLINGS, double, (transition.T, information, jnp.diag(q)))[2]
+    h: jax.Array = jax.lax.fori_loop(0, _DOUBLINGS, double, (transition.T, information, Q))[2]
     return 0.5 * (h + h.T)
 
 
@@ -84,7 +84,12 @@ def innovation_variance(
 def _linearised(
     dynamics: Dynamics, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    """Steady covariance of the predicted state, and the observation matrix, about one flight condition."""
-    transition = jax.jacfwd(partial(rk4_step, dynamics))(x, u, u, dt, theta)
+    """Steady covariance of the predicted state, and the observation matrix, about one flight condition.
+
+    Noise acts all the time: what it does to the state by the end of a step is integrated over it by Simpson's rule.
+    """
+    move = jax.jacfwd(partial(rk4_step, dynamics))
+    half, whole = move(x, u, u, 0.5 * dt, theta), move(x, u, u, dt, theta)
     observation = jax.jacfwd(partial(output, dynamics))(x, u, theta)
-    return steady_covariance(transition, observation, q * dt, r), observation
+    Q = dt / 6.0 * (jnp.diag(q) + 4.0 * (half * q) @ half.T + (whole * q) @ whole.T)
+    return steady_covariance(whole, observation, Q, r), observation

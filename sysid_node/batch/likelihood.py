@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from sysid_node.batch.result import Answer
@@ -19,16 +20,17 @@ from sysid_node.batch.unknowns import Priors, Unknowns
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
-#: Converged once a whole round moves no unknown by more than this share of its standard error.
-TOLERANCE = 1e-3
-
 
 @dataclass(frozen=True)
 class Search:
-    """How long to look: rounds of noise relaxation, and model evaluations within each."""
+    """How long to look: rounds of noise relaxation, and model evaluations within each.
+
+    Converged once a whole round moves no unknown by more than ``tolerance`` of its standard error.
+    """
 
     rounds: int = 60
     evaluations: int = 50
+    tolerance: float = 1e-3
 
 
 DEFAULT_SEARCH = Search()
@@ -64,21 +66,24 @@ class Problem(ABC):
         return self.unknowns.priors()
 
     def noise(self, z: Array) -> Array:
-        """Standard deviation (ny,) of each output's residuals; at least a rounding error of the output's size."""
+        """Lower Cholesky factor (ny, ny) of the residuals' covariance: here independent outputs.
+
+        No output's noise is taken to be below a rounding error of its size.
+        """
         answers = self.answers(z)
         residuals = np.concatenate([answer.residuals for answer in answers])
         size = np.nanmax(np.abs(np.concatenate([answer.measured for answer in answers])), axis=0, initial=0.0)
-        return np.asarray(np.maximum(np.sqrt(np.nanmean(residuals**2, axis=0)), 1e-12 * (1.0 + size)))
+        return np.diag(np.maximum(np.sqrt(np.nanmean(residuals**2, axis=0)), 1e-12 * (1.0 + size)))
 
     def weighted(self, z: Array, noise: Array) -> tuple[list[Array], list[Array]]:
         """Residuals (N, ny), zero where nothing was measured, and sensitivities (N, ny, n), in units of the noise."""
-        residuals = [np.nan_to_num(answer.residuals / noise, nan=0.0) for answer in self.answers(z)]
-        return residuals, [block / noise[None, :, None] for block in self.sensitivities(z)]
+        residuals = [whitened(np.nan_to_num(answer.residuals, nan=0.0), noise) for answer in self.answers(z)]
+        return residuals, [whitened(block, noise) for block in self.sensitivities(z)]
 
     def residuals(self, z: Array, noise: Array) -> Array:
         """Measured minus modelled in units of the noise, zero where nothing was measured, then the priors."""
         index, mean, sigma = self.priors()
-        parts = [np.nan_to_num(answer.residuals / noise, nan=0.0).ravel() for answer in self.answers(z)]
+        parts = [whitened(np.nan_to_num(answer.residuals, nan=0.0), noise).ravel() for answer in self.answers(z)]
         return np.concatenate([*parts, (mean - z[index]) / sigma])
 
     def jacobian(self, z: Array, noise: Array) -> Array:
@@ -86,7 +91,7 @@ class Problem(ABC):
         index, _, sigma = self.priors()
         prior = np.zeros((index.size, z.size))
         prior[np.arange(index.size), index] = -1.0 / sigma
-        parts = [(block / -noise[None, :, None]).reshape(-1, z.size) for block in self.sensitivities(z)]
+        parts = [-whitened(block, noise).reshape(-1, z.size) for block in self.sensitivities(z)]
         return np.concatenate([*parts, prior])
 
     def check(self, z: Array) -> None:
@@ -108,6 +113,14 @@ class Problem(ABC):
                 )
 
 
+def whitened(rows: Array, noise: Array) -> Array:
+    """``rows`` (N, ny, ...) in units of the noise (ny, ny): its inverse applied to the second axis."""
+    if not np.any(np.tril(noise, -1)):
+        return np.asarray(rows / np.diag(noise).reshape(1, -1, *(1,) * (rows.ndim - 2)))
+    inverse = solve_triangular(noise, np.eye(len(noise)), lower=True)
+    return np.asarray(np.moveaxis(np.tensordot(inverse, rows, axes=(1, 1)), 0, 1))
+
+
 def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
     """The unknowns of maximum likelihood, the rounds it took, and a complaint where it did not converge."""
     z = problem.start()
@@ -118,7 +131,7 @@ def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
         z = weighted_least_squares(problem, z, np.arange(z.size), noise, search.evaluations)
         # |J dz| bounds every |dz_i| over its standard error
         moved = float(np.linalg.norm(problem.jacobian(z, noise) @ (z - previous)))
-        if moved < TOLERANCE:
+        if moved < search.tolerance:
             return z, iteration, ""
     return (
         z,

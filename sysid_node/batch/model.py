@@ -76,6 +76,7 @@ class Model:
     derivative: Equations
     output: Equations
     units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
+    driven: tuple[str, ...] | None = None  # the states that process noise moves; None: all of them
 
     def __post_init__(self) -> None:
         for kind in ("states", "inputs", "outputs", "names"):
@@ -93,6 +94,11 @@ class Model:
     def names(self) -> tuple[str, ...]:
         """Parameter names in the order of theta."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def driven_states(self) -> tuple[str, ...]:
+        """The states that process noise moves."""
+        return self.states if self.driven is None else self.driven
 
     @property
     def start(self) -> Array:

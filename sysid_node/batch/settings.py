@@ -18,7 +18,7 @@ class Settings:
 
     frequencies: Frequencies = DEFAULT_FREQUENCIES  # Hz: first line, step, last line (frequency_equation_error)
     low_pass: float = DEFAULT_LOWPASS  # Hz: what is above is left out; 0 = nothing (equation_error)
-    rate: float = 50.0  # Hz: faster measurements are averaged down to it; 0 = none (output_error, filter_error)
+    rate: float = 100.0  # Hz: faster measurements are averaged down to it; 0 = none (output_error, filter_error)
     segment: float = 10.0  # s: flights are cut into pieces this long, each with its own initial state; 0 = whole
     states: tuple[str, ...] = ()  # to be integrated; the others count as measured. Empty: what the model allows
     biases: tuple[str, ...] = ()  # outputs whose bias is estimated for each piece

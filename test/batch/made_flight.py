@@ -75,4 +75,4 @@ def flight(seed: int, scale: float = 1.0, **kwargs: float) -> FlightRecord:
 
 def scores(estimates) -> np.ndarray:  # type: ignore[no-untyped-def]
     """Errors in standard errors."""
-    return np.array([(e.value - TRUTH[name]) / e.standard_error for name, e in estimates.items()])
+    return np.array([(e.value - TRUTH[name]) / e.standard_error for name, e in estimates.items() if name in TRUTH])

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.model import Model, Scalars
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
+from sysid_node.batch.models.gusts import DRIVEN, air_relative, gust_parameters, gust_rates, gust_states
 from sysid_node.batch.models.kinematics import at_probe, attitude_rates, flow_rates
 from sysid_node.errors import InputError
 
@@ -61,13 +62,15 @@ def rigid_body(
     use_prior: bool = False,
     reference_rates: bool = False,
     thrust: bool = True,
+    gusts: bool = False,
 ) -> Model:
     """A model of the aircraft file's derivatives with these states and outputs.
 
     Inputs are the remaining states, the aircraft's controls, ``rho`` (kg/m^3), ``thrust`` (N; left out, and taken as
     zero, where not ``thrust``) and the specific forces at the CG (m/s^2) that no coefficient models. Outputs ax, ay, az
     are those of the IMU where it sits, V, alpha and beta those of the air-data probe. ``use_prior``: the aircraft
-    file's tolerances count. Raises InputError on unknown names and on states whose coefficient has no derivatives.
+    file's tolerances count. ``gusts`` adds the states of module ``gusts``: V, alpha and beta are then those of the path
+    through the mean air. Raises InputError on unknown names and on states whose coefficient has no derivatives.
     """
     modelled = _coefficients_needed(aircraft, states)
     parameters = derivative_parameters(aircraft, modelled, use_prior)
@@ -79,16 +82,19 @@ def rigid_body(
     unknown = [name for name in outputs if name not in OUTPUTS]
     if unknown:
         raise InputError(f"outputs {', '.join(unknown)} are not known; known: {', '.join(OUTPUTS)}")
-    motion = _Motion(aircraft, tuple(states), inputs, names, reference_rates)
+    all_states = (*states, *(gust_states(states) if gusts else ()))
+    turning = gust_parameters(all_states)
+    motion = _Motion(aircraft, all_states, inputs, (names, tuple(p.name for p in turning)), reference_rates)
     return Model(
         name="rigid_body",
-        states=tuple(states),
+        states=all_states,
         inputs=inputs,
         outputs=tuple(outputs),
-        parameters=parameters,
+        parameters=(*parameters, *turning),
         derivative=motion.derivative,
         output=lambda x, u, theta: motion.output(outputs, x, u, theta),
         units=dict(OUTPUTS),
+        driven=tuple(name for name in all_states if name in DRIVEN) if gusts else None,
     )
 
 
@@ -129,35 +135,42 @@ class _Motion:
         aircraft: Aircraft,
         states: tuple[str, ...],
         inputs: tuple[str, ...],
-        names: tuple[str, ...],
+        names: tuple[tuple[str, ...], tuple[str, ...]],
         reference_rates: bool,
     ) -> None:
+        """``names`` of the derivatives, then of the gusts' parameters: together the order of theta."""
         self.aircraft = aircraft
         self.states = states
         self.inputs = inputs
-        self.coefficients = coefficient_function(aircraft, names, reference_rates)
+        self.names, self.turning = names
+        self._coefficients = coefficient_function(aircraft, self.names, reference_rates)
 
     def derivative(self, x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
         """Derivatives of the states."""
-        s = self._signals(x, u)
-        coefficients = self.coefficients(s, theta)
-        rates = {**flow_rates(s, self._specific_force(s, coefficients)), **attitude_rates(s)}
-        rates |= self._angular(s, coefficients)
+        s, air, coefficients = self._flow(x, u, theta)
+        rates = {**flow_rates(s, self._specific_force(air, coefficients)), **attitude_rates(s)}
+        rates |= self._angular(s, air, coefficients) | gust_rates(s, self.aircraft.geometry.b)
         return tuple(rates[name] for name in self.states)
 
     def output(self, outputs: Sequence[str], x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
         """Measured quantities."""
-        s = self._signals(x, u)
-        coefficients = self.coefficients(s, theta)
-        angular = self._angular(s, coefficients)
+        s, air, coefficients = self._flow(x, u, theta)
+        angular = self._angular(s, air, coefficients)
         values = {**s, **{f"{name}dot": value for name, value in angular.items()}}
-        values |= self._at_imu(s, self._specific_force(s, coefficients), angular)
-        values |= at_probe(self.aircraft.sensors.air_data, s)
+        values |= self._at_imu(s, self._specific_force(air, coefficients), angular)
+        values |= {name: air[name] for name in ("V", "alpha", "beta")}
+        values |= at_probe(self.aircraft.sensors.air_data, air)
         return tuple(values[name] for name in outputs)
 
-    def _signals(self, x: Scalars, u: Scalars) -> dict[str, jax.Array]:
+    def _flow(
+        self, x: Scalars, u: Scalars, theta: Scalars
+    ) -> tuple[dict[str, jax.Array], dict[str, jax.Array], dict[str, jax.Array]]:
+        """All signals, the same relative to the gusting air, and the coefficients that follow."""
         values = dict(zip(self.states, x, strict=True)) | dict(zip(self.inputs, u, strict=True))
-        return {"thrust": jnp.zeros_like(u[0])} | values
+        count = len(self.names)
+        s = {"thrust": jnp.zeros_like(u[0])} | values | dict(zip(self.turning, theta[count:], strict=True))
+        air = air_relative(s, self.aircraft.geometry.b)
+        return s, air, self._coefficients(air, theta[:count])
 
     def _specific_force(self, s: Signals, c: Mapping[str, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
         """At the CG, body axes: modelled where there is a coefficient, else as measured.
@@ -174,10 +187,10 @@ class _Motion:
         side = per_coefficient * c["CY"] if "CY" in c else s["ay_cg"]
         return along * ca - down * sa, side, along * sa + down * ca
 
-    def _angular(self, s: Signals, c: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
+    def _angular(self, s: Signals, air: Signals, c: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
         """Angular accelerations of the axes whose moments are modelled."""
         a, inertia = self.aircraft, self.aircraft.inertia
-        pressure = 0.5 * s["rho"] * s["V"] ** 2 * a.geometry.S
+        pressure = 0.5 * air["rho"] * air["V"] ** 2 * a.geometry.S
         Ixx, Iyy, Izz, Ixz = inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz
         rates: dict[str, jax.Array] = {}
         if "Cm" in c:
