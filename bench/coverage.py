@@ -22,7 +22,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.settings import Settings
 
 AIRCRAFT = "cdrw"
-TIMES = np.array([5.0, 15.0, 60.0])  # s
+TIMES = np.array([5.01, 15.01, 59.99])  # s
 SETTINGS = (
     Setting("white noise", autopilot=False),
     Setting("light turbulence", "light", autopilot=False),

@@ -20,6 +20,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online import information, regression, signals, transform
 from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
+from sysid_node.online.prior import beliefs
 from sysid_node.online.renewal import RENEWAL, begin_segment, finish_segment, renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import NUISANCES, OUTPUTS, Layout
@@ -57,6 +58,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         lowest=_lowest(len(aircraft.controls)),
         signals=signals.scalar_signals(aircraft),
         momentum=signals.momentum_gain(aircraft),
+        believed=beliefs(aircraft, plan)[0],
         auxiliary=auxiliary_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * RENEWAL),
         memory=memory,
@@ -102,6 +104,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     transform.add(state.transform, previous[0], time, area, slant)
     state.samples += 1
     state.intervals += sample[INTERVAL]
+    state.recent.append(now[1])
 
 
 def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[float]:

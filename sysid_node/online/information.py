@@ -19,7 +19,7 @@ band of lines: with the residual's density in each band it gives the covariance 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online.auxiliary import Auxiliary, with_instruments
 from sysid_node.online.signals import OFFSET, Layout
+from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
@@ -44,9 +45,8 @@ class Information:
     energy: float  # s: integral of the window squared: the duration, where nothing is forgotten
     bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
     integrals: Array  # (T,) of the transformed signals over time
-    motion: Array  # (T,) integral of the signals' squares, about their means
-    bursts: Array  # (T,) integral of the square of that motion's power
     samples: float
+    uneven: Unevenness = field(default_factory=Unevenness)
 
     def __add__(self, other: Information) -> Information:
         return Information(*(getattr(self, f) + getattr(other, f) for f in self.__dataclass_fields__))
@@ -61,7 +61,7 @@ def nothing(layout: Layout) -> Information:
     width = layout.width
     zeros = np.zeros((BANDS, width, width))
     bias, none = np.zeros((width, width)), np.zeros(layout.transformed)
-    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, none, none, 0.0)
+    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, 0.0)
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def products(transform: Array, model: Auxiliary | None) -> Array:
 
 
 def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
-    """What the transform (2F + 1, T) of begin..end (s) says; ``bias``, ``motion``, ``bursts``, ``samples``: zero."""
+    """What the transform (2F + 1, T) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
     F = lines.omega.size
     clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)
@@ -186,5 +186,4 @@ def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: f
         traces[band] = left[rows].sum()
     square = float(np.vdot(covariance, covariance))
     energy = window_energy(end - begin, lines.rate)
-    bias, none = np.zeros((W, W)), np.zeros(transform.shape[1])
-    return Information(grams, scores, traces, square, energy, bias, transform[-1].copy(), none, none, 0.0)
+    return Information(grams, scores, traces, square, energy, np.zeros((W, W)), transform[-1].copy(), 0.0)

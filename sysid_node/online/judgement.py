@@ -15,7 +15,7 @@ from sysid_node.online.state import Grounds, Renewed, State
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-ENOUGH_FREEDOM = 6.0  # degrees of freedom under which an interval is not trusted
+ENOUGH_FREEDOM = 5.0  # degrees of freedom under which an interval is not trusted
 HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apart at all
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
 STALE = 0.5  # s without a new sample
@@ -28,7 +28,7 @@ def grounds(state: State, renewed: Renewed) -> Grounds:
     """What the judgement of all estimates rests on until the next renewal."""
     table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
     start, _, stop = state.model.settings.frequencies
-    # one weak instrument, and its whole equation is solved by least squares, which gusts may bias
+    # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
     firm = (np.where(plan.mine > 0.0, renewed.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
     sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost)[table.coefficient]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset

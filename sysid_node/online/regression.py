@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv, dposv
 from scipy.special import stdtrit
 
+from sysid_node.online import unevenness
 from sysid_node.online.information import BANDS, Information
 from sysid_node.online.signals import Layout
 
@@ -23,7 +24,7 @@ Index = NDArray[np.intp]
 #: Weight of the mean density, in degrees of freedom, when the residual's density in one band is estimated.
 BAND_PRIOR = 8.0
 #: F statistic of an instrument under which estimates that rest on it are not to be trusted.
-STRONG = 15.0
+STRONG = 25.0
 #: Energy under which a regressor has not moved at all.
 TINY = 1e-18
 #: Share of its energy by which a regressor is set apart from others where their equations are singular.
@@ -186,12 +187,8 @@ class Uncertainty:
     freedom: Array  # (C,) degrees of freedom
 
 
-def uncertainty(plan: Plan, solution: Solution, info: Information, scale_variance: Array) -> Uncertainty:
-    """Sandwich covariance with the residual's spectral density estimated in each band.
-
-    ``scale_variance`` (C,): of an error that scales all derivatives of a coefficient alike. Noise in the airspeed makes
-    one: it multiplies the motion, so it is there when the motion is, which a stationary density does not know.
-    """
+def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertainty:
+    """Sandwich covariance with the residual's density estimated in each band, and with noise that comes and goes."""
     C, P = len(plan.coefficients), plan.columns.size
     if not solution.usable or info.trace_square <= 0.0:
         return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
@@ -207,8 +204,8 @@ def uncertainty(plan: Plan, solution: Solution, info: Information, scale_varianc
     share = expected * (freedom / whole)[:, None]
     bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
     middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
+    middle += unevenness.excess(info.uneven, scores.sum(axis=0), plan.same, density)
     covariance = solution.inverse @ middle @ solution.inverse.T
-    covariance += scale_variance[:, None, None] * (solution.theta.T[:, :, None] * solution.theta.T[:, None, :])
     covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
     return Uncertainty(covariance, density, bands, freedom)
 

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import change, information, noise, regression, timing, transform
+from sysid_node.online import change, information, noise, regression, timing, transform, unevenness
 from sysid_node.online.change import PIECE, Reference, Watch
 from sysid_node.online.information import Information
 from sysid_node.online.state import Renewed, State
+from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 RENEWAL = PIECE  # s of data between renewals
@@ -22,7 +23,7 @@ def renew(state: State) -> None:
     time = state.transform.last
     lines = transform.current(state.transform)
     _watch_piece(state, lines)
-    _weigh_piece(state, lines)
+    _weigh_piece(state)
     renewed = _solve_all(state, _measure_segment(state, lines))
     if state.model.settings.detect_changes:
         _look_for_changes(state, renewed, lines)
@@ -36,13 +37,13 @@ def renew(state: State) -> None:
 def begin_segment(state: State, lines: Array, time: float) -> None:
     """Begin a segment and a piece of the watch at ``time`` (s), where the transform is ``lines``."""
     state.segment, state.segment_start, state.samples, state.intervals = lines, time, 0, 0.0
-    state.motion = state.bursts = 0.0
+    state.uneven = Unevenness()
     _begin_piece(state, lines, time)
 
 
 def _begin_piece(state: State, lines: Array, time: float) -> None:
     state.piece, state.piece_start, state.renew_at = lines, time, time + RENEWAL
-    state.piece_energy = transform.energy(state.transform)
+    state.recent.clear()
 
 
 def _fading(state: State, since: float) -> float:
@@ -57,17 +58,20 @@ def _watch_piece(state: State, lines: Array) -> None:
         state.watch.pieces.append((state.piece_start, piece))
 
 
-def _weigh_piece(state: State, lines: Array) -> None:
-    """Count the piece's motion about the segment's mean: noise in the airspeed weighs where the motion is."""
+def _weigh_piece(state: State) -> None:
+    """Count how unevenly the piece's noise comes."""
     duration = state.transform.last - state.piece_start
-    if duration <= 0.0:
+    if duration <= 0.0 or not state.recent:
         return
-    span = state.transform.last - state.segment_start
-    mean = (lines[-1] - state.segment[-1] * _fading(state, state.segment_start)) / span
-    piece = lines[-1] - state.piece[-1] * _fading(state, state.piece_start)
-    motion = transform.energy(state.transform) - state.piece_energy - 2.0 * mean * piece + mean**2 * duration
-    state.motion = state.motion + motion
-    state.bursts = state.bursts + motion**2 / duration
+    pieces, every = state.watch.pieces, state.intervals / max(state.samples, 1)
+    # about the mean of the last seconds, as slower motion is not in the lines
+    mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (state.transform.last - pieces[0][0])
+    model, rows = state.model, np.array(state.recent)
+    boxes = max(round(2.0 * model.settings.frequencies[2] * duration), 1)
+    piece = unevenness.measure(
+        model.aircraft, model.layout, model.plan, model.believed, rows, mean, duration, every, boxes
+    )
+    state.uneven = state.uneven + piece
 
 
 def _measure_segment(state: State, lines: Array) -> Information:
@@ -82,8 +86,7 @@ def _measure_segment(state: State, lines: Array) -> Information:
         model.aircraft, model.layout, mean, (end - begin) / samples, state.intervals / samples
     )
     info.bias = _line_seconds(state, info) * per_line_second
-    info.motion, info.bursts = info.motion + state.motion, info.bursts + state.bursts
-    info.samples = float(state.samples)
+    info.samples, info.uneven = float(state.samples), state.uneven
     state.present = info
     return info
 
@@ -121,7 +124,7 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     solution = regression.solve(plan, gram, compensation)
     if compensation is not None and not solution.usable:
         solution, compensation = regression.solve(plan, gram), None
-    spread = regression.uncertainty(plan, solution, total, _scale_variance(state, total))
+    spread = regression.uncertainty(plan, solution, total)
     scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
     variance = spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
@@ -135,17 +138,6 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     state.renewed = renewed
     state.watch.references.append(Reference(state.transform.last, solution, spread, strength))
     return renewed
-
-
-def _scale_variance(state: State, total: Information) -> Array:
-    """(C,) variance of the common scale error that the airspeed's noise gives to a coefficient's derivatives."""
-    model = state.model
-    outputs = model.plan.outputs
-    interval = state.intervals / max(state.samples, 1)
-    relative = (2.0 * model.aircraft.noise["airspeed"] / model.aircraft.reference.airspeed) ** 2 * interval
-    motion = np.maximum(total.motion[outputs], 1e-100)
-    variance: Array = np.minimum(relative * total.bursts[outputs] / motion**2, 1.0)
-    return variance
 
 
 def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
@@ -165,7 +157,7 @@ def _begin_anew(state: State, lines: Array, since: float) -> None:
     # what is counted of the present segment is taken as even over its time
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
-    state.motion, state.bursts = state.motion * share, state.bursts * share
+    state.uneven = state.uneven * share
     state.past = information.nothing(state.model.layout)
     state.inside.clear()
     state.segment, state.segment_start = lines - np.sum(kept, axis=0), since

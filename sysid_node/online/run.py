@@ -85,6 +85,7 @@ class _Chunk:
     powerless: NDArray[np.bool_]  # (N,) samples without a thrust
     time: Array  # (n,)
     begins: Array  # (n,) start of the interval; NaN where none leads to the sample
+    values: Array  # (n, T) signals
     areas: Array  # (n, T), see ``transform``
     slants: Array  # (n, T)
     kernels: Array  # (n, 2, rows)
@@ -103,7 +104,7 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     if not time.size:
         empty = np.empty((0, state.model.layout.transformed))
         kernels = np.empty((0, 2, grid.rows))
-        return _Chunk(given, kept, missing, powerless, time, time, empty, empty, kernels, time, state.previous)
+        return _Chunk(given, kept, missing, powerless, time, time, empty, empty, empty, kernels, time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -121,7 +122,7 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     kernels = transform.weights_of_many(grid, begins + 0.5 * steps, steps)
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
     intervals = columns[estimator.INTERVAL]
-    return _Chunk(given, kept, missing, powerless, time, begins, areas, slants, kernels, intervals, last)
+    return _Chunk(given, kept, missing, powerless, time, begins, values, areas, slants, kernels, intervals, last)
 
 
 def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.bool_]]:
@@ -200,6 +201,7 @@ def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: de
         if last < stop:
             _want(results, stops, last)
     state.samples += stop - begin
+    state.recent.extend(chunk.values[begin:stop])
     # one after the other, as ``update`` adds them
     state.intervals = float(np.cumsum(np.append(state.intervals, chunk.intervals[begin:stop]))[-1])
     return stop

@@ -19,6 +19,7 @@ from sysid_node.online.signals import Layout, MomentumGain, ScalarSignals
 from sysid_node.online.table import Table
 from sysid_node.online.timing import Timing
 from sysid_node.online.transform import Transform
+from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ class Model:
     lowest: tuple[float, ...]  # what each value of a sample must lie above
     signals: ScalarSignals
     momentum: MomentumGain
+    believed: Array  # (P, C) the aircraft file's derivatives
     auxiliary: Auxiliary | None  # what makes instruments, where the method wants them
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
@@ -83,9 +85,8 @@ class State:
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
-    piece_energy: Array = field(default_factory=lambda: np.empty(0))  # integral of the squares at the piece's start
-    motion: Array | float = 0.0  # see ``Information``, of the present segment
-    bursts: Array | float = 0.0
+    recent: list[Array] = field(default_factory=list)  # (T,) signals of the piece's samples
+    uneven: Unevenness = field(default_factory=Unevenness)  # of the present segment
     renew_at: float = math.inf
     previous: tuple[float, Array, tuple[float, ...]] | None = None  # time, signals, (p, q, r, ca, sa)
     begin: float = math.nan  # time from which samples count

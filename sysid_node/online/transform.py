@@ -137,8 +137,6 @@ class Transform:
     done: Array  # (rows, width) at ``base``
     kernels: Array  # (BLOCK, 2, rows) weights of the unfinished block
     values: Array  # (BLOCK, 2, width) areas and slants
-    steps: Array  # (BLOCK,) s
-    squares: Array  # (width,) integral of the signals squared over the finished blocks; does not fade
     count: int = 0  # samples in the unfinished block
     base: float = 0.0  # s: time to which ``done`` has decayed
     last: float = 0.0  # s: end of the last interval
@@ -147,7 +145,7 @@ class Transform:
 def start(grid: Lines, width: int, memory: float = math.inf) -> Transform:
     """Empty transform of ``width`` signals."""
     done, values = np.zeros((grid.rows, width)), np.zeros((BLOCK, 2, width))
-    return Transform(grid, width, memory, done, blank_kernels(grid, BLOCK), values, np.ones(BLOCK), np.zeros(width))
+    return Transform(grid, width, memory, done, blank_kernels(grid, BLOCK), values)
 
 
 def add(state: Transform, begin: float, end: float, area: Array, slant: Array) -> None:
@@ -174,7 +172,6 @@ def add_many(state: Transform, kernels: Array, begins: Array, ends: Array, areas
         state.kernels[here] = kernels[there]
         state.values[here, 0] = areas[there]
         state.values[here, 1] = slants[there]
-        state.steps[here] = ends[there] - begins[there]
         state.count += n
         at += n
         if state.count == BLOCK:
@@ -194,7 +191,6 @@ def _append(state: Transform, begin: float, end: float, area: Array, slant: Arra
         kernel[0, -1] = growth
     state.values[i, 0] = area
     state.values[i, 1] = slant
-    state.steps[i] = end - begin
     state.count = i + 1
     state.last = end
     if state.count == BLOCK:
@@ -211,7 +207,6 @@ def _unfinished(state: Transform) -> Array:
 
 def _finish_block(state: Transform) -> None:
     state.done += _unfinished(state)
-    state.squares = energy(state)
     state.count = 0
 
 
@@ -232,10 +227,3 @@ def current(state: Transform) -> Array:
     if math.isfinite(state.memory):
         total *= math.exp((state.base - state.last) / (2.0 * state.memory))
     return np.delete(total, state.grid.padding, axis=0) if state.grid.padding.size else total
-
-
-def energy(state: Transform) -> Array:
-    """(width,) integral of the signals squared up to the last sample, each even over its interval."""
-    n = state.count
-    total: Array = state.squares + (state.values[:n, 0] ** 2 / state.steps[:n, None]).sum(axis=0)
-    return total

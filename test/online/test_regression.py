@@ -121,7 +121,7 @@ def test_impossible_equations_are_not_usable_and_never_raise(plan: Plan, spoiled
         gram = lines.T @ lines
         solution = regression.solve(plan, gram, bias)
     assert not solution.usable
-    spread = regression.uncertainty(plan, solution, information(made(plan)[0], 1.0), np.zeros(len(STRUCTURE)))
+    spread = regression.uncertainty(plan, solution, information(made(plan)[0], 1.0))
     assert not spread.freedom.any()
 
 
@@ -165,7 +165,7 @@ def test_covariance_of_independent_lines_is_the_textbook_one() -> None:
     for density in (1.0, 12.5):
         info = information(lines, density)
         solution = regression.solve(PLAIN, info.grams.sum(axis=0))
-        spread = regression.uncertainty(PLAIN, solution, info, np.zeros(len(STRUCTURE)))
+        spread = regression.uncertainty(PLAIN, solution, info)
         for c in range(len(STRUCTURE)):
             mine = PLAIN.unknowns(c)
             A, y = lines[:, PLAIN.columns[mine]], lines[:, PLAIN.outputs[c]]
@@ -186,22 +186,11 @@ def test_coloured_residuals_count_where_the_regressor_moves() -> None:
     lines[first, PLAIN.outputs[0]] += np.random.default_rng(6).normal(size=ROWS // BANDS)
     info = information(lines, 1.0)
     solution = regression.solve(PLAIN, info.grams.sum(axis=0))
-    spread = regression.uncertainty(PLAIN, solution, info, np.zeros(len(STRUCTURE)))
+    spread = regression.uncertainty(PLAIN, solution, info)
     white = spread.density[0] * solution.inverse.diagonal()
     found = spread.covariance[0].diagonal()
     assert found[0] > 1.5 * white[0]
     assert found[1] < 0.85 * white[1]
-
-
-def test_a_common_scale_error_is_in_the_covariance() -> None:
-    lines, _ = made(PLAIN, 7)
-    info = information(lines, 1.0)
-    solution = regression.solve(PLAIN, info.grams.sum(axis=0))
-    scale = np.linspace(0.0, 0.01, len(STRUCTURE))
-    without, with_it = (regression.uncertainty(PLAIN, solution, info, s).covariance for s in (0.0 * scale, scale))
-    for c in range(len(STRUCTURE)):
-        theta = solution.theta[:, c]
-        np.testing.assert_allclose(with_it[c] - without[c], scale[c] * np.outer(theta, theta), atol=1e-12)
 
 
 def test_strength_is_that_of_the_first_stage() -> None:

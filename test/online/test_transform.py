@@ -163,16 +163,6 @@ def test_many_at_once_are_the_same_bits(memory: float, split: int) -> None:
         intervals = time[:-1][some], time[1:][some]
         transform.add_many(many, kernels[some], *intervals, areas[some], slants[some])
     assert transform.current(single).tobytes() == transform.current(many).tobytes()
-    assert transform.energy(single).tobytes() == transform.energy(many).tobytes()
-
-
-@pytest.mark.parametrize("memory", [math.inf, 2.0])
-def test_the_energy_does_not_fade(memory: float) -> None:
-    """Mean squares of straight lines, less a twelfth of the squared increments: what their means' squares are."""
-    time = irregular(100)
-    x = np.random.default_rng(7).normal(size=(time.size, 2))
-    means = 0.5 * (x[1:] + x[:-1])
-    np.testing.assert_allclose(transform.energy(fed(GRID, time, x, memory)), np.diff(time) @ means**2, rtol=1e-12)
 
 
 def test_phases_are_right_after_ten_hours() -> None:

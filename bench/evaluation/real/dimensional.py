@@ -53,7 +53,7 @@ def regress(
         sides = np.array([x[part] for x in left.values()])
         total = total + _measure(time[part], columns, sides, rates, grid, lines)
     solution = regression.solve(plan, total.grams.sum(axis=0))
-    spread = regression.uncertainty(plan, solution, total, np.zeros(len(left)))
+    spread = regression.uncertainty(plan, solution, total)
     errors = np.sqrt(spread.covariance.diagonal(axis1=1, axis2=2))
     return {
         f"{equation}_{plan.regressors[i]}": Value(float(solution.theta[i, c]), float(errors[c, i]))
