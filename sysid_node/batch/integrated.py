@@ -44,9 +44,14 @@ class Integrated:
     def of(cls, method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings) -> Integrated:
         """Raises InputError where the model needs what was not measured."""
         model, remarks = choose_model(aircraft, records, settings, gusts=method == "filter_error")
-        started, remark = _started(model, aircraft, records)
-        pieces = tuple(piece for record in records for piece in _pieces(method, model, aircraft, record, settings))
-        return cls(method, aircraft, settings, started, pieces, (*remarks, *remark))
+        return cls(method, aircraft, settings, model, (), remarks).on(records)
+
+    def on(self, records: Sequence[FlightRecord]) -> Integrated:
+        """The same model, and so the same compiled program, set up for other flights."""
+        started, remark = _started(self.model, self.aircraft, records)
+        pieces = [_pieces(self.method, started, self.aircraft, record, self.settings) for record in records]
+        flat = tuple(piece for several in pieces for piece in several)
+        return replace(self, model=started, pieces=flat, remarks=(*self.remarks, *remark))
 
     @property
     def _started_states(self) -> tuple[str, ...]:

@@ -2,8 +2,8 @@
 
 Each gust is white noise through a first-order filter, after the Dryden spectra of MIL-F-8785C (1980), sec. 3.7: along
 the path, vertical and lateral (as angles), and rolling. Vertical and lateral gusts that change along the body act
-like a pitching and a yawing motion of the air (frozen turbulence), low-passed by the size of the aircraft. How much of that
-turning there is, the flight must say: it depends on how the gusts lie to the body, and on what the air is like.
+like a pitching and a yawing motion of the air (frozen turbulence), low-passed by the size of the aircraft. How much of
+that turning there is, the flight must say: it depends on how the gusts lie to the body, and on what the air is like.
 """
 
 from __future__ import annotations

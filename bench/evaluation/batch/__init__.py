@@ -1,0 +1,1 @@
+"""Parts of the batch estimators' bench: published analyses, coverage of intervals, the bundled flights."""

@@ -1,0 +1,142 @@
+"""Whether the batch estimators' intervals hold the truth: flights by the hundred, one after the other.
+
+The cropped-delta UAV of the file cdrw, sensors at 50 Hz, closed loop: 3-2-1-1s on each surface, the autopilot holding
+attitude, surfaces measured behind a lag of 0.04 s. Each flight has noise and turbulence of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluation.judging import Verdict, judge
+from evaluation.pages import table
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.batch.identify import identify
+from sysid_node.batch.integrated import Integrated
+from sysid_node.batch.result import Estimate
+from sysid_node.batch.settings import Settings
+from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.flight.record import FlightRecord
+from sysid_node.sim import Simulator
+from sysid_node.sim.atmosphere import air_density
+from sysid_node.sim.layout import OUTPUTS
+from sysid_node.sim.sortie import Conditions, Sortie, fly_sortie
+
+Array = NDArray[np.float64]
+
+RATE = 50.0  # Hz
+SECONDS = 20.0
+AIRCRAFT = load_aircraft("cdrw")
+TRUTH = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
+MANOEUVRES = (
+    "3211:elevator:amplitude=0.06:width=0.3:start=1:every=8:repeat=3",
+    "3211:aileron:amplitude=0.06:width=0.25:start=4:every=8:repeat=2",
+    "3211:rudder:amplitude=0.12:width=0.3:start=6:every=8:repeat=2",
+)
+WHOLE = Settings(segment=0.0)
+LONGITUDINAL = Settings(segment=0.0, states=("V", "alpha", "q", "theta"))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A method in some air; ``rotary``: whether the turbulence turns the air as well as moving it."""
+
+    method: str
+    air: str
+    turbulence: str = "none"
+    rotary: bool = True
+    settings: Settings = WHOLE
+
+
+TRIALS = (
+    Trial("equation_error", "still air"),
+    Trial("frequency_equation_error", "still air"),
+    Trial("output_error", "still air"),
+    Trial("filter_error", "light turbulence, air not turning", "light", False, LONGITUDINAL),
+    Trial("filter_error", "light turbulence", "light", True, LONGITUDINAL),
+    Trial("equation_error", "light turbulence", "light"),
+    Trial("frequency_equation_error", "light turbulence", "light"),
+)
+
+
+@lru_cache
+def _simulator() -> Simulator:
+    return Simulator(AIRCRAFT, RATE)
+
+
+def fly(seed: int, turbulence: str = "none", rotary: bool = True) -> FlightRecord:
+    """One flight as aligned columns."""
+    plan = parse_manoeuvre(MANOEUVRES, AIRCRAFT, RATE, SECONDS)
+    deflections = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])
+    effects = {"actuator_lag": {"time_constant": 0.04}}
+    conditions = Conditions(effects, turbulence=turbulence, seed=seed, rotary_gusts=rotary)
+    return _record(fly_sortie(_simulator(), deflections, conditions), f"flight {seed}")
+
+
+def _record(flown: Sortie, name: str) -> FlightRecord:
+    columns = dict(zip(OUTPUTS, np.asarray(flown.flight.outputs).T, strict=True))
+    surfaces = (*AIRCRAFT.control_symbols, "thrust")
+    columns |= dict(zip(surfaces, np.asarray(flown.flight.surfaces).T, strict=True))
+    columns["rho"] = np.asarray(air_density(-np.asarray(flown.flight.states[:, 2])))
+    return FlightRecord(np.arange(len(columns["V"])) / RATE, columns, name)
+
+
+def estimates(trial: Trial, flights: int) -> dict[str, Array]:
+    """Value, standard error, lower, upper, valid (F, 5) of each derivative; a fit not converged is not valid."""
+    several = [_rows(trial, fly(seed + 1, trial.turbulence, trial.rotary)) for seed in range(flights)]
+    return {name: np.array([rows[name] for rows in several]) for name in TRUTH if name in several[0]}
+
+
+def _rows(trial: Trial, record: FlightRecord) -> dict[str, list[float]]:
+    if trial.method.endswith("equation_error"):
+        fit = identify(trial.method, AIRCRAFT, [record], trial.settings).fit
+    else:
+        fit = _first(trial).on([record]).fit()
+    return {name: _row(e, fit.converged) for name, e in fit.estimates.items() if name in TRUTH}
+
+
+@lru_cache
+def _first(trial: Trial) -> Integrated:
+    """The method set up, so that it compiles only once."""
+    return Integrated.of(trial.method, AIRCRAFT, [fly(1, trial.turbulence, trial.rotary)], trial.settings)
+
+
+def _row(e: Estimate, converged: bool) -> list[float]:
+    return [e.value, e.standard_error, e.lower, e.upper, float(e.valid and converged)]
+
+
+HEADS = ("method", "air", "derivatives", "valid", "coverage %: min", "mean", "max", "outside", "bias / s.e.")
+
+
+def section(trials: Sequence[Trial], flights: int) -> str:
+    """The table, a line a trial."""
+    rows = []
+    for trial in trials:
+        rows.append(_line(trial, {n: judge(e, TRUTH[n]) for n, e in estimates(trial, flights).items()}))
+        print("#", *rows[-1], flush=True)
+    return f"{flights} flights of {SECONDS:g} s each.\n\n{table((*HEADS, 's.e. / scatter', '> 4 s.e. %'), rows)}"
+
+
+def _line(trial: Trial, verdicts: dict[str, Verdict]) -> list[str]:
+    known = {name: v for name, v in verdicts.items() if v.valid > 1}
+    covered = {name: 100 * v.coverage for name, v in known.items()}
+    worst, biased = min(covered, key=covered.__getitem__), max(known, key=lambda n: abs(known[n].bias))
+    spread = [v.spread for v in known.values()]
+    return [
+        trial.method,
+        trial.air,
+        str(len(verdicts)),
+        f"{100 * np.mean([v.share_valid for v in verdicts.values()]):.0f} %",
+        f"{covered[worst]:.1f} ({worst})",
+        f"{np.mean(list(covered.values())):.1f}",
+        f"{max(covered.values()):.1f}",
+        f"{sum(v.off for v in known.values())} of {len(known)}",
+        f"{known[biased].bias:+.2f} ({biased})",
+        f"{min(spread):.2f} to {max(spread):.2f}",
+        f"{100 * sum(v.far for v in known.values()) / sum(v.valid for v in known.values()):.2f}",
+    ]
