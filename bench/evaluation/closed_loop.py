@@ -17,7 +17,7 @@ from sysid_node.control.types import Sensed, SetPoints
 from sysid_node.excite import inflight
 from sysid_node.excite.inflight import Settings as Excitation
 from sysid_node.online.settings import Settings as Estimation
-from sysid_node.ros.beliefs import beliefs_of, has_changed, precision_of
+from sysid_node.ros.beliefs import beliefs_of, precision_of
 from sysid_node.ros.session import Session
 from sysid_node.sim import Simulator, Trim, live, trim_flight
 from sysid_node.sim.live import Air
@@ -122,7 +122,7 @@ def _estimate(session: Session, pilot: controller.State, exciter: inflight.State
     for due in session.imu(stamp, tuple(now.outputs[:6].tolist())):
         controller.hear(pilot, now.time, beliefs_of(due.estimates))
         precision = precision_of(due.estimates, session.aircraft)
-        if inflight.hear(exciter, now.time, precision, has_changed(due.estimates)):
+        if inflight.hear(exciter, now.time, precision):
             session.reset()
 
 

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 GRAVITY = 9.80665
 RATE = 200.0  # Hz, at which the manoeuvre is drawn
-PATIENCE = 2.0  # s of excitation after which estimates that rest on older data are begun anew
+CALM = 1.5  # s of excitation after which estimates are begun anew, when something has changed
 AGAIN = 0.5  # s for which a derivative must be badly known before it is excited again
 EVENTS = 1000  # the last so many are kept
 
@@ -99,7 +99,7 @@ class State:
     missing: tuple[str, ...] = ()  # derivatives not known well enough
     unknown_since: float = math.nan
     armed: bool = False  # watching
-    fresh_from: float = math.nan  # s, from which the estimates' data are
+    spoilt: bool = False  # whether estimates rest on data from before a change
 
     @property
     def active(self) -> bool:
@@ -128,7 +128,7 @@ def start(state: State, time: float) -> None:
     """Begin at a time (s). Raises InputError where it is under way already."""
     if state.active:
         raise InputError("excitation is under way; stop it first")
-    state.begun, state.fresh_from, state.armed = time, time, state.settings.watch
+    state.begun, state.armed = time, state.settings.watch
     _log(state, time, "begun")
 
 
@@ -139,36 +139,29 @@ def stop(state: State, time: float, why: str) -> None:
     state.armed = False
 
 
-def hear(state: State, time: float, precision: Mapping[str, float], changed: bool = False) -> bool:
+def hear(state: State, time: float, precision: Mapping[str, float]) -> bool:
     """Estimates at a time (s): half of each interval over its derivative's size, infinite where it is not valid.
 
-    ``changed``: whoever estimates says that the aircraft has changed, and has forgotten what was before. Returns
-    whether he should be told to: something is no longer known, and he has not noticed through a while of excitation.
+    Returns whether they should be begun anew, once each time that excitation begins again by itself: what is no longer
+    known is of an aircraft that is no more, and the moment of its change, with all that it shook, spoils what follows.
     """
     accuracy = state.settings.accuracy
     state.missing = tuple(n for n in state.settings.derivatives if not precision.get(n, math.inf) <= accuracy)
-    if changed:
-        state.fresh_from = time
     if state.active:
-        if not state.missing:
+        if state.spoilt and time - state.begun >= CALM:
+            state.spoilt = False
+            _log(state, time, "estimates begun anew")
+            return True
+        if not (state.missing or state.spoilt):
             _end(state, time, "known")
-        return _stuck(state, time)
+        return False
     # what was known well enough once need not be better: only what is not known at all is flown for again
     lost = [n for n in state.settings.derivatives if not math.isfinite(precision.get(n, math.inf))]
     state.unknown_since = (time if math.isnan(state.unknown_since) else state.unknown_since) if lost else math.nan
     if state.armed and time - state.unknown_since >= AGAIN:
-        state.begun = time
+        state.begun, state.spoilt = time, True
         _log(state, time, f"begun again: {', '.join(lost)} no longer known")
     return False
-
-
-def _stuck(state: State, time: float) -> bool:
-    """Whether estimates lean on data from long before excitation began; only once for each time that it does."""
-    if not state.active or time - state.begun < PATIENCE or state.fresh_from >= state.begun - PATIENCE:
-        return False
-    state.fresh_from = time
-    _log(state, time, "estimates begun anew")
-    return True
 
 
 def step(state: State, time: float, flight: Flight) -> Array:
@@ -206,6 +199,7 @@ def _danger(state: State, flight: Flight) -> str:
 def _end(state: State, time: float, why: str) -> None:
     _log(state, time, f"{why} after {time - state.begun:.1f} s")
     state.begun = state.unknown_since = math.nan
+    state.spoilt = False
 
 
 def _log(state: State, time: float, text: str) -> None:

@@ -28,8 +28,3 @@ def precision_of(estimates: Estimates, aircraft: Aircraft) -> dict[str, float]:
         size = max(abs(d.value), LEAST_SIZE * abs(aircraft.derivatives[d.name].value))
         found[d.name] = 0.5 * (d.upper - d.lower) / size if d.valid and size > 0.0 else math.inf
     return found
-
-
-def has_changed(estimates: Estimates) -> bool:
-    """Whether the identifier says that the aircraft has just changed."""
-    return any(d.status == "changed" for d in estimates.derivatives.values())
