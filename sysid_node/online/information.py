@@ -70,6 +70,7 @@ class Spectrum:
 
     omega: Array  # (F,) rad/s
     bands: tuple[slice, ...]  # lines of each band
+    order: NDArray[np.intp]  # (2F,) real and imaginary parts of the lines, band after band
     rate: float  # 1/s: decay of the window's energy
     minus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i - omega_j)); 0 where that has no inverse
     plus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i + omega_j))
@@ -93,7 +94,8 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
     minus, plus = (rate - 1j * (omega[:, None] + sign * omega) for sign in (-1.0, 1.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = np.where(np.abs(minus) > 1e-9, 1.0 / minus, 0.0)
-    return Spectrum(omega, bands, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
+    order = np.concatenate([np.r_[part, omega.size + part.start : omega.size + part.stop] for part in bands])
+    return Spectrum(omega, bands, order, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
 
 
 def about_mean(transform: Array, model: Auxiliary | None) -> Array:
@@ -169,7 +171,6 @@ def products(transform: Array, model: Auxiliary | None) -> Array:
 
 def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
     """What the transform (2F + 1, T) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
-    F = lines.omega.size
     clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
@@ -178,8 +179,9 @@ def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: f
     left = covariance.diagonal() - ((n @ inverse2(n.T @ n)) * spread[:, _N]).sum(axis=1)
     W = clean.shape[1]
     grams, scores, traces = np.empty((BANDS, W, W)), np.empty((BANDS, W, W)), np.empty(BANDS)
+    clean, spread, left = clean[lines.order], spread[lines.order], left[lines.order]
     for band, part in enumerate(lines.bands):
-        rows = np.r_[part, F + part.start : F + part.stop]
+        rows = slice(2 * part.start, 2 * part.stop)
         grams[band] = clean[rows].T @ clean[rows]
         score = clean[rows].T @ spread[rows]
         scores[band] = 0.5 * (score + score.T)

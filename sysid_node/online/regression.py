@@ -53,6 +53,7 @@ class Plan:
     counted: Array = field(init=False)  # (P + C, P) 1 where the entry lies in a block
     unit: Array = field(init=False)  # (P, P)
     least_squares: bool = field(init=False)  # whether every regressor is its own instrument
+    kin: dict[tuple[int, ...], Plan] = field(init=False, default_factory=dict, repr=False)  # see ``without``
 
     def __post_init__(self) -> None:
         both = np.concatenate([self.columns, self.outputs])[:, None]
@@ -92,10 +93,16 @@ def plan(structure: dict[str, tuple[str, ...]], layout: Layout) -> Plan:
 
 def trusting(full: Plan, strength: Array) -> Plan:
     """The plan with least squares in the blocks of which an instrument is weak: better biased a little than lost."""
-    weak = [block for block in range(int(full.group.max()) + 1) if (strength[full.group == block] < STRONG).any()]
-    if not weak:
-        return full
-    return replace(full, instruments=np.where(np.isin(full.group, weak), full.columns, full.instruments))
+    weak = full.group[strength < STRONG].tolist()
+    return without(full, tuple(sorted(set(weak)))) if weak else full
+
+
+def without(full: Plan, blocks: tuple[int, ...]) -> Plan:
+    """The plan with least squares in these blocks; made once."""
+    if blocks not in full.kin:
+        own = np.isin(full.group, blocks)
+        full.kin[blocks] = replace(full, instruments=np.where(own, full.columns, full.instruments))
+    return full.kin[blocks]
 
 
 @dataclass
@@ -222,7 +229,7 @@ def strength(plan: Plan, solution: Solution, info: Information) -> Array:
         return np.zeros(plan.columns.size)
     gram = info.grams.sum(axis=0)
     outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
-    plain = solve(replace(plan, instruments=plan.columns), gram)
+    plain = solve(without(plan, tuple(range(int(plan.group.max()) + 1))), gram)
     if not plain.usable:
         return np.zeros(plan.columns.size)
     best = plain.inverse.diagonal()
