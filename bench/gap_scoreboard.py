@@ -16,10 +16,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from evaluation.pages import publish
 from withheld import judging, scoreboard
+from withheld.closing import closed
 from withheld.drawing import SETS, draw
 
 
@@ -31,6 +33,7 @@ def main() -> None:
     parser.add_argument("--plants", nargs="+", help="only cases of these (default: all)")
     parser.add_argument("--kinds", nargs="+", help="only cases of these kinds (default: all)")
     parser.add_argument("--until", help="begin no case after this time of day, HH:MM")
+    parser.add_argument("--fly", action="store_true", help="fly the cases, diagnose nothing yet")
     parser.add_argument("--judge", action="store_true", help="score what is there, fly nothing")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
@@ -42,8 +45,8 @@ def main() -> None:
         if (args.plants and case.plant not in args.plants) or (args.kinds and case.kind not in args.kinds):
             continue
         if not args.judge and not _over(args.until):
-            _finish(args.set, seed, folder)
-        judged += list(_judged(folder, seed))
+            _finish(args.set, seed, folder, fly_only=args.fly)
+        judged += list(_judged(args.set, folder, seed))
     publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged), args.page)
 
 
@@ -51,7 +54,7 @@ def _over(until: str | None) -> bool:
     return until is not None and time.strftime("%H:%M") >= until
 
 
-def _finish(which: str, seed: int, folder: Path) -> None:
+def _finish(which: str, seed: int, folder: Path, *, fly_only: bool) -> None:
     """Flies and diagnoses a case as far as it is not done; a line on how it went."""
     out = folder / str(seed) / "out"
     if (out / "gap.json").exists() or (folder / str(seed) / "failed.txt").exists():
@@ -60,6 +63,8 @@ def _finish(which: str, seed: int, folder: Path) -> None:
         words = [sys.executable, "-m", "withheld.plant", which, str(seed), str(folder)]
         if _run(words, folder, seed, "plant"):
             return
+    if fly_only:
+        return
     case = folder / str(seed)
     bags = [str(case / "fitted"), "--holdout", str(case / "held"), "--aircraft", str(case / "aircraft.yaml")]
     words = [sys.executable, "-m", "sysid_node.cli", "gap", *bags, "--quiet", "--out", str(out)]
@@ -69,7 +74,7 @@ def _finish(which: str, seed: int, folder: Path) -> None:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     (case / "seconds.txt").write_text(f"{seconds:.1f}\n", encoding="utf-8")
-    for judged in _judged(folder, seed):
+    for judged in _judged(which, folder, seed):
         print(seed, judging.line(judged), flush=True)
 
 
@@ -86,12 +91,14 @@ def _run(words: list[str], folder: Path, seed: int, what: str) -> int:
     return 0
 
 
-def _judged(folder: Path, seed: int) -> Iterator[judging.Judged]:
+def _judged(which: str, folder: Path, seed: int) -> Iterator[judging.Judged]:
     """The case as it was judged, where it was diagnosed."""
     found, label = folder / str(seed) / "out" / "gap.json", folder / "labels" / f"{seed}.json"
     if found.exists() and label.exists():
-        said = json.loads(found.read_text(encoding="utf-8"))
-        yield judging.judge(json.loads(label.read_text(encoding="utf-8")), said)
+        truth = json.loads(label.read_text(encoding="utf-8"))
+        judged = judging.judge(truth, json.loads(found.read_text(encoding="utf-8")))
+        named = judged.right and judged.kind in ("one", "two")
+        yield replace(judged, flown=closed(truth, which, folder / str(seed)) if named else None)
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ class Judged:
     sized: bool | None  # all of them within 15 % or within the 95 % interval
     onset: float | None  # s off
     gap: Mapping[str, Any]
+    flown: Mapping[str, float] | None = None  # errors in the plant: before, after, true_effect
 
     @property
     def kind(self) -> str:
@@ -50,8 +51,16 @@ class Judged:
 
     @property
     def closed(self) -> float:
-        """Share of what could be closed on the held-out flight that was."""
+        """Share of what could be closed on the held-out flight that was, as stated."""
         return float(self.gap["shrink_percent"]) / 100.0
+
+    @property
+    def closed_in_plant(self) -> float | None:
+        """The same in the plant, over what the true effect closes there; None where that is next to nothing."""
+        if self.flown is None:
+            return None
+        before, after, best = (self.flown[name] for name in ("before", "after", "true_effect"))
+        return (before - after) / (before - best) if best < 0.95 * before else None
 
 
 def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:

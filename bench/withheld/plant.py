@@ -45,7 +45,7 @@ class Plant:
 
     def __init__(self, case: Case, which: str) -> None:
         self.case, self.root = case, [SETS[which], case.seed]
-        self.truth = _aircraft(case.plant)
+        self.truth = self.flown_by = _aircraft(case.plant)  # what is flown may be put in the truth's place
         self.effects = _in_units(case.effects, self.truth)
 
     def airframe(self, effects: Effects) -> Airframe:
@@ -54,7 +54,7 @@ class Plant:
             from .cessna import Cessna  # noqa: PLC0415  # JSBSim, where it is needed
 
             return Cessna(self.truth, effects, RATE)
-        return Rigid(self.truth, effects, RATE)
+        return Rigid(self.flown_by, effects, RATE)
 
     def fly(self, effects: Effects, which: int) -> Log:
         """The flight that is fitted (0) or held out (1). Raises DivergedError."""

@@ -79,7 +79,10 @@ _SCORES = (
     ("not in the list: unknown_effect", lambda c: [x.right for x in _of_kind(c, "unlisted")], "80 %"),
     ("not in the list: a listed effect blamed above 0.9",
      lambda c: [any(p > BLAMED for p, _ in x.stated) for x in _of_kind(c, "unlisted")], "under 5 %"),
-    ("of those named: 90 % of the closable gap closed", lambda c: [x.closed >= 0.9 for x in _named(c)], "90 %"),
+    ("of those named: 90 % of the closable gap closed, as stated",
+     lambda c: [x.closed >= 0.9 for x in _named(c)], "90 %"),
+    ("of those named: 90 % of what the true effect closes, flown in the plant",
+     lambda c: [x.closed_in_plant >= 0.9 for x in _named(c) if x.closed_in_plant is not None], "90 %"),
 )  # fmt: skip
 
 
