@@ -1,0 +1,91 @@
+"""How much of the gap a diagnosis closes, measured in the plant: the corrected model flown beside the truth.
+
+The held-out flight again, with the same gusts and without noise: once as it was, once with the aircraft file that was
+handed over, once with the corrected file and the effects found. Only for plants that can fly any aircraft file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+
+from .drawing import Case
+from .motion import DivergedError, Effects
+from .plant import RATE, Plant
+
+Array = NDArray[np.float64]
+
+#: Windows, their means left out, in which responses are compared: drift from trim to trim is no dynamics.
+WINDOW_S = 4.0
+
+_READ = (0, 1, 2, 3, 4, 5, 9, 10, 11)  # IMU and air data, without the attitude
+
+
+def closed(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float] | None:
+    """Errors as shares of the motion: ``before``, ``after``, and with the file as it was given and the ``true_effect``.
+
+    None where one cannot be flown. Kept beside the case.
+    """
+    kept = case / "closed.json"
+    if kept.exists():
+        known: dict[str, float] = json.loads(kept.read_text(encoding="utf-8"))
+        return known or None
+    errors = _errors(label, which, case) if label["plant"] != "c172p" else {}
+    kept.write_text(json.dumps(errors), encoding="utf-8")
+    return errors or None
+
+
+def _errors(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float]:
+    fields = {k: v for k, v in label.items() if k in Case.__dataclass_fields__}
+    plant = Plant(Case(**fields), which)
+    truth = _flown(plant, plant.truth, label["effects"])
+    effects = _effects((case / "out" / "effects.txt").read_text(encoding="utf-8"))
+    try:
+        before = _flown(plant, load_aircraft(str(case / "aircraft.yaml")), {})
+        after = _flown(plant, load_aircraft(str(case / "out" / "corrected.yaml")), effects)
+        best = _flown(plant, load_aircraft(str(case / "aircraft.yaml")), label["effects"])
+    except DivergedError:
+        return {}
+    flights = {"before": before, "after": after, "true_effect": best}
+    return {name: _apart(flight, truth) for name, flight in flights.items()}
+
+
+def _flown(plant: Plant, aircraft: Aircraft, effects: Effects) -> Array:
+    """Readings (N, 12) of the held-out flight, were the aircraft this one; the autopilot stays as it is."""
+    other = Plant(plant.case, "development")
+    other.root, other.flown_by = plant.root, replace(aircraft, controls=plant.truth.controls)
+    return other.seen(other.fly(effects, 1), effects)
+
+
+def _apart(model: Array, truth: Array) -> float:
+    """Root-mean-square difference over the motion's own, mean over the readings."""
+    size = round(WINDOW_S * RATE)
+    count = len(truth) // size
+
+    def windows(x: Array) -> Array:
+        parts = x[: count * size, _READ].reshape(count, size, len(_READ))
+        return np.asarray(parts - parts.mean(axis=1, keepdims=True))
+
+    off = np.mean((windows(model) - windows(truth)) ** 2, axis=(0, 1))
+    return float(np.sqrt(np.mean(off / np.mean(windows(truth) ** 2, axis=(0, 1)))))
+
+
+def _effects(text: str) -> dict[str, dict[str, float]]:
+    """Of the lines ``--effect name:key=value:...`` of effects.txt, in the plant's words."""
+    found: dict[str, dict[str, float]] = {}
+    for line in text.splitlines():
+        name, *pairs = line.removeprefix("--effect ").split(":")
+        values = {key: float(value) for key, value in (pair.split("=") for pair in pairs)}
+        if "inverse_rate" in values:
+            values = {"rate": 1.0 / values["inverse_rate"]}
+        found[name] = values
+    return found
