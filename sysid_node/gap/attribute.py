@@ -20,6 +20,7 @@ from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import power_of
+from sysid_node.gap.steps import Steps
 from sysid_node.gap.structure import Structure, instrumented, structure_of
 from sysid_node.gap.view import View
 
@@ -87,23 +88,24 @@ class Attribution:
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
 
 
-def attribute(views: Sequence[View], nuisances: Nuisances, progress: Progress) -> Attribution:
+def attribute(
+    views: Sequence[View], nuisances: Nuisances, progress: Progress, steps: Steps | None = None
+) -> Attribution:
     """Fits everything that has to be, and chooses."""
-    simulator = views[0].simulator
-    candidates = candidates_of(simulator, views)
+    candidates, trier = candidates_of(views[0].simulator, views), Trier(nuisances, steps or Steps())
     progress(0.0, "derivatives within their tolerances")
-    base = _trial(polish(with_candidates(blank(views, nuisances), [], nuisances, [])), None)
+    base = trier.trial(blank(views, nuisances), [])
     chosen, stages = base, []
     for count in range(MOST):
         rest = [c for c in candidates if c.effect not in chosen.fit.effects]
-        trials = stage(chosen, rest, nuisances, _share_of(progress, count))
+        trials = trier.stage(chosen, rest, _share_of(progress, count))
         stages.append(trials)
         better = [t for t in trials if accepted(base, chosen, t)]
         if not better:
             break
         chosen = better[0]
     progress(0.8, "whether another effect would do as well")
-    chosen, places = _refined(base, chosen, stages, nuisances)
+    chosen, places = _refined(trier, base, chosen, stages)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
     causes = tuple(sorted((_cause(chosen, place) for place in places), key=lambda cause: -cause.probability))
     corrected = instrumented(instrumented(chosen.fit))
@@ -115,23 +117,46 @@ def _share_of(progress: Progress, count: int) -> Progress:
     return lambda share, text: progress((count + share) / (MOST + 1.0), text)
 
 
-def stage(current: Trial, candidates: Sequence[Candidate], nuisances: Nuisances, progress: Progress) -> list[Trial]:
-    """The candidates upon what is known so far, the most probable first."""
-    fresh = with_candidates(current.fit, current.fit.candidates, nuisances, ())
-    problem = Projected(fresh, bounded=False)
+@dataclass(frozen=True)
+class Trier:
+    """Fits sets of candidates, the nuisances always along."""
 
-    def look(candidate: Candidate) -> Look:
-        return _first_look(fresh, problem, candidate)
+    nuisances: Nuisances
+    steps: Steps
 
-    def finish(look: Look) -> Trial:
-        _, candidate, start = look
-        fit = with_candidates(current.fit, [*current.fit.candidates, candidate], nuisances, start)
-        return _trial(polish(fit), candidate)
+    def trial(self, fit: Fit, candidates: Sequence[Candidate], look: Look | None = None) -> Trial:
+        """A set of candidates fitted from where another fit stands; what is added to the set starts at its look."""
+        _, added, start = look or (0.0, None, ())
+        wanted = [*candidates, *([added] if added else [])]
+        done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
+        return Trial(done, cross_validated(done), added)
 
-    looked = _spread(look, candidates, lambda s: progress(0.5 * s, "a first look at every effect"))
-    looked.sort(key=lambda look: look[0])
-    trials = _spread(finish, looked[:_POLISHED], lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"))
-    return sorted(trials, key=lambda t: -t.evidence.total)
+    def stage(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Trial]:
+        """The candidates upon what is known so far, the most probable first."""
+        looked = sorted(self._looks(current, candidates, progress), key=lambda look: look[0])[:_POLISHED]
+        kept = current.fit.candidates
+        trials = _spread(
+            lambda look: self.trial(current.fit, kept, look),
+            looked,
+            lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
+        )
+        return sorted(trials, key=lambda t: -t.evidence.total)
+
+    def _looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
+        """A first look at each: what it takes away where the nuisances can do no more."""
+        fresh = with_candidates(current.fit, current.fit.candidates, self.nuisances, ())
+
+        def work() -> dict[str, list[float]]:
+            problem = Projected(fresh)
+            looks = _spread(
+                lambda candidate: _first_look(fresh, problem, candidate),
+                candidates,
+                lambda s: progress(0.5 * s, "a first look at every effect"),
+            )
+            return {candidate.label: [cost, *start] for cost, candidate, start in looks}
+
+        table = self.steps.table(fresh, work)
+        return [(table[c.label][0], c, tuple(table[c.label][1:])) for c in candidates if c.label in table]
 
 
 def _spread(
@@ -171,10 +196,6 @@ def power_left(evidence: Evidence) -> Array:
     return np.asarray(sum(power_of(r) for r in evidence.residuals))
 
 
-def _trial(fit: Fit, added: Candidate | None) -> Trial:
-    return Trial(fit, cross_validated(fit), added)
-
-
 def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
     """The cost that one Gauss-Newton step from the best start leaves, with the weights as they are."""
     if not candidate.indices:
@@ -205,7 +226,7 @@ class Place:
 
 
 def _refined(
-    base: Trial, chosen: Trial, stages: Sequence[list[Trial]], nuisances: Nuisances
+    trier: Trier, base: Trial, chosen: Trial, stages: Sequence[list[Trial]]
 ) -> tuple[Trial, tuple[Place, ...]]:
     """The explanation after every cause has stood against its rivals, given the others.
 
@@ -213,7 +234,7 @@ def _refined(
     """
     pool = list({t.added.label: t.added for trials in stages for t in trials if t.added}.values())
     for _ in range(_SWEEPS):
-        places = tuple(_place(base, chosen, c, stages[0], pool, nuisances) for c in chosen.fit.candidates)
+        places = tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
         better = _replacement(base, chosen, places)
         if better is None:
             break
@@ -222,14 +243,14 @@ def _refined(
 
 
 def _place(
-    base: Trial, chosen: Trial, candidate: Candidate, first: list[Trial], pool: list[Candidate], nuisances: Nuisances
+    trier: Trier, base: Trial, chosen: Trial, candidate: Candidate, first: list[Trial], pool: list[Candidate]
 ) -> Place:
     others = [c for c in chosen.fit.candidates if c is not candidate]
     if not others:
         return Place(candidate, base, tuple(first))
-    without = _trial(polish(with_candidates(chosen.fit, others, nuisances, ())), None)
+    without = trier.trial(chosen.fit, others)
     rest = [c for c in pool if c.effect not in without.fit.effects]
-    return Place(candidate, without, tuple(stage(without, rest, nuisances, lambda s, t: None)))
+    return Place(candidate, without, tuple(trier.stage(without, rest, lambda s, t: None)))
 
 
 def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial | None:

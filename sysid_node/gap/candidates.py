@@ -31,6 +31,9 @@ TIMES = frozenset(
     {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
 )
 
+#: Of these, stamps that may also be early.
+_EITHER_WAY = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
+
 #: Onsets that are tried, as shares of the flight.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
 
@@ -120,7 +123,8 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
     if effect in TIMES:
         name = "delay" if effect.endswith("delay") else "time_constant"
-        yield name, (0.02, 0.07, 0.2)
+        early = (-0.05,) if effect in _EITHER_WAY else ()
+        yield name, (*early, 0.02, 0.07, 0.2)
     if effect == "structural_mode":
         yield "frequency", (3.5, 5.0, 9.0)
     if effect == "ground_effect":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,16 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap import close, localise
-from sysid_node.gap.attribute import Attribution, Cause, Progress, Trial, attribute
+from sysid_node.gap.attribute import NOTICED, Attribution, Cause, Progress, Trial, attribute, power_left
 from sysid_node.gap.close import Gap
+from sysid_node.gap.confusion import Confusion, confusion_of
 from sysid_node.gap.evidence import Evidence, held_out
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.flights import RATE, Flight
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.next_flight import propose
 from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.steps import Steps
 from sysid_node.gap.structure import instrumented
 from sysid_node.gap.view import CHANNELS, View, view_of
 from sysid_node.sim import Simulator
@@ -28,12 +31,12 @@ from sysid_node.sim import Simulator
 _TOLD_APART = 0.8
 
 #: Share of the remainder on some axis that must be structure to matter, and its standard deviations above chance.
-_STRUCTURED, _DEVIATIONS = 0.35, 6.0
+_STRUCTURED, _DEVIATIONS = 0.12, 6.0
 
 #: Standard deviations above chance below which coherence is taken as chance.
 _CHANCE = 4.0
 
-#: Share of the structure that the effects must remove for them to be the explanation.
+#: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
 _EXPLAINED = 0.5
 
 #: A rival with this probability is named.
@@ -67,13 +70,19 @@ class Diagnosis:
     final: Evidence
     next_flight: str
     held_out: bool
+    confusion: Confusion
 
 
 def diagnose(
-    aircraft: Aircraft, flights: Sequence[Flight], holdouts: Sequence[Flight], progress: Progress = lambda s, t: None
+    aircraft: Aircraft,
+    flights: Sequence[Flight],
+    holdouts: Sequence[Flight],
+    progress: Progress = lambda s, t: None,
+    keep: Path | None = None,
 ) -> Diagnosis:
     """Diagnoses flights, and measures the gap on flights held out; without these, by parts of the same flights.
 
+    ``keep``: a folder for finished steps, from which an interrupted diagnosis goes on; empty again at the end.
     Raises InputError: an aircraft file without tolerances or of another aircraft, a held-out flight that is also
     fitted, a flight in which nothing moves.
     """
@@ -82,7 +91,8 @@ def diagnose(
     simulator = Simulator(aircraft, RATE)
     views = [_checked(view_of(simulator, flight)) for flight in flights]
     nuisances = nuisances_of(aircraft, views[0])
-    attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t))
+    steps = Steps.of(keep, views)
+    attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps)
     progress(0.92, "the gap on flight not fitted")
     if holdouts:
         unseen = [_checked(view_of(simulator, flight)) for flight in holdouts]
@@ -94,9 +104,10 @@ def diagnose(
     gap = close.gap_of(unseen, [v.residual(neutral) for v in unseen], base, final, attribution.left)
     verdict = _verdict(views, attribution, base, final)
     found = localise.where(attribution, [v.residual(neutral) for v in views])
+    steps.forget()
     return Diagnosis(
         aircraft, verdict, gap, found, attribution, localise.missing(attribution), tuple(unseen), base, final,
-        _next_flight(verdict, attribution), bool(holdouts),
+        _next_flight(verdict, attribution), bool(holdouts), confusion_of(attribution.base, attribution.trials),
     )  # fmt: skip
 
 
@@ -142,22 +153,37 @@ def _verdict(views: Sequence[View], attribution: Attribution, base: Evidence, fi
         return "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) else "no_gap"
-    if final.total <= base.total or (structured(attribution) and explained(attribution) < _EXPLAINED):
+    if final.total <= base.total or explained(attribution) < _EXPLAINED:
         return "unknown_effect"
     return "explained" if all(c.probability >= _TOLD_APART for c in attribution.causes) else "ambiguous"
 
 
 def structured(attribution: Attribution) -> bool:
     """Whether what is left holds structure that matters."""
-    left = attribution.left
-    return bool(np.any((left.share > _STRUCTURED) & (left.deviations > _DEVIATIONS)))
+    left, size = attribution.left, np.sqrt(_structure_left(attribution))
+    return bool(np.any((left.share > _STRUCTURED) & (left.deviations > _DEVIATIONS) & (size > NOTICED)))
 
 
 def explained(attribution: Attribution) -> float:
-    """Share of the structure, above what derivatives and biases explain, that the effects remove."""
-    before, left = (np.where(s.deviations > _CHANCE, s.coherent, 0.0) for s in (attribution.before, attribution.left))
-    whole = float(before.sum())
-    return float(np.clip(1.0 - left.sum() / whole, 0.0, 1.0)) if whole > 0.0 else float(left.sum() == 0.0)
+    """Share that the effects take away of what lies above the tolerances and is not noise, all channels together."""
+    motion = _motion(attribution.chosen.evidence)
+    gone = (power_left(attribution.base.evidence) - power_left(attribution.chosen.evidence)) / motion
+    taken = max(float(gone.sum()), 0.0)
+    whole = taken + float(_structure_left(attribution).sum())
+    return taken / whole if whole > 0.0 else 1.0
+
+
+def _structure_left(attribution: Attribution) -> Array:
+    """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
+    left, evidence = attribution.left, attribution.chosen.evidence
+    share = np.where(left.deviations > _CHANCE, left.share, 0.0)
+    return np.asarray(share * power_left(evidence) / _motion(evidence))
+
+
+def _motion(evidence: Evidence) -> Array:
+    """Power (12,) of what was measured, about the windows' means."""
+    power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.views)
+    return np.asarray(np.maximum(power, 1e-300))
 
 
 def probability(attribution: Attribution, cause: Cause) -> float:

@@ -191,11 +191,11 @@ def _one_round(fit: Fit) -> Fit:
 class Projected:
     """What is left of the residual at the candidates' parameters when the nuisances do their best.
 
-    ``bounded``: nuisances that would go beyond their limits at the fit's values are put there and stay (an active set,
-    found anew for each linearisation).
+    Nuisances that would go beyond their limits at the fit's values are put there and stay: an active set, found anew
+    for each linearisation.
     """
 
-    def __init__(self, fit: Fit, bounded: bool = True) -> None:
+    def __init__(self, fit: Fit) -> None:
         self.fit, self.weights = fit, [weights(v.windows, p) for v, p in zip(fit.views, fit.power, strict=True)]
         own = list(fit.nuisances.indices)
         blocks = []
@@ -208,8 +208,7 @@ class Projected:
         self.indices = list(fit.indices)
         self.centre, self.sigma = prior(fit.views[0].simulator, fit.indices)
         self._settle(np.ones(self.now.size, bool), np.zeros(self.now.size))
-        if bounded:
-            self._bind(fit.values)
+        self._bind(fit.values)
 
     def _settle(self, free: NDArray[np.bool_], shift: Array) -> None:
         """Which nuisances may move, and how far the others stand from where the residual is taken."""

@@ -1,0 +1,86 @@
+"""Finished steps of a diagnosis, kept in a folder so that one that was interrupted goes on where it stopped.
+
+Each file is named after a digest of all that its content depends on: flights, aircraft, effects and where the fit
+started. A file of another diagnosis is never taken for one of this.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from sysid_node.gap.fit import Fit, linearised, polish
+from sysid_node.gap.view import View
+
+
+@dataclass(frozen=True)
+class Steps:
+    """A folder of finished steps, or None to keep nothing; ``digest`` tells the flights and the aircraft."""
+
+    folder: Path | None = None
+    digest: str = ""
+
+    @classmethod
+    def of(cls, folder: Path | None, views: Sequence[View]) -> Steps:
+        """Those of these flights."""
+        text = hashlib.sha256(repr(views[0].simulator.aircraft).encode())
+        for view in views:
+            text.update(np.ascontiguousarray(view.series).tobytes())
+            text.update(np.ascontiguousarray(view.commands).tobytes())
+        return cls(folder, text.hexdigest())
+
+    def polished(self, fit: Fit) -> Fit:
+        """The fit polished, or as it was when this was done before."""
+        path = self._path("fit", fit)
+        if path is None:
+            return polish(fit)
+        if path.exists():
+            with np.load(path) as kept:
+                points, power = (tuple(kept[f"{n}{i}"] for i in range(len(fit.views))) for n in ("point", "power"))
+            return linearised(replace(fit, points=points, power=power))
+        done = polish(fit)
+        arrays = {f"point{i}": p for i, p in enumerate(done.points)} | {
+            f"power{i}": p for i, p in enumerate(done.power)
+        }
+        partial = path.with_suffix(".part.npz")
+        np.savez(partial, **arrays)  # type: ignore[arg-type]  # NumPy's stubs take the names for options
+        partial.replace(path)
+        return done
+
+    def table(self, fit: Fit, work: Callable[[], dict[str, list[float]]]) -> dict[str, list[float]]:
+        """Numbers by name that were worked out about a fit, or as they were before."""
+        path = self._path("table", fit)
+        if path is None:
+            return work()
+        if path.exists():
+            kept: dict[str, list[float]] = json.loads(path.read_text(encoding="utf-8"))
+            return kept
+        done = work()
+        partial = path.with_suffix(".part")
+        partial.write_text(json.dumps(done), encoding="utf-8")
+        partial.replace(path)
+        return done
+
+    def forget(self) -> None:
+        """Removes the files of this diagnosis, which is finished, and the folder where nothing else is in it."""
+        if self.folder is None or not self.folder.is_dir():
+            return
+        for path in self.folder.glob(f"{self.digest[:12]}-*"):
+            path.unlink()
+        if not any(self.folder.iterdir()):
+            self.folder.rmdir()
+
+    def _path(self, kind: str, fit: Fit) -> Path | None:
+        if self.folder is None:
+            return None
+        self.folder.mkdir(parents=True, exist_ok=True)
+        key = hashlib.sha256((self.digest + kind + "+".join(c.label for c in fit.candidates)).encode())
+        for array in (*fit.points, *fit.power, fit.nuisances.sigma):
+            key.update(np.ascontiguousarray(array).tobytes())
+        suffix = "npz" if kind == "fit" else "json"
+        return self.folder / f"{self.digest[:12]}-{key.hexdigest()[:24]}.{suffix}"
