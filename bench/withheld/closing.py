@@ -61,8 +61,7 @@ def _errors(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float
 
 def _flown(plant: Plant, aircraft: Aircraft, effects: Effects) -> Array:
     """Readings (N, 12) of the held-out flight, were the aircraft this one; the autopilot stays as it is."""
-    other = Plant(plant.case, "development")
-    other.root, other.flown_by = plant.root, replace(aircraft, controls=plant.truth.controls)
+    other = Plant(plant.case, plant.which, replace(aircraft, controls=plant.truth.controls))
     return other.seen(other.fly(effects, 1), effects)
 
 

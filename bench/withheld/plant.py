@@ -43,9 +43,10 @@ _LOW = 100.0
 class Plant:
     """The airframe of a case, with or without its effects, and all that goes with it."""
 
-    def __init__(self, case: Case, which: str) -> None:
-        self.case, self.root = case, [SETS[which], case.seed]
-        self.truth = self.flown_by = _aircraft(case.plant)  # what is flown may be put in the truth's place
+    def __init__(self, case: Case, which: str, flown_by: Aircraft | None = None) -> None:
+        self.case, self.which = case, which
+        self.truth = _aircraft(case.plant)
+        self.flown_by = flown_by or self.truth  # a model may be put in the truth's place
         self.effects = _in_units(case.effects, self.truth)
 
     def airframe(self, effects: Effects) -> Airframe:
@@ -56,12 +57,12 @@ class Plant:
             return Cessna(self.truth, effects, RATE)
         return Rigid(self.flown_by, effects, RATE)
 
-    def fly(self, effects: Effects, which: int) -> Log:
+    def fly(self, effects: Effects, flight: int) -> Log:
         """The flight that is fitted (0) or held out (1). Raises DivergedError."""
         airframe = self.airframe(effects)
-        random = np.random.default_rng([*self.root, 1 + which])
+        random = np.random.default_rng([SETS[self.which], self.case.seed, 1 + flight])
         air, own = random.spawn(2)
-        plan = parse_manoeuvre(self.case.manoeuvres[which], _with_thrust(self.truth), RATE, SECONDS)
+        plan = parse_manoeuvre(self.case.manoeuvres[flight], _with_thrust(self.truth), RATE, SECONDS)
         planned = {n: plan.deflections[n] for n in airframe.controls}
         planned["thrust"] = plan.deflections["throttle"] * _thrust_unit(self.truth)
         highest = _thrust_unit(self.truth)
@@ -140,8 +141,7 @@ def measured(plant: Plant) -> dict[str, float]:
     if not plant.effects:
         return {}
     still = replace(plant.case, turbulence="none")
-    calm = Plant(still, "development")
-    calm.root = plant.root
+    calm = Plant(still, plant.which)
     log = calm.fly({}, 0)
     without = calm.seen(log, {})
     bare = explained(log, without, plant.truth, {}, RATE)
