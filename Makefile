@@ -4,7 +4,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint format build bench clean distclean
+.PHONY: help demo loop test lint format build bench clean distclean
 
 VENV ?= .venv
 RATE ?= 1
@@ -32,6 +32,9 @@ help:  ## this list
 
 demo: $(DONE)/build $(DONE)/run  ## identify the bundled flight live, over DDS; RATE=4 plays it four times faster
 	@$(BIN)/python -m sysid_node.cli demo $(BAG) --rate $(RATE) --out $(OUT) $(ARGS)
+
+loop: $(DONE)/build $(DONE)/run $(DONE)/desk  ## closed loop over DDS: something fails at 30 s, the controller adapts
+	@$(BIN)/python -m sysid_node.cli loop $(ARGS)
 
 test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## run all tests; ARGS="test/online -x" runs some
 	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)

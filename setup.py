@@ -27,6 +27,9 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "adaptive_controller = sysid_node.ros.adaptive_controller:main",
+            "exciter = sysid_node.ros.exciter:main",
+            "flight_simulator = sysid_node.ros.flight_simulator:main",
             "identifier = sysid_node.ros.identifier:main",
             "player = sysid_node.ros.player:main",
             "sysid = sysid_node.cli.main:main",

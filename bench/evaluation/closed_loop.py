@@ -121,7 +121,7 @@ def _estimate(session: Session, pilot: controller.State, exciter: inflight.State
     session.air_data(stamp, (V, alpha, beta, now.density))
     for due in session.imu(stamp, tuple(now.outputs[:6].tolist())):
         controller.hear(pilot, now.time, beliefs_of(due.estimates))
-        precision = precision_of(due.estimates, session.aircraft)
+        precision = precision_of(due.estimates.derivatives.values(), session.aircraft)
         if inflight.hear(exciter, now.time, precision):
             session.reset()
 

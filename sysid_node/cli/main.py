@@ -27,6 +27,7 @@ COMMANDS = {
     "export": "write an estimate as another simulator's model",
     "report": "write report.html again from the files of a run",
     "demo": "identify a recorded flight live, over DDS",
+    "loop": "an adaptive controller in closed loop, over DDS",
 }
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130

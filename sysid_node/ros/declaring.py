@@ -1,9 +1,9 @@
-"""Declares the identifier's parameters to ROS, and keeps wrong values out."""
+"""Declares a node's parameters to ROS, and keeps wrong values out; by default those of the identifier."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
@@ -15,9 +15,11 @@ from sysid_node.errors import InputError
 from sysid_node.ros.parameters import LIVE, PARAMETERS, Parameter, check
 
 
-def declare(node: Node) -> None:
+def declare(
+    node: Node, table: Sequence[Parameter] = PARAMETERS, check: Callable[[Mapping[str, Any]], None] = check
+) -> None:
     """Declare all parameters. Raises InputError on one whose type or value was overridden wrongly."""
-    for parameter in PARAMETERS:
+    for parameter in table:
         try:
             node.declare_parameter(parameter.name, parameter.default, _descriptor(parameter))
         except (InvalidParameterTypeException, InvalidParameterValueException):
@@ -26,13 +28,13 @@ def declare(node: Node) -> None:
             raise InputError(
                 f"parameter {parameter.name} = {given.value!r} ({kind}): expected {parameter.expected}"
             ) from None
-    check(values_of(node))
-    _warn_of_unknown(node)
+    check(values_of(node, table))
+    _warn_of_unknown(node, table)
 
 
-def values_of(node: Node) -> dict[str, Any]:
+def values_of(node: Node, table: Sequence[Parameter] = PARAMETERS) -> dict[str, Any]:
     """All parameters' values."""
-    return {parameter.name: node.get_parameter(parameter.name).value for parameter in PARAMETERS}
+    return {parameter.name: node.get_parameter(parameter.name).value for parameter in table}
 
 
 def refusal(node: Node, state: str, changes: Iterable[RosParameter]) -> str:
@@ -59,9 +61,9 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     return descriptor
 
 
-def _warn_of_unknown(node: Node) -> None:
+def _warn_of_unknown(node: Node, table: Sequence[Parameter]) -> None:
     """A misspelt parameter would otherwise be ignored without a word."""
-    known = [parameter.name for parameter in PARAMETERS]
+    known = [parameter.name for parameter in table]
     for name in node._parameter_overrides:
         if name in known or node.has_parameter(name) or name.startswith("qos_overrides."):
             continue

@@ -1,10 +1,10 @@
-"""The identifier's parameters: one table declares, describes and checks them, and writes config/identifier.yaml."""
+"""Parameters of nodes: one table declares, describes and checks them, and writes config/identifier.yaml."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -181,25 +181,37 @@ def estimation_settings(values: Mapping[str, Any]) -> Settings:
 
 def check(values: Mapping[str, Any]) -> None:
     """Check values of all parameters. Raises InputError naming the first wrong one, what it is and what is expected."""
-    for parameter in PARAMETERS:
+    check_each(PARAMETERS, values)
+    estimation_settings(values)
+
+
+def check_each(table: Sequence[Parameter], values: Mapping[str, Any]) -> None:
+    """Check values one by one. Raises InputError naming the first wrong one."""
+    for parameter in table:
         value = values[parameter.name]
         unknown = parameter.choices and value not in parameter.choices
         if unknown or (isinstance(parameter.default, float) and not parameter.lower <= value <= parameter.upper):
             raise InputError(f"parameter {parameter.name} = {value!r}: expected {parameter.expected}")
-    estimation_settings(values)
 
 
-def annotated_yaml() -> str:
-    """The text of config/identifier.yaml: every parameter with meaning, unit, default and when to change it."""
+IDENTIFIER_EFFECT = (
+    "They take effect when the node is configured; to change one later: ros2 lifecycle set /identifier cleanup."
+)
+
+
+def annotated_yaml(
+    node: str = "identifier", table: Sequence[Parameter] = PARAMETERS, effect: str = IDENTIFIER_EFFECT
+) -> str:
+    """The text of config/<node>.yaml: every parameter with meaning, unit, default and when to change it."""
     lines = [
-        "# Parameters of the node `identifier`. Every value here is the default; leave out what you do not change.",
-        "# ros2 run sysid_node identifier --ros-args --params-file identifier.yaml -p aircraft:=cdrw",
-        "# They take effect when the node is configured; to change one later: ros2 lifecycle set /identifier cleanup.",
+        f"# Parameters of the node `{node}`. Every value here is the default; leave out what you do not change.",
+        f"# ros2 run sysid_node {node} --ros-args --params-file {node}.yaml -p aircraft:=cdrw",
+        f"# {effect}",
         "",
         "/**:",
         "  ros__parameters:",
     ]
-    for parameter in PARAMETERS:
+    for parameter in table:
         values = f"Values: {parameter.constraint}." if parameter.constraint else ""
         unit = f"Unit: {parameter.unit}." if parameter.unit and not values else ""
         notes = (note for note in (parameter.meaning, values, unit, f"Change: {parameter.change}") if note)

@@ -1,0 +1,221 @@
+"""``sysid loop``: an aircraft in closed loop over DDS: it fails, is identified anew, and flies on adapted gains.
+
+Simulator, identifier, exciter and controller run in processes of their own, this one watches. At 30 s something fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.report.loop import Episode, write_loop
+
+if TYPE_CHECKING:
+    from sysid_node.ros.loop_watch import LoopWatch
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+ACTUATORS = "actuator_lag:time_constant=0.05"
+ONSET, EXCITE_AT, SETTLED = 30.0, 3.0, 10.0  # s: failure, first excitation, and after the failure
+START_UP = 60.0  # s in which the first command must come
+WATCHED = ("Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
+NODES: Mapping[str, tuple[str, ...]] = {
+    "flight_simulator": (f"effects:='{ACTUATORS}'",),
+    "identifier": ("method:=sls_rft",),
+    "exciter": ("watch:=true", "accuracy:=0.15"),
+    "adaptive_controller": (),
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is flown."""
+
+    aircraft: Aircraft
+    name: str  # or file, as the nodes are told
+    fail: str  # the effect that sets in
+    seconds: float
+    adapt: bool
+    turbulence: str
+    out: Path
+
+
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser("loop", help="an adaptive controller in closed loop, over DDS", description=__doc__)
+    add = parser.add_argument
+    add("--aircraft", default="cdrw", help="file or name (default: cdrw)")
+    add("--fail", default="control_effectiveness_loss:elevator=0.6", help="effect that sets in at 30 s; '' for none")
+    add("--seconds", type=float, default=60.0, help="of flight (default: 60)")
+    add("--fixed", dest="adapt", action="store_false", help="with the fixed gains of the aircraft file, to compare")
+    add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
+    add("--out", metavar="DIR", type=Path, default=Path("out/loop"), help="default: out/loop")
+    return parser
+
+
+def run(args: argparse.Namespace) -> None:
+    """Flies, watches, writes the report and says how it went."""
+    if not 5.0 <= args.seconds <= 36000.0:
+        raise InputError(f"--seconds {args.seconds:g}: expected 5 to 36000")
+    aircraft = load_aircraft(args.aircraft)
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {args.out}: cannot be made ({error.strerror}); give another folder") from None
+    # A domain of its own: neither hears nor disturbs other ROS programs, here or on the network.
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    plan = Plan(aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.out)
+    episode = _fly(plan)
+    write_loop(args.out, episode)
+    print(_summary(plan, episode))
+
+
+def _fly(plan: Plan) -> Episode:
+    import rclpy  # noqa: PLC0415  # reads its domain from the environment
+
+    from sysid_node.ros.loop_watch import LoopWatch  # noqa: PLC0415
+
+    _check_effects(plan)
+    rclpy.init()
+    watch = LoopWatch()
+    try:
+        with ExitStack() as stack:
+            processes = [stack.enter_context(_node(plan, name)) for name in NODES]
+            events = _watch(plan, watch, processes)
+    finally:
+        watch.close()
+        rclpy.try_shutdown()
+    times = [time for time, _ in watch.tracking]
+    errors = {axis: [row[f"{axis} error"] for _, row in watch.tracking] for axis in ("pitch", "roll", "sideslip")}
+    estimates = dict(watch.estimates.derivatives) if watch.estimates else {}
+    return Episode(plan.aircraft.name, plan.fail, ONSET, plan.adapt, times, errors, estimates, events)
+
+
+def _check_effects(plan: Plan) -> None:
+    """Raise InputError on effects that the simulator would refuse half a minute later."""
+    from sysid_node.sim import Simulator, live  # noqa: PLC0415  # JAX takes its time
+
+    live.vector(Simulator(plan.aircraft), _effects(plan, failed=True).split())
+
+
+def _effects(plan: Plan, failed: bool) -> str:
+    return f"{ACTUATORS} {plan.fail}" if failed and plan.fail else ACTUATORS
+
+
+@contextlib.contextmanager
+def _node(plan: Plan, name: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A node in a process of its own, its log in ``<out>/<name>.log``; interrupted at the end."""
+    own = [f"aircraft:={plan.name}", *NODES[name]]
+    if name == "flight_simulator":
+        own.append(f"turbulence:={plan.turbulence}")
+    if name == "adaptive_controller":
+        own.append(f"adapt:={str(plan.adapt).lower()}")
+    command = [sys.executable, "-m", f"sysid_node.ros.{name}", "--ros-args"]
+    command += [word for pair in own for word in ("-p", pair)]
+    with (plan.out / f"{name}.log").open("wb") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+    if process.returncode:
+        lines = (plan.out / f"{name}.log").read_text(encoding="utf-8").splitlines() or ["no word of why"]
+        raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
+
+
+def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[tuple[float, str]]:
+    """Ask for set-points, begin excitation, let something fail, show it all; returns what happened when."""
+    console, seen = Console(), ""
+    events: list[tuple[float, str]] = []
+    waited = 0.0
+    with Live(console=console, auto_refresh=False) as live:
+        while watch.time < plan.seconds and all(process.poll() is None for process in processes):
+            watch.listen(0.1)
+            if not watch.tracking:
+                waited += 0.1
+                if waited > START_UP:
+                    raise RuntimeError(f"no command came within {START_UP:g} s; the logs in {plan.out} may say why")
+            watch.ask_for(set_points(watch.time))
+            done = [text for _, text in events]
+            if watch.time >= EXCITE_AT and "excitation begun" not in done:
+                watch.excite()
+                events.append((watch.time, "excitation begun"))
+            if plan.fail and watch.time >= ONSET and plan.fail not in done:
+                refused = watch.set_effects(_effects(plan, failed=True))
+                if refused:
+                    raise InputError(f"--fail {plan.fail}: {refused}")
+                events.append((watch.time, plan.fail))
+            said = f"{watch.said('adaptive_controller')}; exciter: {watch.value('exciter', 'last event')}"
+            if said != seen:
+                seen = said
+                events.append((watch.time, said))
+            live.update(_picture(plan, watch), refresh=True)
+    console.print()
+    return events
+
+
+def set_points(time: float) -> dict[str, float]:
+    """Steps of roll and pitch, rad."""
+    roll = (0.3, 0.0, -0.3, 0.0)[int(time / 4.0) % 4]
+    pitch = (0.16, 0.08, 0.03, 0.08)[int((time + 1.0) / 3.0) % 4]
+    return {"roll": roll, "pitch": pitch}
+
+
+def _picture(plan: Plan, watch: LoopWatch) -> RenderableType:
+    """What the terminal shows."""
+    table = Table(box=None, padding=(0, 1), header_style="bold")
+    for heading in ("derivative", "file", "estimate", "95 % interval", "status"):
+        table.add_column(heading, justify="left" if heading in ("derivative", "status") else "right")
+    known = watch.estimates.derivatives if watch.estimates else {}
+    for name in (n for n in WATCHED if n in plan.aircraft.derivatives):
+        file = f"{plan.aircraft.derivatives[name].value:+.4f}"
+        d = known.get(name)
+        if d is None or not math.isfinite(d.value):
+            table.add_row(name, file, "", "", d.status if d else "")
+            continue
+        style = "green" if d.valid else "dim"
+        row = (name, file, f"{d.value:+.4f}", f"{d.lower:+.4f} to {d.upper:+.4f}", Text(d.status, style=style))
+        table.add_row(*row)
+    failed = bool(plan.fail) and watch.time >= ONSET
+    head = Text(f"{plan.aircraft.name}  {watch.time:5.1f} of {plan.seconds:.0f} s  ", style="bold")
+    head.append(plan.fail if failed else "nothing wrong", style="red" if failed else "green")
+    lines = [f"{node}: {watch.said(node)}" for node in NODES]
+    last = watch.tracking[-200:]
+    errors = ", ".join(f"{axis} {_rms(last, axis):.2f} deg" for axis in ("pitch", "roll", "sideslip"))
+    return Group(head, Text(f"tracking error over the last second: {errors}"), table, *(Text(x) for x in lines))
+
+
+def _rms(rows: Sequence[tuple[float, Mapping[str, float]]], axis: str) -> float:
+    values = [row.get(f"{axis} error", math.nan) for _, row in rows]
+    return math.degrees(math.sqrt(sum(v * v for v in values) / len(values))) if values else math.nan
+
+
+def _summary(plan: Plan, episode: Episode) -> str:
+    """How it went, in three lines."""
+    (plan.out / "summary.json").write_text(json.dumps(episode.summary(), indent=2) + "\n", encoding="utf-8")
+    lines = [f"{'adaptive' if plan.adapt else 'fixed'} gains; tracking error (pitch, roll), rms:"]
+    for name, start, stop in episode.spans(SETTLED):
+        errors = (math.degrees(episode.rms(axis, start, stop)) for axis in ("pitch", "roll"))
+        lines.append(f"  {name}: " + ", ".join(f"{error:.2f} deg" for error in errors))
+    return "\n".join([*lines, f"report: {plan.out / 'report.html'}"])

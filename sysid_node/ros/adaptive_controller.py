@@ -1,0 +1,209 @@
+"""The node `adaptive_controller`: flies set-points with gains for the aircraft as it is identified to be."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import Imu, JointState
+from sysid_msgs.msg import AirData, DerivativeEstimates
+
+from sysid_node.control import controller
+from sysid_node.control.allocation import Allocation
+from sysid_node.control.plant import CONTROLS
+from sysid_node.control.settings import RANGES, Settings
+from sysid_node.control.types import Command, Sensed, SetPoints
+from sysid_node.flight.topics import AIR_DATA, IMU
+from sysid_node.ros import conversion
+from sysid_node.ros.beliefs import beliefs_of
+from sysid_node.ros.conversion import NANOSECONDS, stamp_ns
+from sysid_node.ros.loop_node import (
+    AIRCRAFT,
+    COMMAND,
+    DERIVATIVES,
+    EXCITATION,
+    LATEST,
+    SET_POINTS,
+    LoopNode,
+    attitude_of,
+    named,
+    values_by_name,
+)
+from sysid_node.ros.monitor import Durations
+from sysid_node.ros.parameters import Parameter
+from sysid_node.ros.spin import run_program, serve
+
+_DEFAULT = Settings()
+
+
+def _setting(name: str, unit: str, meaning: str, change: str) -> Parameter:
+    return Parameter(name, float(getattr(_DEFAULT, name)), unit, meaning, change, *RANGES[name])
+
+
+PARAMETERS = (
+    AIRCRAFT,
+    Parameter(
+        "adapt",
+        True,
+        "",
+        "Whether estimates are used; false: the gains of the aircraft file, whatever is identified.",
+        "false to compare, or until the identifier is trusted.",
+    ),
+    _setting("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft."),
+    _setting("delay", "s", "From a reading to its command's arrival at the actuator.", "Up on a slow bus."),
+    _setting(
+        "gain_margin",
+        "",
+        "Factor by which every loop's gain may grow or fall, over the corners of the intervals (2 = 6 dB).",
+        "Up for more caution.",
+    ),
+    _setting("phase_margin", "rad", "Phase that every loop has left, over the corners.", "Up for more caution."),
+    _setting(
+        "tightness",
+        "",
+        "Half of an interval over the derivative's size, beyond which the estimate is not used.",
+        "Down to use only what is known well.",
+    ),
+    _setting(
+        "explained",
+        "",
+        "Share of a coefficient's motion that the model must explain, for its derivatives to be used.",
+        "Down in rough air, at the risk of biased estimates.",
+    ),
+    _setting("gain_rate", "1/s", "How fast gains move, in baseline gains a second.", "Down for smoother transitions."),
+    _setting("stale_after", "s", "Without estimates for so long, the baseline is flown.", "Up for a slow identifier."),
+    _setting("command_rate", "rad/s", "Fastest movement of a surface's command.", "To what the servos can do."),
+    _setting(
+        "command_limit", "rad", "Largest command where the aircraft file gives no limit.", "To the surfaces' travel."
+    ),
+    _setting("bandwidth", "rad/s", "Of the attitude that is asked of the aircraft.", "Down for a sluggish aircraft."),
+    _setting("largest_roll", "rad", "Largest roll set-point.", "Up for aerobatics."),
+    _setting("largest_pitch", "rad", "Largest pitch set-point.", "Up for aerobatics."),
+    _setting("largest_sideslip", "rad", "Largest sideslip set-point.", "Up for crosswind landings."),
+)
+SENSOR_AGE = 0.5  # s, of air data beyond which they are taken as not measured
+IMU_AGE = 0.1  # s of silence, after which the surfaces go back to level flight's
+EXCITATION_AGE = 0.1  # s, after which excitation is taken to have ended
+
+
+class AdaptiveController(LoopNode):
+    """``config/adaptive_controller.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+
+    def __init__(self) -> None:
+        super().__init__("adaptive_controller", PARAMETERS)
+        self._state = controller.init(self.aircraft, Settings.from_mapping(self.values))
+        self._allocation = Allocation.of(self.aircraft)
+        self._points = SetPoints()
+        self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
+        self._extra: tuple[float, list[float]] = (-math.inf, [0.0] * len(CONTROLS))
+        self._now, self._heard_imu, self._imu_count, self._blind = math.nan, time.monotonic(), 0, 0
+        self._start_ns = 0
+        self._work = Durations()
+        self._command = self.create_publisher(JointState, COMMAND, 10)
+        self._tracking = self.create_publisher(JointState, "~/tracking", 10)
+        self.create_subscription(Imu, IMU, self._on_imu, LATEST)
+        self.create_subscription(AirData, AIR_DATA, self._on_air_data, LATEST)
+        self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.create_subscription(JointState, EXCITATION, self._on_excitation, LATEST)
+        self.create_subscription(JointState, SET_POINTS, self._on_set_points, 10)
+        self.every(0.02, self._watch)
+
+    def words(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """What is flown, and why."""
+        p50, p99 = self._work.percentiles()
+        values: dict[str, object] = {"step p50 (us)": 1e6 * p50, "step p99 (us)": 1e6 * p99}
+        values |= {"commands without an IMU": self._blind, "IMU messages": self._imu_count}
+        for axis in self._state.axes:
+            values[f"{axis.axis.name}: gains"] = axis.verdict
+            values[f"{axis.axis.name}: estimates used"] = " ".join(axis.used)
+            values[f"{axis.axis.name}: checks passed"] = axis.accepted
+            values[f"{axis.axis.name}: checks failed"] = axis.refused
+        line = "; ".join(f"{axis.axis.name}: {axis.verdict}" for axis in self._state.axes)
+        silent = time.monotonic() - self._heard_imu > IMU_AGE
+        if silent:
+            return DiagnosticStatus.ERROR, f"{IMU} silent: surfaces at level flight's; {line}", values
+        return DiagnosticStatus.WARN if self._state.stale else DiagnosticStatus.OK, line, values
+
+    def _seconds(self, stamp: Any) -> float:
+        """A stamp in s from the first IMU message's."""
+        return (stamp_ns(stamp) - self._start_ns) / NANOSECONDS
+
+    def _on_imu(self, message: Any) -> None:
+        self._start_ns = self._start_ns or stamp_ns(message.header.stamp)
+        now = self._seconds(message.header.stamp)
+        if now <= self._now and now > self._now - 1.0:
+            return  # out of order
+        self._now, self._heard_imu = now, time.monotonic()
+        self._imu_count += 1
+        *_, p, q, r = conversion.imu_values(message, -1.0)
+        phi, theta = attitude_of(message)
+        taken, air = self._air
+        V, alpha, beta, density = air if abs(now - taken) <= SENSOR_AGE else (math.nan,) * 4
+        self._fly(Sensed(now, p, q, r, phi, theta, V, alpha, beta, density))
+
+    def _on_air_data(self, message: Any) -> None:
+        self._air = self._seconds(message.header.stamp), conversion.air_data_values(message)
+
+    def _on_estimates(self, message: Any) -> None:
+        estimates = conversion.estimates_from_message(message, self._start_ns)
+        controller.hear(self._state, estimates.time, beliefs_of(estimates))
+
+    def _on_excitation(self, message: Any) -> None:
+        values = values_by_name(message)
+        found = [values.get(name, 0.0) for name in CONTROLS]
+        self._extra = time.monotonic(), found if all(map(math.isfinite, found)) else [0.0] * len(found)
+
+    def _on_set_points(self, message: Any) -> None:
+        values = values_by_name(message)
+        self._points = SetPoints(**{name: values.get(name, math.nan) for name in SetPoints._fields})
+
+    def _watch(self) -> None:
+        """Without an IMU: no feedback, the surfaces back to level flight's."""
+        silence = time.monotonic() - self._heard_imu
+        if silence > IMU_AGE and self._imu_count:
+            self._blind += 1
+            self._fly(Sensed(self._now + silence, *(math.nan,) * (len(Sensed._fields) - 1)))
+
+    def _fly(self, sensed: Sensed) -> None:
+        start = time.perf_counter()
+        heard, extra = self._extra
+        excitation = extra if time.monotonic() - heard < EXCITATION_AGE else controller.NO_EXCITATION
+        command = controller.step(self._state, sensed, self._points, excitation)
+        stamp = self._start_ns + round(NANOSECONDS * sensed.time)
+        self._command.publish(named(stamp, self._joints(command)))
+        self._tracking.publish(named(stamp, self._errors(sensed)))
+        self._work.add(time.perf_counter() - start)
+
+    def _errors(self, sensed: Sensed) -> dict[str, float]:
+        """What the set-points' reference asks for, and how far off the aircraft is, rad."""
+        wanted = self._state.law.wanted
+        if wanted is None:
+            return {}
+        return {
+            "pitch": wanted.theta,
+            "roll": wanted.phi,
+            "sideslip": wanted.beta,
+            "pitch error": sensed.theta - wanted.theta,
+            "roll error": sensed.phi - wanted.phi,
+            "sideslip error": sensed.beta - wanted.beta,
+        }
+
+    def _joints(self, command: Command) -> dict[str, float]:
+        """Joint positions of a command."""
+        by_name = dict(zip(CONTROLS, command, strict=False))
+        controls = [by_name.get(name, 0.0) for name in self.aircraft.controls]
+        positions = self._allocation.positions(controls, command.thrust)
+        return dict(zip(self._allocation.joints, positions, strict=True))
+
+
+def main() -> None:
+    """Entry point of the node."""
+    sys.exit(run_program(lambda: serve(AdaptiveController())))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""The node `exciter`: small deflections on top of the commands, on request, until enough is known."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import Trigger
+from sysid_msgs.msg import AirData, DerivativeEstimates
+
+from sysid_node.errors import InputError
+from sysid_node.excite import inflight
+from sysid_node.excite.inflight import RANGES, Flight, Settings
+from sysid_node.flight.topics import AIR_DATA, IMU
+from sysid_node.ros import conversion
+from sysid_node.ros.beliefs import precision_of
+from sysid_node.ros.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, attitude_of, named
+from sysid_node.ros.parameters import Parameter
+from sysid_node.ros.spin import run_program, serve
+
+_DEFAULT = Settings()
+
+
+def _setting(name: str, unit: str, meaning: str, change: str) -> Parameter:
+    return Parameter(name, float(getattr(_DEFAULT, name)), unit, meaning, change, *RANGES[name])
+
+
+PARAMETERS = (
+    AIRCRAFT,
+    Parameter(
+        "manoeuvre",
+        "+".join(_DEFAULT.manoeuvre),
+        "",
+        "What is flown, over and over (docs/manoeuvres.md): multisines, 3-2-1-1, doublets; several joined by +.",
+        "Amplitude up in rough air, down near the ground.",
+    ),
+    Parameter(
+        "derivatives",
+        " ".join(_DEFAULT.derivatives),
+        "",
+        "What is to be known, names with a space between.",
+        "To those that you fly for.",
+    ),
+    Parameter(
+        "watch",
+        _DEFAULT.watch,
+        "",
+        "Whether it begins again by itself when one of them is no longer known.",
+        "true beside an adaptive controller.",
+    ),
+    _setting("accuracy", "", "Half of an interval over the derivative's size, with which it is known.", "As needed."),
+    _setting("longest", "s", "It gives up after so long.", "Up in rough air."),
+    _setting("largest_amplitude", "rad", "Largest deflection.", "To what the aircraft bears."),
+    _setting("largest_roll", "rad", "Roll beyond which it aborts.", "For every aircraft."),
+    _setting("largest_pitch", "rad", "Pitch beyond which it aborts.", "For every aircraft."),
+    _setting("least_airspeed", "", "Airspeed below which it aborts, in the reference one.", "To well above the stall."),
+    _setting("most_airspeed", "", "Airspeed above which it aborts, in the reference one.", "To below flutter."),
+    _setting("least_load_factor", "", "Load factor below which it aborts.", "For every aircraft."),
+    _setting("most_load_factor", "", "Load factor above which it aborts.", "For every aircraft."),
+)
+PERIOD = 0.01  # s between its messages
+STALE = 0.2  # s of a sensor's silence, after which it aborts
+
+
+class Exciter(LoopNode):
+    """``config/exciter.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+
+    def __init__(self) -> None:
+        super().__init__("exciter", PARAMETERS)
+        asked = {name: self.values[name] for name in ("watch", *RANGES)}
+        asked |= {name: tuple(self.values[name].split()) for name in ("derivatives", "manoeuvre")}
+        self._state = inflight.init(self.aircraft, Settings(**asked))
+        self._inertial, self._air = (-math.inf, (math.nan,) * 3), (-math.inf, math.nan)
+        self._said = 0
+        self._excitation = self.create_publisher(JointState, EXCITATION, 10)
+        self._reset = self.create_client(Trigger, "identifier/reset")
+        self.create_subscription(Imu, IMU, self._on_imu, LATEST)
+        self.create_subscription(AirData, AIR_DATA, self._on_air_data, LATEST)
+        self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.create_service(Trigger, "~/start", self._on_start)
+        self.create_service(Trigger, "~/stop", self._on_stop)
+        self.every(PERIOD, self._on_time)
+
+    def words(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """What it does, and what it did last."""
+        state = self._state
+        last = state.events[-1].text if state.events else "nothing flown yet"
+        doing = f"exciting for {time.monotonic() - state.begun:.1f} s" if state.active else last
+        values = {"active": state.active, "not yet known": " ".join(state.missing), "events": len(state.events)}
+        return DiagnosticStatus.OK, doing, {**values, "last event": last}
+
+    def _on_imu(self, message: Any) -> None:
+        _, _, az, *_ = conversion.imu_values(message, -1.0)
+        self._inertial = time.monotonic(), (*attitude_of(message), -az / inflight.GRAVITY)
+
+    def _on_air_data(self, message: Any) -> None:
+        self._air = time.monotonic(), message.true_airspeed
+
+    def _on_estimates(self, message: Any) -> None:
+        estimates = conversion.estimates_from_message(message, 0)
+        known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
+        precision = precision_of(known.values(), self.aircraft)
+        if inflight.hear(self._state, time.monotonic(), precision) and self._reset.service_is_ready():
+            self._reset.call_async(Trigger.Request())
+        self._tell()
+
+    def _on_time(self) -> None:
+        now = time.monotonic()
+        (felt, (roll, pitch, load)), (measured, airspeed) = self._inertial, self._air
+        if now - felt > STALE:
+            roll = pitch = load = math.nan
+        if now - measured > STALE:
+            airspeed = math.nan
+        moved = inflight.step(self._state, now, Flight(roll, pitch, airspeed, load))
+        stamp = self.get_clock().now().nanoseconds
+        self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
+        self._tell()
+
+    def _on_start(self, _: Any, response: Any) -> Any:
+        try:
+            inflight.start(self._state, time.monotonic())
+            response.success, response.message = True, f"until {', '.join(self._state.settings.derivatives)} are known"
+        except InputError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _on_stop(self, _: Any, response: Any) -> Any:
+        inflight.stop(self._state, time.monotonic(), "stopped on request")
+        response.success, response.message = True, "surfaces are in the middle"
+        return response
+
+    def _tell(self) -> None:
+        """Log what has been done since the last time."""
+        for event in self._state.events[self._said :]:
+            self.get_logger().info(event.text)
+        self._said = len(self._state.events)
+
+
+def main() -> None:
+    """Entry point of the node."""
+    sys.exit(run_program(lambda: serve(Exciter())))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,188 @@
+"""The node `flight_simulator`: an aircraft that flies in real time, or faster, over topics."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import Imu, JointState
+from sysid_msgs.msg import AirData
+
+from sysid_node.control.allocation import Allocation
+from sysid_node.errors import InputError
+from sysid_node.flight.actuation import Actuation
+from sysid_node.flight.frames import quaternion_from_euler
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.ros.conversion import NANOSECONDS, header, stamp_message
+from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
+from sysid_node.ros.monitor import Durations
+from sysid_node.ros.parameters import Parameter
+from sysid_node.ros.spin import run_program, serve
+from sysid_node.sim import Simulator, live, trim_flight
+from sysid_node.sim.dryden import INTENSITIES
+from sysid_node.sim.live import Air, Reading
+
+PARAMETERS = (
+    AIRCRAFT,
+    Parameter(
+        "effects",
+        "actuator_lag:time_constant=0.05",
+        "",
+        "What makes the aircraft differ from its file: name:key=value, several with a space between. Change in flight.",
+        "To let something fail: control_effectiveness_loss:elevator=0.6 (docs/effects.md lists all).",
+    ),
+    Parameter(
+        "rate",
+        200.0,
+        "Hz",
+        "Samples a second of flight: IMU, air data and actuators alike.",
+        "Down on a slow machine.",
+        lower=20.0,
+        upper=1000.0,
+    ),
+    Parameter(
+        "speed",
+        1.0,
+        "",
+        "How many times as fast as real time it flies; other than 1 it publishes /clock.",
+        "Up to save time, with use_sim_time in the other nodes.",
+        lower=0.05,
+        upper=50.0,
+    ),
+    Parameter(
+        "turbulence",
+        "none",
+        "",
+        "Dryden turbulence.",
+        "To see the loop at work in rough air.",
+        choices=tuple(INTENSITIES),
+    ),
+    Parameter("noise", 1.0, "", "Sensor noise, in that of the aircraft file.", "0 for ideal sensors.", 0.0, 20.0),
+    Parameter("seed", 0.0, "", "Of noise and turbulence.", "For another flight.", 0.0, 1e9),
+)
+LIVE = frozenset({"effects"})
+MOST_BEHIND = 0.5  # s of flight; what is late beyond it is not flown
+POSE_EVERY = 10  # samples
+ENU_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+class FlightSimulator(LoopNode):
+    """``config/flight_simulator.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+
+    def __init__(self) -> None:
+        super().__init__("flight_simulator", PARAMETERS, LIVE)
+        values = self.values
+        self._simulator = Simulator(self.aircraft, values["rate"])
+        self._trim = trim_flight(self._simulator)
+        theta = live.vector(self._simulator, values["effects"].split())
+        air = Air(values["turbulence"], noise=values["noise"], seed=int(values["seed"]))
+        self._flight = live.start(self._simulator, self._trim, air, theta)
+        self._command: list[float] = self._trim.command.tolist()
+        self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
+        self._steps, self._skipped, self._commands, self._refused = Durations(), 0.0, 0, 0
+        self._open_topics()
+        live.step(self._simulator, self._flight, self._command)  # compiles
+        self._start_ns = self.get_clock().now().nanoseconds if values["speed"] == 1.0 else time.time_ns()
+        self._begun, self._behind = time.monotonic(), 0.0
+        self.every(0.5 / (values["rate"] * values["speed"]), self._on_time)
+        self.get_logger().info(f"flies {self.aircraft.name!r} at {values['rate']:g} Hz")
+
+    def _open_topics(self) -> None:
+        self._imu = self.create_publisher(Imu, IMU, 50)
+        self._air_data = self.create_publisher(AirData, AIR_DATA, 50)
+        self._actuators = self.create_publisher(JointState, ACTUATORS, 50)
+        self._pose = self.create_publisher(PoseStamped, "pose", 10)
+        self._sim_time = self.create_publisher(ClockMessage, "/clock", 10) if self.values["speed"] != 1.0 else None
+        self.create_subscription(JointState, COMMAND, self._on_command, LATEST)
+
+    def changed(self, values: Mapping[str, Any]) -> None:
+        """Let other effects be there from the next sample on."""
+        if "effects" in values:
+            if not isinstance(values["effects"], str):
+                raise InputError(f"effects {values['effects']!r}: expected a string")
+            self._flight.theta = live.vector(self._simulator, values["effects"].split())
+            self.get_logger().info(f"effects: {values['effects'] or 'none'}")
+
+    def words(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """How it flies, and what a step costs."""
+        p50, p99 = self._steps.percentiles()
+        flown = self._flight.samples * self._simulator.step
+        values = {
+            "flight time (s)": flown,
+            "step p50 (us)": 1e6 * p50,
+            "step p99 (us)": 1e6 * p99,
+            "commands": self._commands,
+            "commands refused": self._refused,
+            "not flown (s)": self._skipped,
+        }
+        late = f"; {self._skipped:.1f} s were not flown, the machine is too slow" if self._skipped else ""
+        return DiagnosticStatus.WARN if late else DiagnosticStatus.OK, f"{flown:.0f} s flown{late}", values
+
+    def _on_command(self, message: Any) -> None:
+        found = self._actuation.of_message(self._actuation.places(message.name), message.position)
+        if isinstance(found, str) or not all(map(math.isfinite, found)):
+            self._refused += 1
+            return
+        thrust, *controls = found
+        self._command = [*controls, thrust]
+        self._commands += 1
+
+    def _on_time(self) -> None:
+        """Fly what is due."""
+        due = (time.monotonic() - self._begun) * self.values["speed"] - self._behind
+        late = due - self._flight.samples * self._simulator.step
+        if late > MOST_BEHIND:
+            self._behind, self._skipped = self._behind + late, self._skipped + late
+            return
+        while self._flight.samples * self._simulator.step < due:
+            start = time.perf_counter()
+            self._publish(live.step(self._simulator, self._flight, self._command))
+            self._steps.add(time.perf_counter() - start)
+
+    def _publish(self, now: Reading) -> None:
+        stamp = self._start_ns + round(NANOSECONDS * now.time)
+        if self._sim_time is not None:
+            self._sim_time.publish(ClockMessage(clock=stamp_message(stamp)))
+        ax, ay, az, p, q, r, *euler, V, alpha, beta = now.outputs.tolist()
+        x, y, z, w = quaternion_from_euler(np.array([euler]), "flu")[0].tolist()
+        orientation = Quaternion(x=x, y=y, z=z, w=w)
+        *surfaces, thrust = now.surfaces.tolist()
+        joints, positions = self._allocation.joints, self._allocation.positions(surfaces, thrust)
+        self._actuators.publish(JointState(header=header(stamp, ""), name=joints, position=positions))
+        self._air_data.publish(
+            AirData(
+                header=header(stamp, "air_data"),
+                true_airspeed=V,
+                angle_of_attack=alpha,
+                sideslip=beta,
+                air_density=now.density,
+            )
+        )
+        self._imu.publish(
+            Imu(
+                header=header(stamp, "imu"),
+                orientation=orientation,
+                linear_acceleration=Vector3(x=ax, y=-ay, z=-az),
+                angular_velocity=Vector3(x=p, y=-q, z=-r),
+            )
+        )
+        if self._flight.samples % POSE_EVERY == 0:
+            x, y, z = (ENU_NED @ now.state[:3]).tolist()
+            pose = Pose(position=Point(x=x, y=y, z=z), orientation=orientation)
+            self._pose.publish(PoseStamped(header=header(stamp, "map"), pose=pose))
+
+
+def main() -> None:
+    """Entry point of the node."""
+    sys.exit(run_program(lambda: serve(FlightSimulator())))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,109 @@
+"""What the nodes of the closed loop share: a table of parameters, numbers by name, words of how it goes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.frames import euler_from_quaternion
+from sysid_node.ros import conversion
+from sysid_node.ros.declaring import declare, values_of
+from sysid_node.ros.parameters import Parameter, check_each
+
+COMMAND = "actuators/command"
+EXCITATION = "actuators/excitation"
+SET_POINTS = "set_points"
+DERIVATIVES = "identifier/derivatives"
+
+#: The newest counts: what is late is of no use to a controller.
+LATEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+#: The parameter that all of them have.
+AIRCRAFT = Parameter(
+    "aircraft",
+    "",
+    "",
+    "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
+    "For every aircraft.",
+)
+EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
+
+
+class LoopNode(Node):
+    """A node with a table of parameters, of which those in ``live`` may change; says how it goes once a second."""
+
+    def __init__(self, name: str, table: Sequence[Parameter], live: frozenset[str] = frozenset()) -> None:
+        super().__init__(name)
+        self._table, self._live = table, live
+        declare(self, table, lambda values: check_each(table, values))
+        self.values = values_of(self, table)
+        if not self.values["aircraft"]:
+            raise InputError("parameter aircraft is empty: give a name or a file, e.g. -p aircraft:=cdrw")
+        self.aircraft = load_aircraft(self.values["aircraft"])
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self.every(1.0, self._on_tick)
+
+    def changed(self, values: Mapping[str, Any]) -> None:
+        """Take new values of live parameters. Raises InputError where they are impossible."""
+
+    def words(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """Level, one line, and values for /diagnostics."""
+        raise NotImplementedError
+
+    def every(self, period: float, callback: Any) -> None:
+        """Call back every so many seconds of a clock that never jumps."""
+        self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
+        ours = {c.name: c.value for c in changes if any(c.name == p.name for p in self._table)}
+        try:
+            fixed = sorted(ours.keys() - self._live)
+            if fixed:
+                raise InputError(f"{fixed[0]} takes effect when the node starts: start it again")
+            self.changed(ours)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _on_tick(self) -> None:
+        level, line, values = self.words()
+        pairs = [KeyValue(key=k, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for k, v in values.items()]
+        status = DiagnosticStatus(
+            level=level, name=f"{self.get_name()}: state", message=line, hardware_id=self.aircraft.name, values=pairs
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def attitude_of(message: Any) -> tuple[float, float]:
+    """Roll and pitch (rad), FRD, of a sensor_msgs/Imu in forward-left-up axes; NaN where it has no orientation."""
+    if message.orientation_covariance[0] < 0.0:
+        return math.nan, math.nan
+    q = message.orientation
+    phi, theta, _ = euler_from_quaternion(np.array([[q.x, q.y, q.z, q.w]]), "flu")[0].tolist()
+    return phi, theta
+
+
+def named(stamp_ns: int, values: Mapping[str, float]) -> JointState:
+    """Numbers by name."""
+    return JointState(
+        header=conversion.header(stamp_ns, ""), name=list(values), position=[float(v) for v in values.values()]
+    )
+
+
+def values_by_name(message: Any) -> dict[str, float]:
+    """The way back; of a message with fewer positions than names, what there is."""
+    return dict(zip(message.name, message.position, strict=False))

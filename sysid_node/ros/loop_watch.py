@@ -1,0 +1,110 @@
+"""Watches a closed loop: its tracking, what its nodes say of themselves, what is identified; asks it for things."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from sysid_msgs.msg import DerivativeEstimates
+
+from sysid_node.online.types import Estimates
+from sysid_node.ros.conversion import NANOSECONDS, estimates_from_message, stamp_ns
+from sysid_node.ros.loop_node import DERIVATIVES, SET_POINTS, named, values_by_name
+
+TRACKING = "adaptive_controller/tracking"
+PATIENCE = 20.0  # s to wait for a service
+
+
+class LoopWatch:
+    """``tracking``: (time in s of the flight, errors by name); ``estimates`` the newest; ``words`` by node."""
+
+    def __init__(self) -> None:
+        self.tracking: list[tuple[float, dict[str, float]]] = []
+        self.estimates: Estimates | None = None
+        self.words: dict[str, DiagnosticStatus] = {}
+        self.start_ns = 0
+        self._node: Node = rclpy.create_node("loop_watch")
+        self._points = self._node.create_publisher(JointState, SET_POINTS, 10)
+        self._node.create_subscription(JointState, TRACKING, self._on_tracking, 1000)
+        self._node.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 100)
+        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 100)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+
+    @property
+    def time(self) -> float:
+        """Seconds of the flight so far."""
+        return self.tracking[-1][0] if self.tracking else 0.0
+
+    def listen(self, seconds: float) -> None:
+        """Hear what comes within so many seconds."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def ask_for(self, points: Mapping[str, float]) -> None:
+        """Send set-points by name, rad and m/s."""
+        self._points.publish(named(time.time_ns(), points))
+
+    def set_effects(self, effects: str) -> str:
+        """Let the simulated aircraft differ so; returns why it cannot, empty where it does."""
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=effects)
+        request = SetParameters.Request(parameters=[Parameter(name="effects", value=value)])
+        answer = self._call(SetParameters, "flight_simulator/set_parameters", request)
+        return str(answer.results[0].reason)
+
+    def excite(self) -> str:
+        """Begin excitation; returns the exciter's words."""
+        return str(self._call(Trigger, "exciter/start", Trigger.Request()).message)
+
+    def said(self, node: str) -> str:
+        """The last line of a node of the loop on /diagnostics."""
+        return str(self.words[node].message) if node in self.words else ""
+
+    def value(self, node: str, key: str) -> str:
+        """The last value of a key of a node on /diagnostics; empty where there is none."""
+        pairs = self.words[node].values if node in self.words else ()
+        return next((str(pair.value) for pair in pairs if pair.key == key), "")
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+
+    def _call(self, kind: Any, name: str, request: Any) -> Any:
+        client = self._node.create_client(kind, name)
+        try:
+            end = time.monotonic() + PATIENCE
+            while not client.service_is_ready() and time.monotonic() < end:
+                self.listen(0.05)
+            future = client.call_async(request)
+            while not future.done() and time.monotonic() < end:
+                self.listen(0.02)
+            if not future.done():
+                raise RuntimeError(f"{name} gave no answer within {PATIENCE:g} s")
+            return future.result()
+        finally:
+            self._node.destroy_client(client)
+
+    def _on_tracking(self, message: Any) -> None:
+        stamp = stamp_ns(message.header.stamp)
+        self.start_ns = self.start_ns or stamp
+        self.tracking.append(((stamp - self.start_ns) / NANOSECONDS, values_by_name(message)))
+
+    def _on_estimates(self, message: Any) -> None:
+        self.estimates = estimates_from_message(message, self.start_ns)
+
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            node, _, part = status.name.partition(": ")
+            if part == ("estimate" if node == "identifier" else "state"):
+                self.words[node] = status
