@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +10,13 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.coefficients import equations
 from sysid_node.batch.compatibility import check_sensors, corrected
+from sysid_node.batch.constrained_least_squares import constrained_least_squares
 from sysid_node.batch.equation_error import columns, equation_error
+from sysid_node.batch.error_filtering import error_filtering
 from sysid_node.batch.frequency_equation_error import frequency_equation_error
 from sysid_node.batch.integrated import Integrated
+from sysid_node.batch.neural_gauss_newton import neural_gauss_newton
+from sysid_node.batch.recursive_least_squares import recursive_least_squares
 from sysid_node.batch.result import Answer, Fit
 from sysid_node.batch.settings import Settings
 from sysid_node.batch.signals import lowpass
@@ -21,7 +25,16 @@ from sysid_node.batch.validation import figures
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
-METHODS = ("equation_error", "frequency_equation_error", "output_error", "filter_error")
+#: Methods that regress each coefficient on measured signals.
+_REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], Settings], Fit]] = {
+    "equation_error": lambda a, records, s: equation_error(a, records, s.low_pass),
+    "frequency_equation_error": lambda a, records, s: frequency_equation_error(a, records, s.frequencies),
+    "recursive_least_squares": lambda a, records, _: recursive_least_squares(a, records),
+    "error_filtering": lambda a, records, _: error_filtering(a, records),
+    "constrained_least_squares": lambda a, records, _: constrained_least_squares(a, records),
+    "neural_gauss_newton": lambda a, records, s: neural_gauss_newton(a, records, s.low_pass),
+}
+METHODS = (*_REGRESSIONS, "output_error", "filter_error")
 
 #: Flight -> output or coefficient -> figure of merit -> value.
 Figures = dict[str, dict[str, dict[str, float]]]
@@ -67,8 +80,8 @@ def identify(
         aircraft, selections = supported(aircraft, records, settings.low_pass)
         lost = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(lost) or 'nothing'}")
-    integrated = None if method.endswith("equation_error") else Integrated.of(method, aircraft, records, settings)
-    fit = integrated.fit() if integrated else _equation_error(method, aircraft, records, settings)
+    integrated = None if method in _REGRESSIONS else Integrated.of(method, aircraft, records, settings)
+    fit = integrated.fit() if integrated else _REGRESSIONS[method](aircraft, records, settings)
     answered: Figures = {}
     for record in holdout:
         answers = predicted_coefficients(aircraft, fit.values, [record], settings.low_pass)
@@ -89,12 +102,6 @@ def _named(records: Sequence[FlightRecord]) -> list[FlightRecord]:
         name = record.name or "flight"
         names.append(name if name not in names else f"{name} ({names.count(name) + 1 + len(names)})")
     return [replace(record, name=name) for record, name in zip(records, names, strict=True)]
-
-
-def _equation_error(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings) -> Fit:
-    if method == "equation_error":
-        return equation_error(aircraft, records, settings.low_pass)
-    return frequency_equation_error(aircraft, records, settings.frequencies)
 
 
 def predicted_coefficients(

@@ -1,9 +1,10 @@
-"""Extended and unscented Kalman filters for state and parameters together: one pass along the flight.
+"""Extended, iterated and unscented Kalman filters for state and parameters together: one pass along the flight.
 
-Jategaonkar (2015), ch. 7; Julier & Uhlmann, "Unscented Filtering and Nonlinear Estimation", Proc. IEEE 92(3), 2004. The
-parameters join the state as constants, and the filter learns them as it goes. Both need the noise levels, which maximum
-likelihood finds by itself (``filter_error``'s ``extras`` serve); they are here for comparison, and to watch estimates
-form. Errors are the filter's own: honest where noise is white and its levels are right.
+Jategaonkar (2015), ch. 7; Bell & Cathey, "The Iterated Kalman Filter Update as a Gauss-Newton Method", IEEE Trans. AC
+38(2), 1993; Julier & Uhlmann, "Unscented Filtering and Nonlinear Estimation", Proc. IEEE 92(3), 2004.
+The parameters join the state as constants, and the filter learns them as it goes. All need the noise levels, which
+maximum likelihood finds by itself (``filter_error``'s ``extras`` serve); they are here for comparison, and to watch
+estimates form. Errors are the filter's own: honest where noise is white and its levels are right.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from sysid_node.batch.result import Estimate, interval
 from sysid_node.batch.rollout import output, rk4_step
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
+
+#: Gauss-Newton steps of an iterated correction.
+_ITERATIONS = 4
 
 #: Spread of the sigma points, and what is known of the distribution's shape (2: Gaussian).
 _SPREAD, _SHAPE = 0.5, 2.0
@@ -54,6 +58,11 @@ def extended_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, star
     Raises InputError where data do not fit the model, outputs have gaps, or the filter diverges.
     """
     return _filtered(model, manoeuvre, q, r, start_deviation, _extended_predict, _extended_correct)
+
+
+def iterated_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, start_deviation: Array) -> Track:
+    """Joint estimation, each sample's outputs linearised again where they lead to. As ``extended_kalman``."""
+    return _filtered(model, manoeuvre, q, r, start_deviation, _extended_predict, _iterated_correct)
 
 
 def unscented_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, start_deviation: Array) -> Track:
@@ -102,6 +111,27 @@ def _extended_correct(
     rest = jnp.eye(mean.size) - gain @ observation
     # Joseph's form: the covariance stays positive
     return mean + gain @ (y - observe(mean)), rest @ covariance @ rest.T + (gain * r) @ gain.T
+
+
+def _iterated_correct(
+    observe: Callable[[jax.Array], jax.Array], moments: Moments, y: jax.Array, r: jax.Array
+) -> Moments:
+    mean, covariance = moments
+
+    def gain_at(x: jax.Array) -> tuple[jax.Array, jax.Array]:
+        observation = jax.jacfwd(observe)(x)
+        cross = covariance @ observation.T
+        return _solve(observation @ cross + jnp.diag(r), cross.T).T, observation
+
+    def again(_: int, x: jax.Array) -> jax.Array:
+        gain, observation = gain_at(x)
+        # x = mean + K (y - h(x) - H (mean - x))
+        return mean + gain @ (y - observe(x) - observation @ (mean - x))
+
+    x = jax.lax.fori_loop(0, _ITERATIONS, again, mean)
+    gain, observation = gain_at(x)
+    rest = jnp.eye(mean.size) - gain @ observation
+    return x, rest @ covariance @ rest.T + (gain * r) @ gain.T
 
 
 def _unscented_predict(move: Callable[[jax.Array], jax.Array], moments: Moments, q: jax.Array) -> Moments:

@@ -1,15 +1,19 @@
 """Extended and unscented Kalman filters, against the published runs and against a linear problem's exact answer."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from made_models import NOISE, SHORT_PERIOD, flown, noisy, short_period_model, with_outputs
 from reference_flights import HFB_EKF, HFB_FILTER_NOISE, HFB_UKF, hfb_320
+from scipy.optimize import minimize_scalar
 
 from sysid_node.batch.output_error import output_error
-from sysid_node.batch.recursive import extended_kalman, unscented_kalman
+from sysid_node.batch.recursive import _iterated_correct, extended_kalman, iterated_kalman, unscented_kalman
 from sysid_node.errors import InputError
 
-FILTERS = pytest.mark.parametrize("method", [extended_kalman, unscented_kalman], ids=["extended", "unscented"])
+FILTERS = pytest.mark.parametrize(
+    "method", [extended_kalman, iterated_kalman, unscented_kalman], ids=["extended", "iterated", "unscented"]
+)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +41,7 @@ def test_the_unscented_filter_gives_the_published_figures(hfb):
 
 
 @FILTERS
-def test_both_end_near_maximum_likelihood(method):
+def test_all_end_near_maximum_likelihood(method):
     start = {name: 0.8 * value for name, value in SHORT_PERIOD.items()}
     manoeuvre = noisy(flown(short_period_model()), np.random.default_rng(1))
     deviation = np.array([1e-4, 1e-4, *(0.3 * abs(v) for v in SHORT_PERIOD.values())])
@@ -48,6 +52,16 @@ def test_both_end_near_maximum_likelihood(method):
         assert estimate.standard_error == pytest.approx(best.estimates[name].white_error, rel=0.25), name
     assert track.values.shape == track.errors.shape == (len(manoeuvre), 5)
     assert (track.errors[-1] < track.errors[0]).all()
+
+
+def test_the_iterated_correction_is_the_most_probable_state():
+    """A square is measured: prior and measurement together are least squares, which Gauss-Newton solves."""
+    (found,), covariance = _iterated_correct(
+        lambda x: x**2, (jnp.array([2.5]), jnp.array([[1.0]])), jnp.array([9.0]), jnp.array([0.04])
+    )
+    best = minimize_scalar(lambda x: (x - 2.5) ** 2 + (9.0 - x**2) ** 2 / 0.04, bounds=(1.0, 5.0), method="bounded")
+    assert float(found) == pytest.approx(best.x, abs=1e-4)
+    assert float(covariance[0, 0]) == pytest.approx(1.0 / (1.0 + (2.0 * best.x) ** 2 / 0.04), rel=1e-3)
 
 
 def test_a_filter_that_breaks_down_is_refused():

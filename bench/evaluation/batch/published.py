@@ -74,7 +74,7 @@ def _filters(case: published.ReferenceCase, biased: Fit) -> str:
     r, q = (np.array(variances) for variances in published.HFB_FILTER_NOISE)
     start = np.full(len(case.model.states) + len(case.model.names), np.sqrt(10.0))
     arguments = (case.model, case.manoeuvre, q / case.manoeuvre.step**2, r, start)
-    extended, unscented = extended_kalman(*arguments).final, unscented_kalman(*arguments).final
+    filters = (extended_kalman(*arguments).final, unscented_kalman(*arguments).final)
     rows = []
     for name, value in published.HFB_FILTER_ERROR.items():
         e = fit.estimates[name]
@@ -85,10 +85,7 @@ def _filters(case: published.ReferenceCase, biased: Fit) -> str:
                 f"{value:.4g}",
                 f"{e.value:.4g} ({e.standard_error:.2g})",
                 f"{(e.value - value) / e.standard_error:+.2f}",
-                *(
-                    f"{known} / {filtered[name].value:.4g}"
-                    for known, filtered in zip(others, (extended, unscented), strict=True)
-                ),
+                *(f"{known} / {here[name].value:.4g}" for known, here in zip(others, filters, strict=True)),
                 f"{biased.values[name]:.4g}",
             ]
         )
