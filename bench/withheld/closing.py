@@ -31,7 +31,7 @@ _READ = (0, 1, 2, 3, 4, 5, 9, 10, 11)  # IMU and air data, without the attitude
 
 
 def closed(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float] | None:
-    """Errors as shares of the motion: ``before``, ``after``, and with the file as it was given and the ``true_effect``.
+    """Errors as shares of the motion: ``before``, ``after``, and with the corrected file and the ``true_effect``.
 
     None where one cannot be flown. Kept beside the case.
     """
@@ -50,9 +50,9 @@ def _errors(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float
     truth = _flown(plant, plant.truth, label["effects"])
     effects = _effects((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     try:
+        corrected = load_aircraft(str(case / "out" / "corrected.yaml"))
         before = _flown(plant, load_aircraft(str(case / "aircraft.yaml")), {})
-        after = _flown(plant, load_aircraft(str(case / "out" / "corrected.yaml")), effects)
-        best = _flown(plant, load_aircraft(str(case / "aircraft.yaml")), label["effects"])
+        after, best = (_flown(plant, corrected, found) for found in (effects, label["effects"]))
     except DivergedError:
         return {}
     flights = {"before": before, "after": after, "true_effect": best}
