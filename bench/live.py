@@ -1,7 +1,8 @@
 """The live node at work: what is lost, how late estimates are, what it costs. `python bench/live.py [--seconds 60]`
 
 One process publishes 400 Hz IMU, 100 Hz air data and 100 Hz actuators, another is the identifier, this one listens.
-Latency is from the IMU message's header stamp to the estimate's arrival here, one DDS hop and one callback included.
+Latency is from the IMU message's header stamp to the estimate's publication, as DDS stamps it, and to its arrival here,
+one DDS hop and one callback later.
 Inputs are interpolated, so a sample waits until air data and actuators of its own time or later have come. Where all
 three are sampled together that takes no time; where they run free it takes up to their period, 10 ms here.
 """
@@ -99,15 +100,16 @@ def processor_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def listen(node, flight: BaseProcess, pid: int) -> tuple[list[float], dict[str, str], float]:
-    """Latencies (s), the last words of /diagnostics by key, and the node's share of one core."""
-    latencies: list[float] = []
+def listen(node, flight: BaseProcess, pid: int) -> tuple[list[tuple[int, int]], dict[str, str], float]:
+    """Latencies (ns) until publication and arrival, the last words of /diagnostics by key, the node's share of a core."""
+    latencies: list[tuple[int, int]] = []
     words: dict[str, str] = {}
     used = began = 0.0
 
-    def on_estimates(message) -> None:
+    def on_estimates(message, info) -> None:
         nonlocal used, began
-        latencies.append((time.time_ns() - stamp_ns(message.header.stamp)) / 1e9)
+        stamp = stamp_ns(message.header.stamp)
+        latencies.append((info["source_timestamp"] - stamp, time.time_ns() - stamp))
         if not began:
             used, began = processor_seconds(pid), time.monotonic()
 
@@ -137,7 +139,8 @@ def main() -> None:
     rclpy.init()
     print(f"{seconds:g} s of {IMU_RATE} Hz IMU + 100 Hz air data + 100 Hz actuators, estimates at {PUBLISH_RATE:g} Hz")
     print(
-        f"{'sampling':<10}{'sent':>8}{'lost':>6}{'rejected':>10}{'estimates':>11}{'p50 ms':>8}{'p99 ms':>8}{'CPU %':>7}"
+        f"{'sampling':<10}{'sent':>8}{'lost':>6}{'rejected':>10}{'estimates':>11}"
+        f"{'published: p50 ms':>19}{'p99 ms':>8}{'arrived: p50 ms':>17}{'p99 ms':>8}{'CPU %':>7}"
     )
     for together in (True, False):
         node = rclpy.create_node("bench")
@@ -150,10 +153,10 @@ def main() -> None:
         sent = ticks + 2 * (1 + (ticks - 1) // SLOW_EVERY)
         received = sum(int(words[f"{topic}: received"]) for topic in ("imu/data", "air_data", "actuators"))
         rejected = sum(int(count) for key, count in words.items() if key.startswith("rejected"))
-        p50, p99 = 1e3 * np.percentile(latencies, (50, 99))
+        (out50, in50), (out99, in99) = 1e-6 * np.percentile(latencies, (50, 99), axis=0)
         print(
             f"{'together' if together else 'free':<10}{sent:>8}{sent - received:>6}{rejected:>10}{len(latencies):>11}"
-            f"{p50:>8.2f}{p99:>8.2f}{100 * share:>7.1f}"
+            f"{out50:>19.2f}{out99:>8.2f}{in50:>17.2f}{in99:>8.2f}{100 * share:>7.1f}"
         )
     rclpy.shutdown()
 

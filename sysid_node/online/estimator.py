@@ -76,8 +76,8 @@ def _lowest(controls: int) -> tuple[float, ...]:
 def update(state: State, time: float, sample: Sequence[float]) -> None:
     """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s).
 
-    A sample that lacks a value other than thrust, has an impossible one, or does not come after the last one, is left
-    out and counted in ``incomplete``.
+    A sample that lacks a value, has an impossible one, or does not come after the last one, is left out and counted in
+    ``incomplete``. Where the first sample has no thrust it is taken as unknown, and as none, from then on.
     """
     if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = time + state.model.settings.settle_time
@@ -87,6 +87,8 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
         sample = _completed(state, time, sample)
         if not sample:
             return
+    elif state.thrust_known is None:
+        state.thrust_known = True
     previous = state.previous
     if previous is not None and time - previous[0] < SHORTEST:
         leave_out(state, len(sample))
@@ -110,9 +112,9 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
 def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[float]:
     """The sample with unknown thrust taken as none; empty, and counted, where anything else is missing."""
     filled = list(sample)
-    if not abs(filled[THRUST]) < LIMIT:
+    powerless = not abs(filled[THRUST]) < LIMIT and not state.thrust_known
+    if powerless:
         filled[THRUST] = 0.0
-        state.thrust_known = False
     for column, value in enumerate(filled):
         if not state.model.lowest[column] < value < LIMIT:
             leave_out(state, column)
@@ -120,6 +122,8 @@ def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[f
     if not time < LIMIT:
         leave_out(state, len(filled))
         return ()
+    if state.thrust_known is None:
+        state.thrust_known = not powerless
     return filled
 
 

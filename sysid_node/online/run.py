@@ -41,7 +41,7 @@ def run(
         end = min(begin + CHUNK, time.size)
         chunk = _prepare(results.state, time[begin:end], samples[begin:end])
         stops = due[(due >= begin) & (due < end)] - begin
-        if results.state.renewed is None or (results.state.thrust_known and chunk.powerless.any()):
+        if results.state.renewed is None:
             # what is missing is told from moment to moment
             for first, stop in pairwise(dict.fromkeys([0, *(stops + 1).tolist(), end - begin])):
                 _advance(results, chunk, first, stop, stops[stops + 1 == stop])
@@ -82,7 +82,6 @@ class _Chunk:
     given: Array  # (N,) of all samples given
     kept: NDArray[np.intp]  # (N + 1,) usable samples among the first of those given
     missing: NDArray[np.intp]  # (N,) what ``leave_out`` counts, -1 where a sample is usable or too early to count
-    powerless: NDArray[np.bool_]  # (N,) samples without a thrust
     time: Array  # (n,)
     begins: Array  # (n,) start of the interval; NaN where none leads to the sample
     values: Array  # (n, T) signals
@@ -95,7 +94,7 @@ class _Chunk:
 
 def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     """What ``update`` computes of each sample by itself, for many."""
-    usable, missing, powerless = _usable(state, time, samples)
+    usable, missing = _usable(state, time, samples)
     given, kept = time, np.concatenate([[0], np.cumsum(usable)])
     time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]
     thrust = estimator.THRUST
@@ -104,7 +103,7 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     if not time.size:
         empty = np.empty((0, state.model.layout.transformed))
         kernels = np.empty((0, 2, grid.rows))
-        return _Chunk(given, kept, missing, powerless, time, time, empty, empty, empty, kernels, time, state.previous)
+        return _Chunk(given, kept, missing, time, time, empty, empty, empty, kernels, time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -122,24 +121,31 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     kernels = transform.weights_of_many(grid, begins + 0.5 * steps, steps)
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
     intervals = columns[estimator.INTERVAL]
-    return _Chunk(given, kept, missing, powerless, time, begins, values, areas, slants, kernels, intervals, last)
+    return _Chunk(given, kept, missing, time, begins, values, areas, slants, kernels, intervals, last)
 
 
-def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.bool_]]:
-    """(N,) which samples ``update`` takes in, which column the others lack, and which have no thrust."""
+def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """(N,) which samples ``update`` takes in, and which column the others lack."""
     if np.isnan(state.begin) and time.size:
         state.begin = float(time[0]) + state.model.settings.settle_time
     possible = (samples > np.array(state.model.lowest)) & (samples < estimator.LIMIT)
     late = time >= state.begin
-    powerless = late & ~possible[:, estimator.THRUST]
-    possible[:, estimator.THRUST] = True
+    if not state.thrust_known:
+        powered = possible[:, estimator.THRUST].copy()
+        possible[:, estimator.THRUST] = True
+        complete = np.asarray(late & possible.all(axis=1))
+        if state.thrust_known is None and complete.any():
+            first = int(np.argmax(complete))
+            state.thrust_known = bool(powered[first])
+            if state.thrust_known:
+                possible[first:, estimator.THRUST] = powered[first:]
     complete = possible.all(axis=1)
     missing = np.where(late & ~complete, np.argmin(possible, axis=1), -1)
     usable = late & complete
     hasty = _hasty(state, time, np.flatnonzero(usable))
     missing[hasty] = samples.shape[1]
     usable[hasty] = False
-    return usable, missing, powerless
+    return usable, missing
 
 
 def _hasty(state: State, time: Array, rows: NDArray[np.intp]) -> list[int]:
@@ -161,8 +167,6 @@ def _advance(results: _Results, chunk: _Chunk, first: int, stop: int, wanted: ND
     state = results.state
     for column in chunk.missing[first:stop][chunk.missing[first:stop] >= 0].tolist():
         estimator.leave_out(state, column)
-    if chunk.powerless[first:stop].any():
-        state.thrust_known = False
     stops = deque(zip(chunk.kept[wanted + 1].tolist(), chunk.given[wanted].tolist(), strict=True))
     begin, end = int(chunk.kept[first]), int(chunk.kept[stop])
     while begin < end:

@@ -93,7 +93,7 @@ class State:
     samples: int = 0  # in the present segment
     intervals: float = 0.0  # s: sum of the air data's intervals in the present segment
     incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
-    thrust_known: bool = True
+    thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
     present: Information | None = None  # the present segment's, at the last renewal
     renewed: Renewed | None = None
     watch: Watch = field(default_factory=Watch)

@@ -90,12 +90,21 @@ def test_lost_samples_gaps_and_columns_that_are_missing() -> None:
     assert_same(AIRCRAFT, Settings(), time[keep], samples[keep], np.arange(0.0, SECONDS, 0.25))
 
 
-def test_thrust_lost_late_is_not_known_early() -> None:
-    """Only what came before an estimate may count in it."""
+@pytest.mark.parametrize("lost", [slice(400, 403), slice(1000, None)])
+def test_samples_without_thrust_are_left_out_once_it_is_known(lost: slice) -> None:
     time, samples = flight(2)
-    samples[1000:, THRUST] = np.nan
+    samples[lost, THRUST] = np.nan
     found = assert_same(AIRCRAFT, Settings(detect_changes=False), time, samples, np.array([9.0, 13.0]))
+    kept = np.isfinite(samples[:, THRUST])
+    again = run.run(AIRCRAFT, Settings(detect_changes=False), time[kept], samples[kept], np.array([9.0]))
+    assert repr(found[0]) == repr(again[0])
     assert found[0].derivatives["CL_0"].status != "thrust not measured"
+
+
+def test_thrust_that_comes_late_is_not_believed() -> None:
+    time, samples = flight(2)
+    samples[:300, THRUST] = np.nan
+    found = assert_same(AIRCRAFT, Settings(detect_changes=False), time, samples, np.array([9.0, 13.0]))
     assert found[1].derivatives["CL_0"].status == "thrust not measured"
 
 
