@@ -133,9 +133,9 @@ def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_
     if not state.thrust_known:
         powered = possible[:, estimator.THRUST].copy()
         possible[:, estimator.THRUST] = True
-        complete = np.asarray(late & possible.all(axis=1))
-        if state.thrust_known is None and complete.any():
-            first = int(np.argmax(complete))
+        others = np.flatnonzero(late & possible.all(axis=1))
+        if state.thrust_known is None and others.size:
+            first = int(others[0])
             state.thrust_known = bool(powered[first])
             if state.thrust_known:
                 possible[first:, estimator.THRUST] = powered[first:]
