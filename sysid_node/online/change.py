@@ -1,141 +1,167 @@
-"""Abrupt changes of the aircraft, and flight that the model no longer explains.
+"""Abrupt changes of the aircraft, and flight that the estimates do not explain.
 
-The transforms of the last few seconds are kept in pieces. Each time a piece is complete, the equations over the last
-one to four seconds are tested against the estimates from before them: the score A'r of the residual r is zero-mean with
-covariance s^2 A'KA + G C G while nothing has changed (C: covariance of the earlier estimates, G = A'A; with
-instruments Z'r and Z'KZ, G = Z'A, so that gusts are no change), so Q = (A'r)'
-Cov^-1 (A'r) is chi-square (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2, the generalised
-likelihood ratio over the time of change). Over spans much shorter than the period of the line spacing, A'KA is A'A over
-twice that spacing, whatever the span. A change is announced when Q cannot be chance and the changed derivatives explain
-most of what the old ones leave. Residuals that nothing explains are another matter: the model itself does not hold
-there (near the stall, say).
+The transforms of the last seconds are kept in pieces. Each time a piece is complete, stretches of one second and more
+that end in it are tested against the estimates from before them (``contradiction``): the generalised likelihood ratio
+over the time of change (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2).
+
+What is unlikely to be chance casts doubt: estimates that the last seconds contradict are not valid. What cannot be
+chance in an hour of flight ends them: all is learned anew from the time of change. It is announced as a change of the
+aircraft if earlier manoeuvres are contradicted as surely (``experience``); else the estimates were at fault. Residuals
+that no derivatives explain are another matter: there the model itself does not hold (near the stall, say).
 """
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gdtrix
 
 from sysid_node.online.auxiliary import Auxiliary
-from sysid_node.online.information import products
-from sysid_node.online.regression import STRONG, TINY, Plan, Solution, Uncertainty, misfits
+from sysid_node.online.contradiction import Contradiction, Reference, contradiction, disagreement
+from sysid_node.online.experience import Experience, recall
+from sysid_node.online.information import Spectrum, clean_lines
+from sysid_node.online.regression import Plan
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 PIECE = 0.5  # s
-SPANS = (2, 4, 8)  # pieces looked back over
-FALSE_ALARM = 1e-12  # a test: 7200 pieces an hour, times six coefficients and three spans
-MARGIN = 3.0  # and Q must exceed what chance allows by this factor: no model is exact
-EXPLAINED = 0.6  # share of the misfit that changed derivatives must explain
-MISFIT = 0.05  # share of the motion's energy that the misfit must reach to matter
+SPANS = (2, 4, 8, 16, 32)  # pieces looked back over
+EVERY = 4  # a span of n times so many pieces is looked at with every n-th piece
+FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about three spans
+MARGIN = 1.5  # and F must exceed what chance allows by this factor: no model is exact
+DOUBT = 1e-3  # chance under which a span casts doubt
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
-NOISY = 3.0  # times the noise's usual energy that the misfit must reach to be looked into
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
-USUAL = 4  # pieces in the span by which the usual size of Q is judged
-LEARNING = 0.05  # weight of each new Q in that judgement
-OUTLIER = 20.0  # a Q per derivative beyond this is no usual one
-
-
-@dataclass(frozen=True)
-class Reference:
-    """The estimates as they stood at one time (s)."""
-
-    time: float
-    solution: Solution
-    uncertainty: Uncertainty
-    strength: Array  # (P,) of the instruments that it rests on
+USUAL = 4  # pieces in the span by which the usual size of F is judged
+LEARNING = 0.02  # weight of each new F in that judgement
+AS_MUCH = 0.9  # share of the largest contradiction that is about as much
+OUTLIER = 10.0  # an F beyond this is no usual one
 
 
 @dataclass
 class Watch:
-    """The last pieces of the transform, the estimates that belong to their starts, and the usual Q per derivative."""
+    """The last pieces of the transform, the estimates that belong to their starts, and what was found of the spans."""
 
-    pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, W)
+    pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, T)
     references: deque[Reference] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))
-    usual: dict[int, float] = field(default_factory=dict)  # by coefficient: 1 where the model is exact
+    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))  # (C,) F where nothing changes
+    doubted: dict[int, Flags] = field(default_factory=dict)  # (C,) by span
+    lost: Flags | None = None  # (C,)
+    disowned: Flags | None = None  # (C,) by what was learned in well-excited flight
+    looks: int = 0
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What the last seconds say of each coefficient (C,), and since when the aircraft has changed, if it has."""
+    """What the last seconds say of each coefficient (C,), and since when (s) all must be learned anew, if it must."""
 
-    changed_since: float | None
-    lost: NDArray[np.bool_]
+    doubted: Flags
+    lost: Flags
+    since: float | None = None
+    changed: bool = False  # whether it is the aircraft that has changed
 
 
 @dataclass(frozen=True)
-class _Misfit:
-    """One coefficient's equation over one span, by the earlier estimates."""
+class Looking:
+    """What all tests of one time share."""
 
-    per_derivative: float  # Q over its number of derivatives
-    over_chance: float  # Q over what chance allows
-    explained: bool  # whether changed derivatives explain it
-    unexplained: bool  # whether nothing does
+    full: Plan
+    model: Auxiliary | None
+    spectrum: Spectrum
+    watch: Watch
+    now: float
+    memory: float  # s, inf = nothing is forgotten
+
+    def lines(self, span: int) -> tuple[float, Array]:
+        """Start (s) and clean lines of the last ``span`` pieces."""
+        pieces = self.watch.pieces
+        part = sum(piece for _, piece in islice(pieces, len(pieces) - span, None))
+        return pieces[-span][0], clean_lines(np.asarray(part), self.model)
+
+    def at(self, span: int, reference: Reference | None = None) -> Contradiction | None:
+        """How the last ``span`` pieces contradict the reference, else the estimates before them, if there are any."""
+        if span > len(self.watch.pieces):
+            return None
+        start = self.watch.pieces[-span][0]
+        known = reference or next((r for r in reversed(self.watch.references) if r.time <= start + 1e-6), None)
+        if known is None:
+            return None
+        return contradiction(known, self.lines(span)[1], self.spectrum, self.now - start)
 
 
-def examine(plan: Plan, model: Auxiliary | None, watch: Watch, density_per_gram: float, now: float) -> Finding:
-    """Test every span of the last pieces; see the module's text.
-
-    ``density_per_gram`` (s): A'KA over A'A where the span is much shorter than the period of the line spacing.
-    """
-    lost = np.zeros(len(plan.coefficients), dtype=bool)
-    best, since = MARGIN, None
-    for span in (span for span in SPANS if span <= len(watch.pieces)):
-        start = watch.pieces[-span][0]
-        reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
-        if reference is None:
+def examine(looking: Looking, experiences: list[Experience]) -> Finding:
+    """Test the spans that are due; see the module's text."""
+    watch, C = looking.watch, len(looking.full.coefficients)
+    watch.looks += 1
+    surest = 1.0
+    for span in SPANS:
+        if watch.looks % max(span // EVERY, 1):
+            continue
+        found = looking.at(span)
+        if found is None:
             break
-        part = np.sum([piece for _, piece in list(watch.pieces)[-span:]], axis=0)
-        gram = products(part, model)
-        energy = 0.5 * (len(part) - 1) * (now - start)
-        for c in _suspects(plan, reference, gram, energy):
-            misfit = _misfit(plan, reference, gram, c, density_per_gram, energy)
-            usual = max(watch.usual.get(c, 1.0), 1.0)
-            if misfit.explained and misfit.over_chance > best * usual:
-                # the change fell somewhere in the oldest piece: what came after it is all new
-                best, since = misfit.over_chance / usual, watch.pieces[1 - span][0]
-            if span == USUAL:
-                lost[c] = misfit.unexplained
-                watch.usual[c] = usual + LEARNING * (min(misfit.per_derivative, OUTLIER) - usual)
-    return Finding(since, lost)
+        known = found.freedom >= KNOWN
+        usual = _usual(watch, span, C)
+        watch.doubted[span] = known & (found.chance(usual) < DOUBT)
+        surest = min(surest, float(np.where(known, found.chance(MARGIN * usual), 1.0).min()))
+        if span == USUAL:
+            watch.lost = known & (found.share > LOST) & (found.unexplained > NOISE_RATIO)
+            _get_used_to(watch, found, C)
+    none = np.zeros(C, dtype=bool)
+    doubted = np.any([none if watch.disowned is None else watch.disowned, *watch.doubted.values()], axis=0)
+    lost = none if watch.lost is None else watch.lost
+    if surest >= FALSE_ALARM:
+        return Finding(doubted, lost)
+    span = _onset(looking)
+    changed = any(_contradicted(looking, span, experience, block) for block, experience in enumerate(experiences))
+    # the change fell somewhere in the oldest piece: what came after it is all new
+    return Finding(doubted, lost, watch.pieces[1 - span][0], changed)
 
 
-def _suspects(plan: Plan, reference: Reference, gram: Array, energy: float) -> list[int]:
-    """Coefficients whose earlier estimates are trusted and miss more than noise, a share of the motion that matters."""
-    v = misfits(plan, reference.solution.theta)
-    misfit = ((gram @ v) * v).sum(axis=0)
-    motion = gram.take(plan.square)
-    missed = (misfit > MISFIT * motion) & (misfit > NOISY * energy * reference.uncertainty.density) & (motion > TINY)
-    firm = (np.where(plan.mine > 0.0, reference.strength[:, None], np.inf) >= STRONG).all(axis=0)
-    return np.flatnonzero(missed & firm & (reference.uncertainty.freedom >= KNOWN)).tolist()
+def _usual(watch: Watch, span: int, C: int) -> Array:
+    """(C,) the usual F before the last ``span`` pieces, at least 1."""
+    return watch.usual[-span] if span <= len(watch.usual) else np.ones(C)
 
 
-def _misfit(plan: Plan, reference: Reference, gram: Array, c: int, density_per_gram: float, energy: float) -> _Misfit:
-    """How badly the earlier estimates of a coefficient fit the span, and what would mend it."""
-    mine, y = plan.unknowns(c), plan.outputs[c]
-    J = plan.columns[mine]
-    density = float(reference.uncertainty.density[c])
-    v = np.zeros(plan.width)
-    v[y], v[J] = 1.0, -reference.solution.theta[mine, c]
-    misfit, motion = float(v @ gram @ v), float(gram[y, y])
-    Z = plan.instruments[mine]
-    G, left_over = gram[np.ix_(Z, J)], gram @ v
-    score = left_over[Z]
-    mended = np.linalg.lstsq(G, score, rcond=1e-9)[0]
-    explained = float(2.0 * mended @ left_over[J] - mended @ gram[np.ix_(J, J)] @ mended)
-    # nuisances and unknowns take up as much of the noise's energy as of independent lines
-    left = (misfit - explained) / max(energy - (J.size + 3) * density_per_gram, 0.1 * energy)
-    C = reference.uncertainty.covariance[c][np.ix_(mine, mine)]
-    spread = max(density, left) * density_per_gram * gram[np.ix_(Z, Z)] + G @ C @ G.T
-    Q = float(score @ np.linalg.solve(spread + np.diag(spread.diagonal() * 1e-9 + 1e-300), score))
-    return _Misfit(
-        per_derivative=Q / J.size,
-        over_chance=Q / (2.0 * float(gdtrix(1.0, 0.5 * J.size, 1.0 - FALSE_ALARM))),
-        explained=explained > EXPLAINED * misfit,
-        unexplained=misfit - explained > LOST * motion and left > NOISE_RATIO * density,
-    )
+def _get_used_to(watch: Watch, found: Contradiction, C: int) -> None:
+    """Where models are not exact F is usually more than chance makes it."""
+    last = watch.usual[-1] if watch.usual else np.ones(C)
+    watch.usual.append(np.maximum(last + LEARNING * (np.minimum(found.statistic, OUTLIER) - last), 1.0))
+
+
+def _onset(looking: Looking) -> int:
+    """Pieces since the change: the shortest span that contradicts about as much as any."""
+    quadratics = []
+    for span in range(SPANS[0], len(looking.watch.pieces) + 1):
+        found = looking.at(span)
+        if found is None:
+            break
+        quadratics.append(float((found.statistic * found.count)[found.freedom >= KNOWN].max(initial=0.0)))
+    return SPANS[0] + int(np.argmax(np.array(quadratics) >= AS_MUCH * max(quadratics)))
+
+
+def _contradicted(looking: Looking, span: int, experience: Experience, block: int) -> bool:
+    """Whether the last ``span`` pieces contradict earlier manoeuvres that moved the controls as much."""
+    start, lines = looking.lines(span)
+    reference = recall(experience, looking.full, looking.now - looking.memory, start)
+    if reference is None or experience.beyond((lines[:, experience.controls] ** 2).sum(axis=0)):
+        return False
+    found = contradiction(reference, lines, looking.spectrum, looking.now - start)
+    mine = (looking.full.block == block) & (found.freedom >= KNOWN)
+    return bool((found.chance(MARGIN)[mine] < FALSE_ALARM).any())
+
+
+def compare(full: Plan, watch: Watch, experiences: list[Experience], memory: float) -> None:
+    """Doubt the estimates of a long time that those from well-excited flight contradict."""
+    published = watch.references[-1]
+    watch.disowned = np.zeros(len(full.coefficients), dtype=bool)
+    for block, experience in enumerate(experiences):
+        reference = recall(experience, full, published.time - memory, published.time)
+        if reference is not None:
+            firm = (full.block == block) & (reference.uncertainty.freedom >= KNOWN)
+            watch.disowned |= firm & (disagreement(reference, published) < DOUBT)

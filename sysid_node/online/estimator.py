@@ -20,6 +20,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online import information, regression, signals, transform
 from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
+from sysid_node.online.experience import experiences
 from sysid_node.online.prior import beliefs
 from sysid_node.online.renewal import RENEWAL, begin_segment, finish_segment, renew
 from sysid_node.online.settings import Settings
@@ -64,7 +65,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         memory=memory,
     )
     running = transform.start(grid, layout.transformed, memory)
-    return State(model, running, plan, information.nothing(layout))
+    return State(model, running, plan, information.nothing(layout), experiences=experiences(plan, layout))
 
 
 def _lowest(controls: int) -> tuple[float, ...]:

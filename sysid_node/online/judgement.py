@@ -30,7 +30,7 @@ def grounds(state: State, renewed: Renewed) -> Grounds:
     start, _, stop = state.model.settings.frequencies
     # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
     firm = (np.where(plan.mine > 0.0, renewed.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
-    sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost)[table.coefficient]
+    sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost & ~renewed.doubted)[table.coefficient]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
     return Grounds(
         sound=sound & ~spoilt,
@@ -111,6 +111,7 @@ def _reasons(
     reasons[:, (renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = "converging"
     if not state.thrust_known:
         reasons[:, table.needs_thrust] = "thrust not measured"
+    reasons[:, renewed.doubted[c]] = "contradicted"
     reasons[:, renewed.lost[c]] = "outside model"
     return reasons
 

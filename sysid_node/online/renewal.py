@@ -8,13 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import change, information, noise, regression, timing, transform, unevenness
-from sysid_node.online.change import PIECE, Reference, Watch
+from sysid_node.online.change import PIECE, Looking, Watch
+from sysid_node.online.contradiction import Reference
+from sysid_node.online.experience import experiences, learn
 from sysid_node.online.information import Information
 from sysid_node.online.state import Renewed, State
 from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 RENEWAL = PIECE  # s of data between renewals
+RECENT = 8  # pieces about whose mean motion is counted
 TIMING_EVERY = 4  # renewals between looks at the controls' timing, which changes slowly
 
 
@@ -63,7 +66,7 @@ def _weigh_piece(state: State) -> None:
     duration = state.transform.last - state.piece_start
     if duration <= 0.0 or not state.recent:
         return
-    pieces, every = state.watch.pieces, state.intervals / max(state.samples, 1)
+    pieces, every = list(state.watch.pieces)[-RECENT:], state.intervals / max(state.samples, 1)
     # about the mean of the last seconds, as slower motion is not in the lines
     mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (state.transform.last - pieces[0][0])
     model, rows = state.model, np.array(state.recent)
@@ -128,48 +131,68 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
     variance = spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
-    lost = np.zeros(len(plan.coefficients), dtype=bool)
+    none = np.zeros(len(plan.coefficients), dtype=bool)
     state.renewals += 1
     if last is None or state.renewals % TIMING_EVERY == 0:
         lags = timing.examine(plan, state.model.layout, solution, spread, gram)
     else:
         lags = last.timing
-    renewed = Renewed(total, solution, spread, compensation, past.grams.sum(axis=0), factors, lags, strength, lost)
+    base = past.grams.sum(axis=0)
+    renewed = Renewed(total, solution, spread, compensation, base, factors, lags, strength, none, none)
     state.renewed = renewed
-    state.watch.references.append(Reference(state.transform.last, solution, spread, strength))
+    state.watch.references.append(Reference(state.transform.last, plan, solution, spread))
     return renewed
 
 
 def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
-    density_per_gram = 0.5 / state.model.settings.frequencies[1]
     model, now = state.model, state.transform.last
-    finding = change.examine(state.plan, model.auxiliary, state.watch, density_per_gram, now)
-    renewed.lost = finding.lost
-    if finding.changed_since is not None:
-        _begin_anew(state, lines, finding.changed_since)
+    looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, now, _memory(state))
+    finding = change.examine(looking, state.experiences)
+    renewed.lost, renewed.doubted = finding.lost, finding.doubted
+    if finding.since is not None:
+        _begin_anew(state, lines, finding.since)
+    if finding.changed:
+        state.changed_at, state.experiences = now, experiences(model.plan, model.layout)
+
+
+def _memory(state: State) -> float:
+    """How long ago is not forgotten, s."""
+    return state.model.settings.window or state.model.memory
 
 
 def _begin_anew(state: State, lines: Array, since: float) -> None:
     """Forget all that was before ``since`` (s), the start of a piece."""
     now = state.transform.last
-    kept = [piece for start, piece in state.watch.pieces if start >= since - 1e-6]
+    kept = [piece * _fading(state, start + PIECE) for start, piece in state.watch.pieces if start >= since - 1e-6]
+    then = lines - np.sum(kept, axis=0)
+    _learn_before(state, then / _fading(state, since), since)
     # what is counted of the present segment is taken as even over its time
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
     state.uneven = state.uneven * share
     state.past = information.nothing(state.model.layout)
     state.inside.clear()
-    state.segment, state.segment_start = lines - np.sum(kept, axis=0), since
-    state.changed_at = now
+    state.segment, state.segment_start = then, since
     state.watch = Watch()
     _solve_all(state, _measure_segment(state, lines))
+
+
+def _learn_before(state: State, lines: Array, end: float) -> None:
+    """Remember the part of the present segment until ``end`` (s), when the transform was ``lines``."""
+    begin, model = state.segment_start, state.model
+    if end - begin < PIECE:
+        return
+    part = lines - state.segment * math.exp(0.5 * model.spectrum.rate * (begin - end))
+    learn(state.experiences, information.measure(part, model.auxiliary, model.spectrum, begin, end), end)
 
 
 def finish_segment(state: State) -> None:
     """Put the present segment to the finished ones."""
     if state.present is not None and state.renewed is not None:
         state.past = state.past + state.present
+        learn(state.experiences, state.present, state.transform.last)
+        change.compare(state.model.plan, state.watch, state.experiences, _memory(state))
         if state.model.settings.window:
             state.inside.append((state.transform.last, state.present))
         state.renewed.base = state.past.grams.sum(axis=0)

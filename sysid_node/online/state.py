@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.change import Watch
+from sysid_node.online.experience import Experience
 from sysid_node.online.information import Information, Spectrum
 from sysid_node.online.regression import Plan, Solution, Uncertainty
 from sysid_node.online.settings import Settings
@@ -66,6 +67,7 @@ class Renewed:
     timing: Timing  # whether the controls are felt when they are measured
     strength: Array  # (P,) of the instruments
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
+    doubted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
     grounds: Grounds | None = None  # made when first wanted
 
 
@@ -97,5 +99,6 @@ class State:
     present: Information | None = None  # the present segment's, at the last renewal
     renewed: Renewed | None = None
     watch: Watch = field(default_factory=Watch)
+    experiences: list[Experience] = field(default_factory=list)  # by block of the plan
     renewals: int = 0
     changed_at: float = -math.inf

@@ -22,7 +22,8 @@ class DerivativeEstimate(NamedTuple):
     lower: float
     upper: float
     valid: bool
-    status: str  # "ok", "converging", "not excited", "collinear with ...", "stale input", "outside model", "changed"
+    # "ok", "converging", "not excited", "collinear with ...", "stale input", "outside model", "contradicted", "changed"
+    status: str
 
 
 class FitQuality(NamedTuple):

@@ -59,6 +59,7 @@ STATUS_WORDS = {
     "converging": "not settled yet: more flying needed",
     "stale input": "a sensor was silent",
     "outside model": "flown where the model does not hold",
+    "contradicted": "contradicted by the last seconds",
     "changed": "changed in flight, being learned anew",
 }
 

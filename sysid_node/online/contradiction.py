@@ -1,0 +1,111 @@
+"""How strongly a stretch of flight contradicts the estimates from before it.
+
+With the earlier estimates theta the residual r = y - A theta of the stretch's lines is noise, and while nothing has
+changed the score Z'r has zero mean and the covariance S Z'KZ + G C G' (Z: the instruments, or the regressors A
+themselves, whichever the estimates were solved with; C: the estimates' covariance; G = Z'A; S K: the noise's). So
+
+    F = (Z'r)' [S Z'KZ + G C G']^-1 (Z'r) / p
+
+is Fisher's F with p and the residual density's degrees of freedom. It needs no strong instruments: where they are weak,
+C is large (the test of Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). Instruments from the deflections
+hold nothing of the gusts, so gusts are no contradiction. Over stretches shorter than the period of the line spacing
+Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no derivatives explain of the stretch
+itself: air that has become rougher is no contradiction either.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from sysid_node.online.information import Spectrum
+from sysid_node.online.regression import TINY, Plan, Solution, Uncertainty, misfits
+
+Array = NDArray[np.float64]
+
+LEAST = 0.1  # share of a stretch's energy that at least counts as the noise's, however many unknowns it has
+RIDGE = 1e-9  # share by which what did not move is set apart
+NUISANCES = 3  # lines that offset, constant and drift take up
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The estimates as they stood at one time (s), and by which equations."""
+
+    time: float
+    plan: Plan
+    solution: Solution
+    uncertainty: Uncertainty
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Of C coefficients over one stretch."""
+
+    statistic: Array  # (C,) F
+    count: Array  # (C,) derivatives, its first degrees of freedom
+    freedom: Array  # (C,) its second
+    unexplained: Array  # (C,) density that no derivatives explain, over the usual one
+    share: Array  # (C,) of the motion's energy that no derivatives explain
+
+    def chance(self, margin: Array | float) -> Array:
+        """(C,) probability of a statistic so large, ``margin`` times over, where nothing has changed."""
+        return np.asarray(fdtrc(self.count, np.maximum(self.freedom, 1.0), self.statistic / margin))
+
+
+def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, duration: float) -> Contradiction:
+    """Test the clean ``lines`` (2F, W) of a stretch of ``duration`` (s)."""
+    plan, known = reference.plan, reference.uncertainty
+    density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
+    band = np.tile(np.repeat(np.arange(len(spectrum.bands)), [b.stop - b.start for b in spectrum.bands]), 2)
+    gram = lines.T @ lines
+    left_over = gram @ misfits(plan, reference.solution.theta)
+    count = plan.mine.sum(axis=0)
+    rest = _unexplained(plan, reference, gram, left_over)
+    energy = 0.5 * len(lines) * duration
+    density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
+    excess = density / np.maximum(known.density, TINY)
+    Z = lines[:, plan.instruments]
+    noise = (Z.T * known.bands[:, None, band]) @ Z
+    noise *= (density_per_gram * np.maximum(excess, 1.0))[:, None, None]
+    G = gram[plan.instruments[:, None], plan.columns] * plan.same
+    spread = noise + G @ known.covariance @ G.T
+    score = (left_over[plan.instruments] * plan.mine).T
+    motion = np.maximum(gram.take(plan.square), TINY)
+    return Contradiction(_normalised(plan, spread, score) / count, count, known.freedom, excess, rest / motion)
+
+
+def _unexplained(plan: Plan, reference: Reference, gram: Array, left_over: Array) -> Array:
+    """(C,) the least that any change of the derivatives would leave of the residuals' energy."""
+    misfit: Array = left_over[plan.outputs, np.arange(plan.outputs.size)]
+    score = left_over[plan.columns] * plan.mine
+    misfit -= (score * reference.solution.theta).sum(axis=0)
+    normal = gram[plan.columns[:, None], plan.columns] * plan.same
+    normal += np.diag(RIDGE * normal.diagonal() + TINY)
+    misfit -= (score * np.linalg.solve(normal, score)).sum(axis=0)
+    return misfit
+
+
+def _normalised(plan: Plan, spread: Array, score: Array) -> Array:
+    """(C,) score' spread^-1 score of scores (C, P) over the unknowns that belong."""
+    mine = plan.mine.T
+    variance = spread.diagonal(axis1=1, axis2=2) * mine
+    weight = np.where(variance > 0.0, 1.0 / np.sqrt(np.maximum(variance, TINY**2)), 0.0)
+    correlation = spread * weight[:, :, None] * weight[:, None, :]
+    correlation += plan.unit * (RIDGE + (weight == 0.0))[:, :, None]
+    scaled = score * weight
+    return np.asarray((scaled * np.linalg.solve(correlation, scaled[:, :, None])[:, :, 0]).sum(axis=1))
+
+
+def disagreement(one: Reference, other: Reference) -> Array:
+    """(C,) the chance that the estimates of two stretches differ as much, were they independent and both unbiased."""
+    plan = one.plan
+    difference = ((one.solution.theta - other.solution.theta) * plan.mine).T
+    count = plan.mine.sum(axis=0)
+    spread = one.uncertainty.covariance + other.uncertainty.covariance
+    freedom = np.minimum(one.uncertainty.freedom, other.uncertainty.freedom)
+    return np.asarray(fdtrc(count, np.maximum(freedom, 1.0), _normalised(plan, spread, difference) / count))
