@@ -39,7 +39,7 @@ def main() -> None:
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     folder = args.out.resolve() / args.set
-    judged = []
+    judged, failed = [], []
     for seed in range(args.first, args.first + args.cases):
         case = draw(args.set, seed)
         if (args.plants and case.plant not in args.plants) or (args.kinds and case.kind not in args.kinds):
@@ -47,7 +47,8 @@ def main() -> None:
         if not args.judge and not _over(args.until):
             _finish(args.set, seed, folder, fly_only=args.fly)
         judged += list(_judged(args.set, folder, seed))
-    publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged), args.page)
+        failed += [path.read_text(encoding="utf-8").strip() for path in (folder / str(seed)).glob("failed.txt")]
+    publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged, failed), args.page)
 
 
 def _over(until: str | None) -> bool:

@@ -23,8 +23,8 @@ def interval(right: int, of: int) -> tuple[float, float]:
     return low, high
 
 
-def page(cases: Sequence[Judged]) -> str:
-    """The section of the documentation."""
+def page(cases: Sequence[Judged], failed: Sequence[str] = ()) -> str:
+    """The section of the documentation: cases that were judged, and what was said of those that failed."""
     if not cases:
         return "No case was diagnosed."
     own = [c for c in cases if c.label["plant"] != _FOREIGN]
@@ -39,6 +39,8 @@ def page(cases: Sequence[Judged]) -> str:
         "By effect: cases with it, how many were right, and what was said first in the others.",
         table(("effect", "plant", "cases", "right", "else"), _confusion(cases)),
     ]
+    if failed:
+        parts.append(f"Not judged: {len(failed)} ({'; '.join(failed)}).")
     return "\n\n".join(parts)
 
 
