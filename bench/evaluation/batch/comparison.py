@@ -1,0 +1,168 @@
+"""All methods on the same bundled flights: estimates against the truth, answers to a flight held out, cost.
+
+Every method starts from the same wrong aircraft file: each derivative off by its tolerance times a random number, so
+that nothing is won by what the file already knows.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluation.pages import table
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch import recursive
+from sysid_node.batch.identify import identify, predicted_coefficients
+from sysid_node.batch.integrated import choose_model
+from sysid_node.batch.manoeuvres import manoeuvre
+from sysid_node.batch.settings import Settings
+from sysid_node.batch.signals import averaged
+from sysid_node.batch.validation import figures
+from sysid_node.flight.logs import load_flight
+from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.truth import read_truth
+from sysid_node.online.run import run
+from sysid_node.online.settings import Settings as OnlineSettings
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+Array = NDArray[np.float64]
+BAGS = Path(__file__).resolve().parents[3] / "bags"
+
+WATCHED = ("CL_alpha", "CL_de", "CD_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_beta", "Cl_p", "Cl_da")
+WATCHED = (*WATCHED, "Cn_beta", "Cn_r", "Cn_dr")
+
+#: Process noise that the Kalman filters are told of, per root second: light turbulence, as an operator might guess.
+GUSTS = {"V": 0.4, "alpha": 0.03, "beta": 0.04, "p": 0.3, "q": 0.1, "r": 0.1, "phi": 1e-3, "theta": 1e-3}
+#: Kinds of the aircraft file's noise, by output.
+KINDS = {"V": "airspeed", "p": "gyro", "q": "gyro", "r": "gyro", "phi": "attitude", "theta": "attitude"}
+AIR_INTERVAL = 0.02  # s between air data in the bundled flights
+
+#: Value, lower and upper end of the interval; NaN where not valid.
+Found = Mapping[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A bundled flight, as every method gets it."""
+
+    aircraft: Aircraft
+    record: FlightRecord
+    truth: Mapping[str, float]
+
+
+@cache
+def case(name: str) -> Case:
+    """The flight of a bag, with the wrong aircraft file."""
+    aircraft = load_aircraft(name.partition("_")[0])
+    rng = np.random.default_rng(1)
+    wrong = {
+        key: replace(d, value=d.value + (d.tolerance or 0.0) * float(rng.standard_normal()))
+        for key, d in aircraft.derivatives.items()
+    }
+    record = replace(load_flight(BAGS / name, aircraft), name=name)
+    return Case(replace(aircraft, derivatives=wrong), record, read_truth(BAGS / name))
+
+
+def by_batch(method: str, flown: Case) -> Found:
+    """A method of ``sysid identify``, as it comes."""
+    fit = identify(method, flown.aircraft, [flown.record], Settings()).fit
+    return {n: (e.value, e.lower, e.upper) for n, e in fit.estimates.items() if e.valid and n in flown.truth}
+
+
+def by_online(method: str, flown: Case) -> Found:
+    """The online estimator's estimates at the end of the flight."""
+    record = flown.record
+    columns = {**record.columns, "air_interval": np.full(len(record), AIR_INTERVAL)}
+    samples = np.column_stack([columns[name] for name in (*SAMPLE_COLUMNS, *flown.aircraft.control_symbols)])
+    last = run(flown.aircraft, OnlineSettings(method=method), record.time, samples, record.time[-1:])[-1]
+    return {n: (d.value, d.lower, d.upper) for n, d in last.derivatives.items() if d.valid}
+
+
+def by_kalman(method: Callable[..., recursive.Track], flown: Case) -> Found:
+    """A filter of state and parameters, told the aircraft file's noise, values and tolerances."""
+    model, _ = choose_model(flown.aircraft, [flown.record], Settings())
+    piece = manoeuvre(model, averaged(flown.record, 100.0))
+    noise = flown.aircraft.noise
+    sensors = np.array(
+        [noise[KINDS.get(name, "accel" if name.startswith("a") and len(name) == 2 else name)] for name in model.outputs]
+    )
+    first = [sensors[model.outputs.index(name)] for name in model.states]
+    start = [flown.aircraft.derivatives[name].tolerance or 0.1 for name in model.names]
+    q = np.array([GUSTS[name] ** 2 for name in model.states])
+    final = method(model, piece, q, sensors**2, np.array([*first, *start])).final
+    return {n: (e.value, e.lower, e.upper) for n, e in final.items()}
+
+
+METHODS: Mapping[str, Callable[[Case], Found]] = {
+    "online, sls_rft": partial(by_online, "sls_rft"),
+    "online, iv_rft": partial(by_online, "iv_rft"),
+    **{
+        name.replace("_", " "): partial(by_batch, name)
+        for name in (
+            "recursive_least_squares",
+            "error_filtering",
+            "constrained_least_squares",
+            "equation_error",
+            "frequency_equation_error",
+            "neural_gauss_newton",
+        )
+    },
+    "extended Kalman filter": partial(by_kalman, recursive.extended_kalman),
+    "iterated Kalman filter": partial(by_kalman, recursive.iterated_kalman),
+    "unscented Kalman filter": partial(by_kalman, recursive.unscented_kalman),
+    "output error": partial(by_batch, "output_error"),
+    "filter error": partial(by_batch, "filter_error"),
+}
+
+
+def section(name: str, holdout: str) -> str:
+    """Errors on one flight, then what the estimates make of another."""
+    flown, other = case(name), case(holdout)
+    errors, answers = [], []
+    for label, method in METHODS.items():
+        begin = time.process_time()
+        found = method(flown)
+        seconds = time.process_time() - begin
+        errors.append([label, *_errors(found, flown.truth), f"{seconds:.1f}"])
+        answers.append([label, *_answers(found, other)])
+        print("#", name, *errors[-1], flush=True)
+    heads = ("error, %", *WATCHED, "mean", "intervals that hold", "processor, s")
+    checked = (
+        "",
+        *(f"{c}: error" for c in ("CL", "CD", "CY", "Cl", "Cm", "Cn")),
+        "Theil",
+        "R^2",
+        "white",
+        "with inputs",
+    )
+    return f"{table(heads, errors)}\n\nOn {holdout}, held out:\n\n{table(checked, answers)}"
+
+
+def _errors(found: Found, truth: Mapping[str, float]) -> list[str]:
+    """Errors in % of the truth, their mean size, how many intervals of those valid hold it."""
+    off = {n: 100.0 * (found[n][0] / truth[n] - 1.0) for n in WATCHED if n in found}
+    holding = [lower <= truth[n] <= upper for n, (_, lower, upper) in found.items() if n in truth]
+    mean = f"{np.mean(np.abs(list(off.values()))):.1f}" if off else "-"
+    return [*(f"{off[n]:+.1f}" if n in off else "-" for n in WATCHED), mean, f"{sum(holding)} of {len(holding)}"]
+
+
+def _answers(found: Found, other: Case) -> list[str]:
+    """Normalised error of each coefficient, then the means of the other figures; below the usual low-pass."""
+    values = {n: value for n, (value, _, _) in found.items()}
+    several = predicted_coefficients(other.aircraft, values, [other.record], Settings().low_pass)
+    if not several:
+        return ["-"] * 10
+    inputs = {s: np.interp(several[0].time, other.record.time, other.record[s]) for s in other.aircraft.control_symbols}
+    merits = figures(several[0], inputs)
+    own = [f"{merits[c]['normalised_error']:.3f}" if c in merits else "-" for c in ("CL", "CD", "CY", "Cl", "Cm", "Cn")]
+    means = [
+        np.mean([m[key] for m in merits.values()]) for key in ("theil", "r_squared", "whiteness", "input_correlation")
+    ]
+    return [*own, *(f"{mean:.3f}" for mean in means)]
