@@ -33,6 +33,9 @@ CAUTIONS = (1.0, 2.0, 4.0, 8.0, 16.0)
 #: s between two checks of an axis.
 PERIOD = 0.5
 
+#: Surfaces that do less, in what the file's do (for two, the product), or the opposite, are not relied on.
+LEAST_AUTHORITY = 0.1
+
 
 class Flown(NamedTuple):
     """What the law flies on: derivatives (D,) for the feedforward, gains (m, n) for the feedback."""
@@ -91,10 +94,10 @@ def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Setting
             used.append(name)
     if not used:
         return
-    try:
-        gains = state.axis.gains(values, CAUTIONS[0])
-    except np.linalg.LinAlgError:
+    if np.linalg.det(state.axis.authority(values)) < LEAST_AUTHORITY:
+        state.verdict = "kept: hardly any effect of the surfaces"
         return
+    gains = _gains(state.axis, values, CAUTIONS[0])
     state.check, state.checked_at = Check(values, _corners(state.axis, values, half), gains), now
     state.used = tuple(used)
 
@@ -129,8 +132,7 @@ def _corners(axis: Axis, values: Array, half: Array) -> Array:
 def _look(state: Adaptation, check: Check, settings: Settings) -> None:
     """The next few corners with the gains under test."""
     corners = check.corners[check.passed : check.passed + A_STEP]
-    found = margins(state.axis.model(corners), check.gains, state.axis.delay)
-    if not found.enough(settings.gain_margin, settings.phase_margin).all():
+    if not _have_margins(state.axis, corners, check.gains, settings):
         _be_more_cautious(state, check)
         return
     check.passed += len(corners)
@@ -141,12 +143,27 @@ def _look(state: Adaptation, check: Check, settings: Settings) -> None:
         state.verdict = "adapted" if caution == 1.0 else f"adapted, caution {caution:g}"
 
 
+def _have_margins(axis: Axis, corners: Array, gains: Array, settings: Settings) -> bool:
+    if not np.isfinite(gains).all():
+        return False
+    found = margins(axis.model(corners), gains, axis.delay)
+    return bool(found.enough(settings.gain_margin, settings.phase_margin).all())
+
+
 def _be_more_cautious(state: Adaptation, check: Check) -> None:
     check.caution, check.passed = check.caution + 1, 0
     if check.caution == len(CAUTIONS):
         state.check, state.refused, state.verdict = None, state.refused + 1, "kept: no margins at the corners"
         return
-    check.gains = state.axis.gains(check.values, CAUTIONS[check.caution])
+    check.gains = _gains(state.axis, check.values, CAUTIONS[check.caution])
+
+
+def _gains(axis: Axis, values: Array, caution: float) -> Array:
+    """The regulator's gains, NaN where there are none: those have no margins."""
+    try:
+        return axis.gains(values, caution)
+    except np.linalg.LinAlgError:
+        return np.full(axis.baseline.shape, np.nan)
 
 
 def _between(start: Flown, end: Flown, share: float) -> Flown:

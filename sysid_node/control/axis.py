@@ -61,12 +61,16 @@ class Axis:
         """The aircraft of derivatives (..., D), surfaces included."""
         return plant.behind_actuators(self.motion(self.named(values)), self.lag)
 
+    def authority(self, values: Array) -> Array:
+        """(m, m) what the surfaces of an aircraft of derivatives (D,) do, in what the file's do: 1 = the same."""
+        return np.asarray(np.linalg.solve(self.effect, self.motion(self.named(values)).B[self.moments]))
+
     def gains(self, values: Array, caution: float) -> Array:
         """Gains (m, n) for an aircraft of derivatives (D,), with ``caution`` times the baseline's weight on surfaces.
 
         Raises LinAlgError where there are none.
         """
-        share = np.linalg.solve(self.effect, self.motion(self.named(values)).B[self.moments])
+        share = self.authority(values)
         return regulator.gains(self.model(values), self.Q, caution * self.weight * share.T @ share)
 
 

@@ -69,7 +69,7 @@ def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[f
 def _fall_back(state: State, sensed: Sensed) -> None:
     """Head for the baseline where estimates are old or a sensor is silent."""
     silent = [name for name, value in sensed._asdict().items() if not math.isfinite(value)]
-    age = sensed.time - state.heard
+    age = abs(sensed.time - state.heard)  # the clock may step back
     if silent:
         state.stale = f"{silent[0]} not measured"
     elif age > state.settings.stale_after:

@@ -22,7 +22,10 @@ _WEIGHTS = np.logspace(-3.0, 6.0, 91)  # among which the weight on the surfaces 
 
 def gains(plant: Linear, Q: Array, R: Array) -> Array:
     """K (m, n) of u = -K x that minimises the integral of x'Qx + u'Ru; Q (n,) the diagonal. LinAlgError: none does."""
-    P = solve_continuous_are(plant.A, plant.B, np.diag(Q), R)
+    try:
+        P = solve_continuous_are(plant.A, plant.B, np.diag(Q), R)
+    except ValueError as error:  # not finite
+        raise np.linalg.LinAlgError(str(error)) from None
     return np.asarray(np.linalg.solve(R, plant.B.T @ P))
 
 

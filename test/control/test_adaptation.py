@@ -1,0 +1,155 @@
+"""Gates, checks over the corners, bounded movement, fall-back: what is flown, and when."""
+
+import math
+
+import numpy as np
+import pytest
+from flying import AIRCRAFT, NAN, STEP, beliefs, level
+
+from sysid_node.control import adaptation, controller
+from sysid_node.control.axis import axes
+from sysid_node.control.margins import margins
+from sysid_node.control.settings import Settings
+from sysid_node.control.types import SetPoints
+from sysid_node.errors import InputError
+
+ELEVATOR = {"Cm_de": 0.4, "CL_de": 0.4}
+
+
+def flown(state: controller.State, seconds: float, estimates: object, start: float = 0.0) -> float:
+    """Level flight with the same estimates at 20 Hz; returns when it ended, s."""
+    count = round(seconds / STEP)
+    for k in range(count):
+        now = start + k * STEP
+        if estimates is not None and k % 10 == 0:
+            controller.hear(state, now, estimates)
+        controller.step(state, level(now), SetPoints())
+    return start + count * STEP
+
+
+@pytest.fixture
+def state() -> controller.State:
+    return controller.init(AIRCRAFT, Settings())
+
+
+def baseline(state: controller.State) -> bool:
+    """Whether the baseline's gains are flown."""
+    return all(np.allclose(axis.flown.gains, axis.axis.baseline) for axis in state.axes)
+
+
+def test_the_baseline_has_good_margins() -> None:
+    for axis in axes(AIRCRAFT, 0.05, 0.02):
+        found = margins(axis.model(axis.believed), axis.baseline, axis.delay)
+        assert bool(found.enough(10.0 ** (12.0 / 20.0), math.radians(60.0)))
+
+
+def test_estimates_equal_to_the_file_change_nothing(state: controller.State) -> None:
+    flown(state, 5.0, beliefs(half=0.02))
+    assert state.axes[0].verdict == "adapted"
+    for axis in state.axes:
+        np.testing.assert_allclose(axis.flown.gains, axis.axis.baseline, rtol=1e-6, atol=1e-9)
+
+
+def test_a_surface_of_less_effect_gets_more_gain(state: controller.State) -> None:
+    """Gains in the moments that they make stay what they were: 1 / 0.4 of the baseline's."""
+    flown(state, 8.0, beliefs(ELEVATOR, half=0.02))
+    pitch = state.axes[0]
+    assert pitch.verdict == "adapted"
+    ratio = pitch.flown.gains[0, 1:4] / pitch.axis.baseline[0, 1:4]
+    np.testing.assert_allclose(ratio, 2.5, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"valid": False}, {"explained": 0.5}, {"value": NAN}, {"lower": -math.inf}, {"lower": NAN, "upper": NAN}],
+)
+def test_what_is_not_to_be_trusted_is_not_used(state: controller.State, changes: dict[str, float]) -> None:
+    flown(state, 3.0, beliefs(ELEVATOR, **changes))
+    assert baseline(state)
+    assert all(axis.accepted == 0 for axis in state.axes)
+
+
+def test_wide_intervals_are_not_used(state: controller.State) -> None:
+    flown(state, 3.0, beliefs(ELEVATOR, half=2.0 * state.settings.tightness))
+    assert baseline(state)
+
+
+def test_what_is_flown_has_margins_at_every_corner(state: controller.State) -> None:
+    estimates = beliefs({**ELEVATOR, "Cm_alpha": -0.3}, half=0.1)
+    flown(state, 8.0, estimates)
+    for axis in state.axes:
+        assert axis.accepted > 0
+        values = np.array([estimates[name].value for name in axis.axis.derivatives])
+        half = np.array([0.5 * (estimates[n].upper - estimates[n].lower) for n in axis.axis.derivatives])
+        corners = adaptation._corners(axis.axis, values, half)
+        found = margins(axis.axis.model(corners), axis.target.gains, axis.axis.delay)
+        assert found.enough(2.0, math.pi / 4.0).all()
+
+
+def test_wide_corners_ask_for_caution(state: controller.State) -> None:
+    flown(state, 5.0, beliefs(half=0.35))
+    assert "caution" in state.axes[0].verdict or "kept" in state.axes[0].verdict
+
+
+@pytest.mark.parametrize("share", [0.05, 0.0, -0.5])
+def test_surfaces_without_effect_or_reversed_are_not_relied_on(state: controller.State, share: float) -> None:
+    flown(state, 3.0, beliefs({"Cm_de": share}, half=0.02))
+    np.testing.assert_allclose(state.axes[0].flown.gains, state.axes[0].axis.baseline)
+    assert "hardly any effect" in state.axes[0].verdict
+
+
+def test_no_margins_at_the_corners_keeps_what_is_flown() -> None:
+    strict = controller.init(AIRCRAFT, Settings(gain_margin=6.0, phase_margin=1.2))
+    flown(strict, 5.0, beliefs(ELEVATOR, half=0.35))
+    assert strict.axes[0].refused > 0
+    assert "no margins" in strict.axes[0].verdict
+    np.testing.assert_allclose(strict.axes[0].flown.gains, strict.axes[0].axis.baseline)
+
+
+def test_gains_move_at_a_bounded_rate(state: controller.State) -> None:
+    pitch, last, fastest = state.axes[0], state.axes[0].flown.gains, 0.0
+    estimates = beliefs(ELEVATOR, half=0.02)
+    for k in range(1200):
+        if k % 10 == 0:
+            controller.hear(state, k * STEP, estimates)
+        controller.step(state, level(k * STEP), SetPoints())
+        fastest = max(fastest, float(np.abs(pitch.flown.gains - last).max() / np.abs(pitch.axis.baseline).max()))
+        last = pitch.flown.gains
+    assert not baseline(state)
+    assert 0.0 < fastest <= state.settings.gain_rate * STEP * 1.001
+
+
+def test_old_estimates_bring_the_baseline_back(state: controller.State) -> None:
+    end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
+    assert not baseline(state)
+    flown(state, 0.4, None, end)
+    assert state.stale == ""
+    flown(state, 6.0, None, end + 0.4)
+    assert "no estimates for" in state.stale
+    assert baseline(state)
+
+
+def test_a_silent_sensor_brings_the_baseline_back(state: controller.State) -> None:
+    end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
+    for k in range(1200):
+        controller.step(state, level(end + k * STEP, alpha=NAN), SetPoints())
+    assert state.stale == "alpha not measured"
+    assert baseline(state)
+
+
+def test_adaptation_can_be_switched_off() -> None:
+    fixed = controller.init(AIRCRAFT, Settings(adapt=False))
+    flown(fixed, 3.0, beliefs(ELEVATOR, half=0.02))
+    assert baseline(fixed)
+
+
+def test_impossible_settings_are_refused() -> None:
+    with pytest.raises(InputError, match="gain_margin"):
+        Settings(gain_margin=0.5)
+    with pytest.raises(InputError, match="delay"):
+        Settings(delay=NAN)
+
+
+def test_slow_actuators_are_refused() -> None:
+    with pytest.raises(InputError, match="too slow"):
+        controller.init(AIRCRAFT, Settings(actuator_lag=1.0, delay=0.5))

@@ -1,0 +1,101 @@
+"""The control law: commands that are always finite and within limits, and set-points that are tracked."""
+
+import math
+
+import numpy as np
+import pytest
+from flying import AIRCRAFT, LEVEL, STEP, beliefs, level
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sysid_node.control import controller
+from sysid_node.control.settings import Settings
+from sysid_node.control.types import Belief, Sensed, SetPoints
+from sysid_node.sim import Simulator, live, trim_flight
+
+ANY = st.floats(allow_nan=True, allow_infinity=True, width=32)
+STATE = controller.init(AIRCRAFT, Settings())
+LIMITS = [control.limit for control in AIRCRAFT.controls.values()]
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    sensed=st.tuples(*[ANY] * 9),
+    points=st.builds(SetPoints, ANY, ANY, ANY, ANY, ANY),
+    estimate=st.builds(Belief, ANY, ANY, ANY, st.booleans(), ANY),
+    step=st.floats(0.0, 1.0),
+)
+def test_whatever_comes_in_a_flyable_command_goes_out(
+    sensed: tuple[float, ...], points: SetPoints, estimate: Belief, step: float
+) -> None:
+    now = (STATE.time if math.isfinite(STATE.time) else 0.0) + step
+    controller.hear(STATE, now, {"Cm_de": estimate})
+    command = controller.step(STATE, Sensed(now, *sensed), points)
+    assert np.isfinite(command).all()
+    assert (np.abs(command[:3]) <= np.array(LIMITS) + 1e-12).all()
+    assert 0.0 <= command.thrust <= 30.0
+
+
+def test_level_flight_asks_for_the_trim() -> None:
+    state = controller.init(AIRCRAFT, Settings())
+    trim = trim_flight(Simulator(AIRCRAFT, 100.0))
+    command = controller.step(state, level(0.0), SetPoints())
+    np.testing.assert_allclose(command[:3], trim.command[:3], atol=0.01)
+    assert command.thrust == pytest.approx(trim.command[3], abs=0.5)
+
+
+def test_commands_move_at_a_bounded_rate() -> None:
+    state = controller.init(AIRCRAFT, Settings(command_rate=1.0))
+    before = controller.step(state, level(0.0), SetPoints())
+    after = controller.step(state, level(STEP, theta=LEVEL + 0.5, q=2.0), SetPoints(roll=0.8))
+    assert np.abs(np.subtract(after[:3], before[:3])).max() <= 1.0 * STEP + 1e-12
+
+
+def fly(points: SetPoints, seconds: float, excitation: float = 0.0) -> tuple[controller.State, live.Reading]:
+    """The simulator, its actuators lagging, under the controller at 100 Hz."""
+    simulator = Simulator(AIRCRAFT, 100.0)
+    trim = trim_flight(simulator)
+    flight = live.start(
+        simulator, trim, live.Air(noise=0.0), live.vector(simulator, ["actuator_lag:time_constant=0.05"])
+    )
+    state, command = controller.init(AIRCRAFT, Settings()), trim.command.tolist()
+    for _ in range(round(seconds * 100)):
+        now = live.step(simulator, flight, command)
+        _, _, _, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
+        sensed = Sensed(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
+        command = controller.step(state, sensed, points, (excitation, 0.0, 0.0))
+    return state, now
+
+
+@pytest.mark.parametrize(
+    ("points", "column", "wanted", "within"),
+    [
+        (SetPoints(roll=0.3), 6, 0.3, 0.005),
+        (SetPoints(roll=-0.2, pitch=0.15), 7, 0.15, 0.005),
+        (SetPoints(sideslip=0.05), 11, 0.05, 0.0075),  # its error is not integrated, as those of roll and pitch are
+        (SetPoints(airspeed=20.0), 9, 20.0, 0.5),
+    ],
+)
+def test_set_points_are_reached(points: SetPoints, column: int, wanted: float, within: float) -> None:
+    _, now = fly(points, 12.0)
+    assert now.outputs[column] == pytest.approx(wanted, abs=within)
+
+
+def test_a_pitch_rate_is_tracked() -> None:
+    _, now = fly(SetPoints(pitch_rate=0.1), 2.0)
+    assert now.outputs[4] == pytest.approx(0.1, rel=0.1)
+
+
+def test_a_disturbance_is_integrated_away() -> None:
+    """A constant deflection on top of the command, as a trim error: pitch comes back to where it should be."""
+    _, now = fly(SetPoints(pitch=0.1), 15.0, excitation=0.02)
+    assert now.outputs[7] == pytest.approx(0.1, abs=0.003)
+
+
+def test_the_clock_may_step_back() -> None:
+    state = controller.init(AIRCRAFT, Settings())
+    controller.step(state, level(100.0), SetPoints())
+    controller.hear(state, 100.0, beliefs())
+    command = controller.step(state, level(3.0), SetPoints())
+    assert np.isfinite(command).all()
+    assert "no estimates for" in state.stale
