@@ -5,13 +5,17 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.show import progress_bar
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.topics import topic_names
@@ -31,7 +35,13 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("bags", metavar="BAG", type=Path, nargs="+", help="rosbag2 folder, .mcap, .db3 or .csv file")
     add("--aircraft", required=True, metavar="FILE|NAME", help="aircraft file, or name as in cdrw: the belief")
     add("--holdout", action="append", default=[], metavar="BAG", type=Path, help="a flight to check on, not to fit")
-    add("--out", required=True, metavar="DIR", type=Path, help="folder for the results")
+    add(
+        "--out",
+        required=True,
+        metavar="DIR",
+        type=Path,
+        help="folder for the results; an interrupted run, started again with the same folder, goes on where it stopped",
+    )
     add("--topic", action="append", default=[], metavar="OURS:=THEIRS", help="a topic's name in the bags")
     add("--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu)")
     add("--quiet", action="store_true", help="print nothing")
@@ -48,12 +58,22 @@ def run(args: argparse.Namespace) -> None:
     flights, holdouts = (
         [load_flight(path, aircraft, topics, args.body_frame) for path in paths] for paths in (args.bags, args.holdout)
     )
-    with progress_bar("gap", quiet=args.quiet) as progress:
-        found = diagnose(aircraft, flights, holdouts, lambda share, _: progress(share))
+    with _progress(quiet=args.quiet) as progress:
+        found = diagnose(aircraft, flights, holdouts, progress, keep=args.out / "unfinished")
     write_gap(args.out, found)
     if not args.quiet:
         print(opening_text(found))
         print(args.out / "report.html")
+
+
+@contextmanager
+def _progress(*, quiet: bool) -> Iterator[Callable[[float, str], None]]:
+    """A bar on stderr that says what is being done; nothing where ``quiet`` or where stderr is a file."""
+    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
+        task = progress.add_task("reading the flights", total=1.0)
+        yield lambda share, doing: progress.update(task, completed=share, description=doing)
 
 
 def write_gap(folder: Path, found: Diagnosis) -> None:

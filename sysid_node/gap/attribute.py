@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
-from sysid_node.gap.fit import Fit, Projected, blank, polish, with_candidates
+from sysid_node.gap.fit import Fit, Projected, blank, linearised, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import power_of
 from sysid_node.gap.steps import Steps
@@ -86,6 +86,16 @@ class Attribution:
     causes: tuple[Cause, ...]
     table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
+
+    def as_filed(self) -> Attribution:
+        """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
+        neutral = tuple(view.simulator.neutral() for view in self.base.fit.views)
+        return replace(self, corrected=linearised(replace(self.base.fit, points=neutral)))
+
+    def without_causes(self) -> Attribution:
+        """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
+        corrected = instrumented(instrumented(self.base.fit))
+        return replace(self, chosen=self.base, corrected=corrected, left=structure_of(self.base.fit), causes=())
 
 
 def attribute(

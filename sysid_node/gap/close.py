@@ -47,7 +47,7 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
 
     def errors(weight: Array, share: Array) -> Array:
         """Overall errors (4,) at weights (G,) of the groups, where such a share (12,) of the remainder is structure."""
-        floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - share)), stages[1])
+        floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - share)), np.minimum(stages[0], stages[1]))
         table = np.stack([*stages, floor])  # (4, groups, 12)
         shares = (table * weight[:, None]).sum(axis=1) / np.maximum((measured * weight[:, None]).sum(axis=0), 1e-300)
         return np.asarray(np.sqrt(shares[:, counted].mean(axis=1))) if counted.any() else np.zeros(4)
@@ -55,7 +55,7 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
     all_equal, structured = np.ones(len(groups)), np.clip(left.share, 0.0, 1.0)
     overall = errors(all_equal, structured)
     shrinks = _shrinks(errors, left, len(groups))
-    floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - structured)), stages[1])
+    floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - structured)), np.minimum(stages[0], stages[1]))
     table = np.stack([*stages, floor])
     own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
     names = ("before", "tolerances", "after", "noise_floor")

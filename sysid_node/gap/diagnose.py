@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,9 @@ from sysid_node.gap.fit import Fit
 from sysid_node.gap.flights import RATE, Flight
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.next_flight import propose
-from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.nuisance import Nuisances, nuisances_of
 from sysid_node.gap.steps import Steps
-from sysid_node.gap.structure import instrumented
+from sysid_node.gap.structure import Structure, instrumented
 from sysid_node.gap.view import CHANNELS, View, view_of
 from sysid_node.sim import Simulator
 
@@ -39,6 +39,9 @@ _CHANCE = 4.0
 #: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
 _EXPLAINED = 0.5
 
+#: Probability, with what is left over counted against it, below which no cause is said to explain.
+_LIKELY = 0.5
+
 #: A rival with this probability is named.
 _NAMED = 0.03
 
@@ -47,6 +50,9 @@ _TELLING = 6.0
 
 #: Travel below which no surface counts as moved, rad.
 _TRAVEL = 0.004
+
+#: Separation, in standard deviations, from which a flight tells two effects apart.
+_PARTED = 3.0
 
 #: What to fly where no pair of effects is in doubt.
 _LARGER = "3-2-1-1 on each surface in turn, larger and at two airspeeds, in still air"
@@ -94,21 +100,51 @@ def diagnose(
     steps = Steps.of(keep, views)
     attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps)
     progress(0.92, "the gap on flight not fitted")
-    if holdouts:
-        unseen = [_checked(view_of(simulator, flight)) for flight in holdouts]
-        own = [nuisances_of(aircraft, view) for view in unseen]
-        base, final = (held_out(f, unseen, own) for f in (instrumented(attribution.base.fit), attribution.corrected))
-    else:
-        unseen, base, final = views, attribution.base.evidence, attribution.chosen.evidence
-    neutral = simulator.neutral()
-    gap = close.gap_of(unseen, [v.residual(neutral) for v in unseen], base, final, attribution.left)
-    verdict = _verdict(views, attribution, base, final)
-    found = localise.where(attribution, [v.residual(neutral) for v in views])
+    unseen = [_checked(view_of(simulator, flight)) for flight in holdouts]
+    own = [nuisances_of(aircraft, view) for view in unseen]
+    check = _check(attribution, unseen, own)
+    if attribution.causes and check.gap.after >= min(check.gap.before, check.gap.tolerances):
+        attribution = attribution.without_causes()
+        check = _check(attribution, unseen, own)
+    if not attribution.causes and check.gap.tolerances > check.gap.before:
+        attribution = attribution.as_filed()
+        check = check.as_filed(attribution.left)
+    verdict = _verdict(views, attribution, check)
+    progress(0.95, "what to fly next")
+    found = localise.where(attribution, [v.residual(simulator.neutral()) for v in views])
+    flight = _next_flight(verdict, attribution)
     steps.forget()
     return Diagnosis(
-        aircraft, verdict, gap, found, attribution, localise.missing(attribution), tuple(unseen), base, final,
-        _next_flight(verdict, attribution), bool(holdouts), confusion_of(attribution.base, attribution.trials),
+        aircraft, verdict, check.gap, found, attribution, localise.missing(attribution), check.views, check.base,
+        check.final, flight, bool(holdouts), confusion_of(attribution.base, attribution.trials),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Check:
+    """What flight not fitted says of an explanation."""
+
+    views: tuple[View, ...]
+    base: Evidence
+    final: Evidence
+    gap: Gap
+
+    def as_filed(self, left: Structure) -> _Check:
+        """The same of the aircraft file as it is."""
+        before = tuple(v.residual(v.simulator.neutral()) for v in self.views)
+        base = replace(self.base, residuals=before)
+        return replace(self, base=base, final=base, gap=close.gap_of(self.views, before, base, base, left))
+
+
+def _check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> _Check:
+    """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
+    if unseen:
+        base, final = (held_out(f, unseen, own) for f in (instrumented(attribution.base.fit), attribution.corrected))
+    else:
+        base, final = attribution.base.evidence, attribution.chosen.evidence
+    views = base.views
+    before = [v.residual(v.simulator.neutral()) for v in views]
+    return _Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))
 
 
 def _require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
@@ -148,14 +184,15 @@ def _excitation(view: View) -> Array:
     return np.asarray((power / view.noise[1:].sum(axis=0))[view.axes])
 
 
-def _verdict(views: Sequence[View], attribution: Attribution, base: Evidence, final: Evidence) -> str:
+def _verdict(views: Sequence[View], attribution: Attribution, check: _Check) -> str:
     if max(_excitation(view).max() for view in views) < _TELLING:
         return "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) else "no_gap"
-    if final.total <= base.total or explained(attribution) < _EXPLAINED:
+    if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
         return "unknown_effect"
-    return "explained" if all(c.probability >= _TOLD_APART for c in attribution.causes) else "ambiguous"
+    sure = [c.probability >= _TOLD_APART and probability(attribution, c) >= _LIKELY for c in attribution.causes]
+    return "explained" if all(sure) else "ambiguous"
 
 
 def structured(attribution: Attribution) -> bool:
@@ -260,11 +297,26 @@ def _next_flight(verdict: str, attribution: Attribution) -> str:
     best = propose(attribution.chosen.fit, pairs)
     if best is None:
         return _LARGER
-    parted = sorted({e for cause in attribution.causes for e in (cause.candidate.effect, *_named(cause))})
+    if best.separation < _PARTED:
+        return (
+            f"no manoeuvre parts {_listed(attribution)} (at most {best.separation:.2g} standard deviations): what they "
+            "do in flight is the same; measure on the ground"
+        )
+    if best.separation <= best.flown:
+        return (
+            f"the same again, longer and in still air: no other manoeuvre tried parts {_listed(attribution)} better than "
+            f"those flown ({best.flown:.3g} standard deviations of the sensors' noise)"
+        )
     return (
-        f"{best.words}, in still air: parts {', '.join(parted)} by {best.separation:.3g} standard deviations or more, "
-        f"the manoeuvres flown by {best.flown:.3g}"
+        f"{best.words}, in still air: parts {_listed(attribution)} by {best.separation:.3g} standard deviations or "
+        f"more, the manoeuvres flown by {best.flown:.3g}"
     )
+
+
+def _listed(attribution: Attribution) -> str:
+    """The causes in doubt and what is named beside them."""
+    doubtful = [cause for cause in attribution.causes if _named(cause)]
+    return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *_named(cause))))
 
 
 def _named(cause: Cause) -> list[str]:

@@ -22,6 +22,7 @@ def opening_text(found: Diagnosis) -> str:
 
 SECTIONS: tuple[Section[Diagnosis], ...] = (
     Section("opening", "", "gap_opening.html.j2", gap.opening),
+    Section("channels", "How far off, before and after", "gap_channels.html.j2", gap.channels),
     Section("where", "Where the gap lies", "gap_where.html.j2", gap.where),
     Section("flight", "Measured and simulated", "gap_flight.html.j2", gap.flight),
     Section("candidates", "What could cause it", "gap_candidates.html.j2", gap.candidates),

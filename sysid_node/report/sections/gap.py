@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sysid_node.gap.diagnose import Diagnosis, document, structured
+from sysid_node.gap.nuisance import GUSTY
 from sysid_node.gap.view import CHANNELS
 from sysid_node.report import figures
 from sysid_node.report.figures import BLUE, GREEN, MUTED, PURPLE, VERMILION, Figure
@@ -28,21 +29,44 @@ _WORDS = {
     "psi": "heading",
 }
 
+#: Of a channel's gap: as the file has it, with derivatives and biases fitted, with the causes, noise.
+_STAGES = ("before", "tolerances", "after", "noise_floor")
+
 _OTHERS = ("#E69F00", "#56B4E9", "#CC79A7", "#999999")
 
 
 def paragraph(found: Diagnosis) -> str:
     """What was found, for a pilot."""
+    return _findings(found) + _weather(found)
+
+
+def _weather(found: Diagnosis) -> str:
+    """How much the air moved, where it did."""
+    view = max(found.views, key=lambda v: v.gusts)
+    if view.gusts < GUSTY * view.record["V"].mean():
+        return ""
+    return (
+        f" The air was not still: across the flight path it moved by {number(view.gusts, 2)} m/s (root mean square), "
+        "which is taken as weather, not as the aircraft's doing."
+    )
+
+
+def _findings(found: Diagnosis) -> str:
     gap = found.gap
     worst = max(gap.per_channel, key=lambda c: gap.per_channel[c]["before"], default="")
     off = f"The simulator's {_WORDS.get(worst, 'response')} is {_percent(gap, worst)} off"
     whose = "flight held out" if found.held_out else "parts of the flight that were not fitted"
     falls = (
-        f"on {whose} the error over all axes falls from {number(gap.before, 2)} to {number(gap.after, 2)} of the "
+        f"on {whose} the error over all channels falls from {number(gap.before, 2)} to {number(gap.after, 2)} of the "
         f"motion; noise alone would leave {number(gap.noise_floor, 2)}"
+        if gap.after < 0.95 * gap.before
+        else f"on {whose} the error over all channels is {number(gap.before, 2)} of the motion"
     )
     if found.verdict == "no_gap":
-        return f"{off}, no more than noise and the aircraft file's tolerances allow: {falls}. Nothing else is missing."
+        return (
+            f"{off}, no more than noise and the aircraft file's tolerances allow: with the derivatives fitted within "
+            f"these, {falls}. No other effect is needed."
+        )
     if found.verdict == "unsupported":
         return f"{off}, but the flight moves too little to say why: fly a larger manoeuvre."
     if not found.attribution.causes:
@@ -51,7 +75,7 @@ def paragraph(found: Diagnosis) -> str:
         )
     causes = " and ".join(_cause_words(cause) for cause in document(found)["causes"])
     doubt = {
-        "ambiguous": " This flight cannot tell it from what stands beside it.",
+        "ambiguous": " This flight does not settle which.",
         "unknown_effect": " Much remains that no effect known here predicts.",
     }.get(found.verdict, "")
     return f"{off}. The flight says: {causes}. With that added, {falls}.{doubt}"
@@ -173,7 +197,28 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
         }
         for c in document(found)["causes"]
     ]
-    return {"rows": rows, "causes": causes}
+    return {"rows": rows, "causes": causes, "confusion": _confusion(found)}
+
+
+def _confusion(found: Diagnosis) -> Mapping[str, Any]:
+    """Cells of the map of what is confused with what."""
+    table = found.confusion
+    cells = [
+        {"row": i, "column": j, "value": number(value, 2), "opacity": f"{abs(value):.2f}", "positive": value > 0}
+        for i, row in enumerate(table.cosines.tolist())
+        for j, value in enumerate(row)
+        if j < i and abs(value) >= 0.05
+    ]
+    return {"names": [words_of(label) for label in table.labels], "cells": cells}
+
+
+def channels(found: Diagnosis) -> Mapping[str, Any]:
+    """The gap of each channel before and after, beside its noise floor."""
+    rows = [
+        (_WORDS[name], *(f"{number(100.0 * c[stage], 2)} %" for stage in _STAGES))
+        for name, c in found.gap.per_channel.items()
+    ]
+    return {"rows": rows, "held_out": found.held_out}
 
 
 def shape(found: Diagnosis) -> Mapping[str, Any]:
