@@ -150,6 +150,8 @@ def section(folder: Path, flight: Flight) -> str:
     low, high = gap["ci95"]
     row.append(f"{gap['shrink_percent']:.0f} % ({low:.0f} to {high:.0f})")
     parts.append(table(("verdict", "before", "within tolerances", "after", "noise floor", "closed"), [row]))
+    if found.get("air_motion"):
+        parts.append(f"Air in motion across the path, rms: {found['air_motion']:.2f} m/s.")
     if found["causes"]:
         heads = ("cause", "probability", "parameters (s.e.)", "not told apart from")
         parts.append(table(heads, [_cause(cause) for cause in found["causes"]]))
