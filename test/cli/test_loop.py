@@ -1,0 +1,47 @@
+"""The closed loop of `sysid loop`, whole but short: four nodes in processes of their own, the table, the report."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def loop(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """`sysid loop` in a domain of its own."""
+    environment = {**os.environ, "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fast_discovery.xml")}
+    environment.pop("ROS_DOMAIN_ID", None)
+    command = [sys.executable, "-m", "sysid_node.cli", "loop", *arguments]
+    return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
+    done = loop("--seconds", "8", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert "tracking error" in done.stdout
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["adapted"] is True
+    assert summary["tracking_error"]["whole flight"]["pitch"] < 0.1
+    assert any(event["what"] == "excitation begun" for event in summary["events"])
+    assert "What happened" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--fail", "wings_off:left=1"], "wings_off"),
+        (["--seconds", "1"], "--seconds 1"),
+        (["--aircraft", "nonesuch"], "nonesuch"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(arguments: list[str], words: str, tmp_path: Path) -> None:
+    done = loop(*arguments, "--out", str(tmp_path))
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

@@ -1,0 +1,41 @@
+"""The tables of parameters of the loop's nodes agree with their settings and with the files that users read."""
+
+from dataclasses import fields
+from types import ModuleType
+
+import pytest
+import yaml
+from harness import ROOT
+
+from sysid_node.control.settings import Settings as Control
+from sysid_node.excite.inflight import Settings as Excitation
+from sysid_node.ros import adaptive_controller, exciter, flight_simulator
+from sysid_node.ros.loop_node import EFFECT
+from sysid_node.ros.parameters import annotated_yaml, check_each
+
+NODES = [adaptive_controller, exciter, flight_simulator]
+
+
+@pytest.mark.parametrize("node", NODES, ids=lambda node: node.__name__)
+def test_shipped_file_is_the_table(node: ModuleType) -> None:
+    name = node.__name__.rpartition(".")[2]
+    text = (ROOT / "config" / f"{name}.yaml").read_text(encoding="utf-8")
+    assert text == annotated_yaml(name, node.PARAMETERS, EFFECT)
+    values = yaml.safe_load(text)["/**"]["ros__parameters"]
+    assert values == {parameter.name: parameter.default for parameter in node.PARAMETERS}
+    check_each(node.PARAMETERS, values)
+
+
+@pytest.mark.parametrize("node", NODES, ids=lambda node: node.__name__)
+def test_every_parameter_is_explained(node: ModuleType) -> None:
+    for parameter in node.PARAMETERS:
+        assert parameter.meaning.endswith("."), parameter.name
+        assert parameter.change.endswith("."), parameter.name
+
+
+def test_every_setting_is_a_parameter_with_the_same_default() -> None:
+    values = {parameter.name: parameter.default for parameter in adaptive_controller.PARAMETERS}
+    assert {field.name for field in fields(Control)} <= values.keys()
+    assert Control.from_mapping(values) == Control()
+    names = {parameter.name for parameter in exciter.PARAMETERS}
+    assert {field.name for field in fields(Excitation)} <= names
