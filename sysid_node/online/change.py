@@ -1,8 +1,8 @@
 """Abrupt changes of the aircraft, and flight that the estimates do not explain.
 
-The transforms of the last seconds are kept in pieces. Each time a piece is complete, stretches of one second and more
-that end in it are tested against the estimates from before them (``contradiction``): the generalised likelihood ratio
-over the time of change (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2).
+The transforms of the last seconds are kept in pieces. Each time a piece is complete, stretches of 1.5 s and more that
+end in it are tested against the estimates from before them (``contradiction``): the generalised likelihood ratio over
+the time of change (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2).
 
 What is unlikely to be chance casts doubt: estimates that the last seconds contradict are not valid. What cannot be
 chance in an hour of flight ends them: all is learned anew from the time of change. It is announced as a change of the
@@ -29,15 +29,15 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PIECE = 0.5  # s
-SPANS = (2, 4, 8, 16, 32)  # pieces looked back over
-EVERY = 4  # a span of n times so many pieces is looked at with every n-th piece
-FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about three spans
+SPANS = (3, 6, 12, 24)  # pieces looked back over
+EVERY = 3  # a span of n times so many pieces is looked at with every n-th piece
+FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about two spans
 MARGIN = 1.5  # and F must exceed what chance allows by this factor: no model is exact
-DOUBT = 1e-3  # chance under which a span casts doubt
+DOUBT = 1e-2  # chance under which a span casts doubt
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
-USUAL = 4  # pieces in the span by which the usual size of F is judged
+USUAL = 3  # pieces in the span by which the usual size of F is judged
 LEARNING = 0.02  # weight of each new F in that judgement
 AS_MUCH = 0.9  # share of the largest contradiction that is about as much
 OUTLIER = 10.0  # an F beyond this is no usual one

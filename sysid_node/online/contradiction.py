@@ -17,13 +17,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 from scipy.special import fdtrc
 
 from sysid_node.online.information import Spectrum
-from sysid_node.online.regression import TINY, Plan, Solution, Uncertainty, misfits
+from sysid_node.online.regression import TINY, Plan, Solution, Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -61,16 +63,15 @@ def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, durati
     """Test the clean ``lines`` (2F, W) of a stretch of ``duration`` (s)."""
     plan, known = reference.plan, reference.uncertainty
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
-    band = np.tile(np.repeat(np.arange(len(spectrum.bands)), [b.stop - b.start for b in spectrum.bands]), 2)
     gram = lines.T @ lines
-    left_over = gram @ misfits(plan, reference.solution.theta)
+    left_over = gram[:, plan.outputs] - gram[:, plan.columns] @ reference.solution.theta
     count = plan.mine.sum(axis=0)
     rest = _unexplained(plan, reference, gram, left_over)
     energy = 0.5 * len(lines) * duration
     density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
     excess = density / np.maximum(known.density, TINY)
     Z = lines[:, plan.instruments]
-    noise = (Z.T * known.bands[:, None, band]) @ Z
+    noise = (Z.T * known.bands[:, None, _band_of_each(tuple(band.stop for band in spectrum.bands))]) @ Z
     noise *= (density_per_gram * np.maximum(excess, 1.0))[:, None, None]
     G = gram[plan.instruments[:, None], plan.columns] * plan.same
     spread = noise + G @ known.covariance @ G.T
@@ -85,9 +86,16 @@ def _unexplained(plan: Plan, reference: Reference, gram: Array, left_over: Array
     score = left_over[plan.columns] * plan.mine
     misfit -= (score * reference.solution.theta).sum(axis=0)
     normal = gram[plan.columns[:, None], plan.columns] * plan.same
-    normal += np.diag(RIDGE * normal.diagonal() + TINY)
-    misfit -= (score * np.linalg.solve(normal, score)).sum(axis=0)
+    normal += plan.unit * (RIDGE * normal.diagonal() + TINY)
+    _, solved, _ = dposv(normal, score)
+    misfit -= (score * solved).sum(axis=0)
     return misfit
+
+
+@cache
+def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
+    """(2F,) the band of each line's real part, then of each line's imaginary part; ``ends`` are the bands'."""
+    return np.tile(np.searchsorted(ends, np.arange(ends[-1]), side="right"), 2)
 
 
 def _normalised(plan: Plan, spread: Array, score: Array) -> Array:
