@@ -83,6 +83,7 @@ $(DONE)/run $(DONE)/desk $(DONE)/dev: $(DONE)/%: requirements/%.txt requirements
 $(DONE)/build: $(shell find msg_defs -type f) package.xml setup.py setup.cfg Makefile \
                $(shell find config launch -type d) | $(DONE)/ros
 	@echo "==> sysid_msgs and sysid_node, by colcon (about 20 s)"
+	mkdir -p build && find build -xtype l -delete  # links to files that are no more stop colcon
 	COLCON_LOG_LEVEL=error $(BIN)/colcon build --merge-install --symlink-install --install-base $(VENV_DIR) \
 	    --event-handlers console_direct- desktop_notification- status- --executor sequential \
 	    --cmake-args -DPython3_EXECUTABLE=$(BIN)/python -DBUILD_TESTING=OFF --no-warn-unused-cli
