@@ -84,7 +84,7 @@ def fall_back(state: Adaptation, why: str) -> None:
 
 def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Settings, now: float) -> None:
     """Begin the check of what new estimates ask for, if none is under way and the last is long enough ago."""
-    if state.check is not None or now - state.checked_at < PERIOD:
+    if state.check is not None or abs(now - state.checked_at) < PERIOD:
         return
     values, half, used = state.target.values.copy(), np.zeros(len(state.axis.derivatives)), []
     for i, name in enumerate(state.axis.derivatives):

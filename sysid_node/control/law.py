@@ -153,10 +153,8 @@ def _errors(law: Law, sensed: Sensed, late: Wanted, level: float) -> tuple[Array
 
 def _follow_surfaces(law: Law, time: float, feedback: Array, step: float) -> None:
     """Move the surfaces' model behind the delay and the lag of the actuators."""
-    law.coming.append((time, feedback))
-    while len(law.coming) > 1 and law.coming[1][0] <= time - law.settings.delay:
-        law.coming.popleft()
-    law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (law.coming[0][1] - law.surfaces)
+    late = reference.delayed(law.coming, time, feedback, law.settings.delay)
+    law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (late - law.surfaces)
 
 
 def _limited(law: Law, asked: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:

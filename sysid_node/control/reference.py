@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from sysid_node.control.plant import GRAVITY
 from sysid_node.control.settings import Settings
 from sysid_node.control.types import SetPoints
+
+T = TypeVar("T")
 
 DAMPING = 0.9
 MOST_RATE, MOST_ACCELERATION = 1.5, 8.0  # rad/s, rad/s^2
@@ -111,12 +113,19 @@ def _toward(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
+def delayed(coming: deque[tuple[float, T]], time: float, value: T, delay: float) -> T:
+    """What was given ``delay`` (s) before, or the oldest known; ``value`` is given now (s)."""
+    if coming and coming[-1][0] > time:
+        coming.clear()  # the clock has stepped back
+    coming.append((time, value))
+    while len(coming) > 1 and coming[1][0] <= time - delay:
+        coming.popleft()
+    return coming[0][1]
+
+
 def follow(state: Behind, time: float, wanted: Wanted, step: float) -> Wanted:
     """The reference ``wanted`` now (s), behind delay and lag."""
-    state.coming.append((time, wanted))
-    while len(state.coming) > 1 and state.coming[1][0] <= time - state.delay:
-        state.coming.popleft()
-    late = state.coming[0][1]
+    late = delayed(state.coming, time, wanted, state.delay)
     if state.now is None:
         state.now = late
     share = 1.0 - math.exp(-step / state.lag)

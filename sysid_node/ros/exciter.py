@@ -77,6 +77,7 @@ class Exciter(LoopNode):
         self._state = inflight.init(self.aircraft, Settings(**asked))
         self._inertial, self._air = (-math.inf, (math.nan,) * 3), (-math.inf, math.nan)
         self._said = 0
+        self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first
         self._excitation = self.create_publisher(JointState, EXCITATION, 10)
         self._reset = self.create_client(Trigger, "identifier/reset")
         self.create_subscription(Imu, IMU, self._on_imu, LATEST)
@@ -90,13 +91,16 @@ class Exciter(LoopNode):
         """What it does, and what it did last."""
         state = self._state
         last = state.events[-1].text if state.events else "nothing flown yet"
-        doing = f"exciting for {time.monotonic() - state.begun:.1f} s" if state.active else last
+        doing = f"exciting for {self._now - state.begun:.1f} s" if state.active else last
         values = {"active": state.active, "not yet known": " ".join(state.missing), "events": len(state.events)}
         return DiagnosticStatus.OK, doing, {**values, "last event": last}
 
     def _on_imu(self, message: Any) -> None:
         _, _, az, *_ = conversion.imu_values(message, -1.0)
         self._inertial = time.monotonic(), (*attitude_of(message), -az / inflight.GRAVITY)
+        stamp = conversion.stamp_ns(message.header.stamp)
+        self._start_ns = self._start_ns or stamp
+        self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
 
     def _on_air_data(self, message: Any) -> None:
         self._air = time.monotonic(), message.true_airspeed
@@ -105,7 +109,7 @@ class Exciter(LoopNode):
         estimates = conversion.estimates_from_message(message, 0)
         known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
         precision = precision_of(known.values(), self.aircraft)
-        if inflight.hear(self._state, time.monotonic(), precision) and self._reset.service_is_ready():
+        if inflight.hear(self._state, self._now, precision) and self._reset.service_is_ready():
             self._reset.call_async(Trigger.Request())
         self._tell()
 
@@ -116,21 +120,21 @@ class Exciter(LoopNode):
             roll = pitch = load = math.nan
         if now - measured > STALE:
             airspeed = math.nan
-        moved = inflight.step(self._state, now, Flight(roll, pitch, airspeed, load))
+        moved = inflight.step(self._state, self._now, Flight(roll, pitch, airspeed, load))
         stamp = self.get_clock().now().nanoseconds
         self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
         self._tell()
 
     def _on_start(self, _: Any, response: Any) -> Any:
         try:
-            inflight.start(self._state, time.monotonic())
+            inflight.start(self._state, self._now)
             response.success, response.message = True, f"until {', '.join(self._state.settings.derivatives)} are known"
         except InputError as error:
             response.success, response.message = False, str(error)
         return response
 
     def _on_stop(self, _: Any, response: Any) -> Any:
-        inflight.stop(self._state, time.monotonic(), "stopped on request")
+        inflight.stop(self._state, self._now, "stopped on request")
         response.success, response.message = True, "surfaces are in the middle"
         return response
 

@@ -137,6 +137,14 @@ def test_a_silent_sensor_brings_the_baseline_back(state: controller.State) -> No
     assert baseline(state)
 
 
+def test_the_clock_may_step_back(state: controller.State) -> None:
+    flown(state, 1.0, beliefs(half=0.02), 100.0)
+    flown(state, 8.0, beliefs(ELEVATOR, half=0.02), 3.0)
+    np.testing.assert_allclose(state.axes[0].flown.gains[0, 1], 2.5 * state.axes[0].axis.baseline[0, 1], rtol=0.01)
+    assert len(state.law.coming) < 10
+    assert len(state.law.behind.coming) < 10
+
+
 def test_adaptation_can_be_switched_off() -> None:
     fixed = controller.init(AIRCRAFT, Settings(adapt=False))
     flown(fixed, 3.0, beliefs(ELEVATOR, half=0.02))
