@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,7 +27,8 @@ class Equations:
     """Both sides of the six equations at each time of a flight.
 
     ``coefficients`` CL CD CY Cl Cm Cn as far as they can be formed, besides CX and CZ (body axes); ``regressors`` by
-    the names of derivatives ("0", "alpha", "q", "de", ...); each (N,), finite. ``left_out`` samples lacked a value.
+    the names of derivatives ("0", "alpha", "q", "de", ...); each (N,), finite. ``left_out`` samples lacked a value;
+    ``noise`` holds the sensors' 1 sigma in those regressors that have one.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Equations:
     regressors: Mapping[str, Array]
     left_out: int = 0
     remarks: tuple[str, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
 
 
 def equations(aircraft: Aircraft, record: FlightRecord) -> Equations:
@@ -50,7 +52,17 @@ def equations(aircraft: Aircraft, record: FlightRecord) -> Equations:
     regressors = _regressors(aircraft, s, coefficients["CL"])
     if left_out:
         remarks.append(f"{record.name or 'flight'}: {left_out} of {len(record)} samples lack a value and were left out")
-    return Equations(record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks))
+    noise = _noise(aircraft, float(s["V"].mean()))
+    return Equations(record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks), noise)
+
+
+def _noise(aircraft: Aircraft, airspeed: float) -> dict[str, float]:
+    """What the aircraft file's sensor noise makes of the regressors."""
+    b, cbar, known = aircraft.geometry.b, aircraft.geometry.cbar, aircraft.noise
+    noise = {name: known[name] for name in ("alpha", "beta") if name in known}
+    if "gyro" in known:
+        noise |= {name: known["gyro"] * length / (2.0 * airspeed) for name, length in (("p", b), ("q", cbar), ("r", b))}
+    return noise
 
 
 def at_cg(aircraft: Aircraft, record: FlightRecord) -> dict[str, Array]:

@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.coefficients import Equations, equations, usable
 from sysid_node.batch.identifiability import sentences
 from sysid_node.batch.regression import Regression, regress
-from sysid_node.batch.result import Answer, Fit
+from sysid_node.batch.result import Answer, Estimate, Fit
 from sysid_node.batch.signals import lowpass
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -63,7 +64,7 @@ def columns(flight: Equations, regressors: Sequence[str]) -> Array:
 
 def collected(method: str, fits: Mapping[str, Regression], flights: Sequence[Equations]) -> Fit:
     """The regressions of all coefficients as one Fit."""
-    estimates = {name: estimate for fit in fits.values() for name, estimate in fit.estimates.items()}
+    estimates = {name: _seen(estimate, flights) for fit in fits.values() for name, estimate in fit.estimates.items()}
     covariance = np.zeros((len(estimates), len(estimates)))
     first = 0
     for fit in fits.values():
@@ -92,6 +93,16 @@ def collected(method: str, fits: Mapping[str, Regression], flights: Sequence[Equ
         message="linear least squares",
         remarks=_remarks(fits, flights),
     )
+
+
+def _seen(estimate: Estimate, flights: Sequence[Equations]) -> Estimate:
+    """Not valid where its regressor is mostly its sensor's noise: then it is biased towards zero, and sure of it."""
+    _, regressor = split_derivative(estimate.name)
+    noise = max((flight.noise.get(regressor, 0.0) for flight in flights), default=0.0)
+    values = np.concatenate([flight.regressors[regressor] for flight in flights])
+    if not estimate.valid or float(np.var(values)) >= 2.0 * noise**2:
+        return estimate
+    return replace(estimate, valid=False, status="not excited: its regressor is within the sensor's noise")
 
 
 def _remarks(fits: Mapping[str, Regression], flights: Sequence[Equations]) -> tuple[str, ...]:

@@ -136,13 +136,9 @@ def _joined(
     covariance[count, count] = offset.covariance[0, 0] + means @ fit.covariance @ means
     found = dict(fit.estimates)
     ((name, alone),) = offset.estimates.items()
-    widened = float(np.sqrt(covariance[count, count])) / alone.standard_error
-    found[name] = replace(
-        alone,
-        standard_error=alone.standard_error * widened,
-        lower=alone.value - (alone.value - alone.lower) * widened,
-        upper=alone.value + (alone.upper - alone.value) * widened,
-    )
+    error = float(np.sqrt(covariance[count, count]))
+    half = error * ((alone.upper - alone.value) / alone.standard_error if alone.standard_error > 0.0 else 1.96)
+    found[name] = replace(alone, standard_error=error, lower=alone.value - half, upper=alone.value + half)
     coefficient = name.partition("_")[0]
     order = [f"{coefficient}_{regressor}" for regressor in regressors]
     index = [list(found).index(n) for n in order]

@@ -35,6 +35,9 @@ class Search:
 
 DEFAULT_SEARCH = Search()
 
+#: A model whose answer is so many times the measurement has diverged.
+_DIVERGED = 1e6
+
 #: Rounds of noise relaxation for initial states and biases alone.
 _OWN_ROUNDS = 4
 
@@ -77,13 +80,13 @@ class Problem(ABC):
 
     def weighted(self, z: Array, noise: Array) -> tuple[list[Array], list[Array]]:
         """Residuals (N, ny), zero where nothing was measured, and sensitivities (N, ny, n), in units of the noise."""
-        residuals = [whitened(np.nan_to_num(answer.residuals, nan=0.0), noise) for answer in self.answers(z)]
+        residuals = [whitened(_measured_only(answer), noise) for answer in self.answers(z)]
         return residuals, [whitened(block, noise) for block in self.sensitivities(z)]
 
     def residuals(self, z: Array, noise: Array) -> Array:
         """Measured minus modelled in units of the noise, zero where nothing was measured, then the priors."""
         index, mean, sigma = self.priors()
-        parts = [whitened(np.nan_to_num(answer.residuals, nan=0.0), noise).ravel() for answer in self.answers(z)]
+        parts = [whitened(_measured_only(answer), noise).ravel() for answer in self.answers(z)]
         return np.concatenate([*parts, (mean - z[index]) / sigma])
 
     def jacobian(self, z: Array, noise: Array) -> Array:
@@ -103,14 +106,20 @@ class Problem(ABC):
                 "(fewer parameters, initial states and biases)"
             )
         for answer in self.answers(z):
-            lost = np.argwhere(~np.isfinite(answer.modelled))
+            size = 1.0 + np.abs(np.nan_to_num(answer.measured)).max(axis=0)
+            lost = np.argwhere(~(np.abs(answer.modelled) < _DIVERGED * size))
             if lost.size:
                 row, column = lost[0]
                 raise InputError(
                     f"{answer.name}: model {self.unknowns.model.name} diverges from its start values: "
-                    f"{answer.names[column]} is not finite from {answer.time[row]:.2f} s on; start nearer to the "
-                    "aircraft (equation_error finds start values) or cut the flight into shorter manoeuvres"
+                    f"{answer.names[column]} is beyond all measure from {answer.time[row]:.2f} s on; start nearer "
+                    "to the aircraft (equation_error finds start values) or cut the flight into shorter manoeuvres"
                 )
+
+
+def _measured_only(answer: Answer) -> Array:
+    """Residuals, zero where nothing was measured; where the model has no number, neither have they."""
+    return np.where(np.isfinite(answer.measured), answer.residuals, 0.0)
 
 
 def whitened(rows: Array, noise: Array) -> Array:
@@ -160,14 +169,15 @@ def weighted_least_squares(
     lower, upper = problem.bounds()
     # a start value on its bound would leave the interior method no step
     inside = np.clip(z[chosen], lower[chosen], upper[chosen])
-    solution = least_squares(
-        residuals,
-        inside,
-        jacobian,
-        bounds=(lower[chosen], upper[chosen]),
-        x_scale="jac",
-        max_nfev=evaluations,
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # a step so far that the model diverges is taken back
+        solution = least_squares(
+            residuals,
+            inside,
+            jacobian,
+            bounds=(lower[chosen], upper[chosen]),
+            x_scale="jac",
+            max_nfev=evaluations,
+        )
     return moved(solution.x)
 
 

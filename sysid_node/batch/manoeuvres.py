@@ -15,6 +15,8 @@ from sysid_node.batch.signals import differentiate
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
+_FEWEST = 5  # samples in a piece of flight
+
 #: Outputs that no sensor gives: derivatives of measured columns.
 _DERIVED = {"pdot": "p", "qdot": "q", "rdot": "r"}
 
@@ -55,11 +57,13 @@ def segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:
 
     A long open-loop rollout drifts away on small errors of trim and wind; pieces with an initial state each do not.
     """
+    if len(record) < _FEWEST:
+        raise InputError(f"flight {record.name!r}: {len(record)} samples; give at least {_FEWEST}, better some seconds")
     if not seconds > 0.0:
         return [record]
     pieces = max(1, int(np.ceil(record.duration / seconds - 1e-9)))
     edges = np.linspace(0, len(record), pieces + 1).round().astype(int)
-    if np.diff(edges).min() < 5:
+    if np.diff(edges).min() < _FEWEST:
         raise InputError(
             f"flight {record.name!r}: {len(record)} samples in {record.duration:.1f} s cannot be cut into segments of "
             f"{seconds:g} s; give longer segments"

@@ -130,3 +130,18 @@ def test_a_still_control_is_not_excited():
 def test_impossible_bands_are_refused(frequencies, said):
     with pytest.raises(InputError, match=said):
         frequency_equation_error(KESTREL, [clean()], frequencies)
+
+
+@pytest.mark.parametrize("method", [equation_error, frequency_equation_error])
+def test_noise_on_a_regressor_that_hardly_moves_is_no_excitation(method):
+    """Level flight: all that the vane and the gyroscopes show is their own noise, which explains nothing."""
+    rng, samples = np.random.default_rng(6), 1000
+    columns = {name: np.full(samples, float(values[0])) for name, values in clean().columns.items()}
+    for name, kind in (("alpha", "alpha"), ("beta", "beta"), ("p", "gyro"), ("q", "gyro"), ("r", "gyro")):
+        columns[name] = columns[name] + KESTREL.noise[kind] * rng.normal(size=samples)
+    for name in ("de", "da", "dr", "ax", "ay", "az"):
+        columns[name] = columns[name] + 0.01 * rng.normal(size=samples)
+    fit = method(KESTREL, [FlightRecord(np.arange(samples) / 50.0, columns, "level")])
+    for name in ("CL_alpha", "Cm_alpha", "Cm_q", "CY_beta", "Cl_p", "Cn_r"):
+        assert fit.estimates[name].status == "not excited: its regressor is within the sensor's noise", name
+        assert not fit.estimates[name].valid

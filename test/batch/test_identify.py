@@ -119,3 +119,11 @@ def test_an_unknown_method_and_no_flight_are_refused():
         identify("kalman", KESTREL, [clean()], QUICK)
     with pytest.raises(InputError, match="no flight to identify from"):
         identify("equation_error", KESTREL, [], QUICK)
+
+
+@pytest.mark.parametrize("method", ["output_error", "filter_error"])
+def test_a_flight_of_three_samples_is_refused(method):
+    whole = flight(1)
+    short = dataclasses.replace(whole, time=whole.time[:3], columns={k: v[:3] for k, v in whole.columns.items()})
+    with pytest.raises(InputError, match="samples"):
+        identify(method, KESTREL, [short], QUICK)
