@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import TIMES, Candidate, bounds, candidates_of
+from sysid_node.gap.candidates import PER_CONTROL, TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, polish, with_candidates
 from sysid_node.gap.nuisance import Nuisances
@@ -40,8 +40,11 @@ MATERIAL, MATERIAL_OF_ALL = 0.25, 0.08
 #: Error, as a share of the motion, that nobody would look for.
 NOTICED = 0.05
 
+#: Rivals of a cause that are fitted to the end.
+_RIVALS = 4
+
 #: Times that the causes stand against their rivals, at most.
-_SWEEPS = 4
+_SWEEPS = 3
 
 #: Nats by which another explanation must be better to take the place of one.
 _CLEARLY = 1.0
@@ -108,7 +111,9 @@ def attribute(
     chosen, stages = base, []
     for count in range(MOST):
         rest = [c for c in candidates if c.effect not in chosen.fit.effects]
-        trials = trier.stage(chosen, rest, _share_of(progress, count))
+        looks = trier.looks(chosen, rest, _share_of(progress, count))
+        trials = trier.finish(chosen, looks[:_POLISHED], _share_of(progress, count))
+        candidates = _narrowed(candidates, looks)
         stages.append(trials)
         better = [t for t in trials if accepted(base, chosen, t)]
         if not better:
@@ -141,19 +146,8 @@ class Trier:
         done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
         return Trial(done, cross_validated(done), added)
 
-    def stage(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Trial]:
-        """The candidates upon what is known so far, the most probable first."""
-        looked = sorted(self._looks(current, candidates, progress), key=lambda look: look[0])[:_POLISHED]
-        kept = current.fit.candidates
-        trials = _spread(
-            lambda look: self.trial(current.fit, kept, look),
-            looked,
-            lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
-        )
-        return sorted(trials, key=lambda t: -t.evidence.total)
-
-    def _looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
-        """A first look at each: what it takes away where the nuisances can do no more."""
+    def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
+        """A first look at each, the best first: what it takes away where the nuisances can do no more."""
         fresh = with_candidates(current.fit, current.fit.candidates, self.nuisances, ())
 
         def work() -> dict[str, list[float]]:
@@ -166,7 +160,25 @@ class Trier:
             return {candidate.label: [cost, *start] for cost, candidate, start in looks}
 
         table = self.steps.table(fresh, work)
-        return [(table[c.label][0], c, tuple(table[c.label][1:])) for c in candidates if c.label in table]
+        found = [(table[c.label][0], c, tuple(table[c.label][1:])) for c in candidates if c.label in table]
+        return sorted(found, key=lambda look: look[0])
+
+    def finish(self, current: Trial, looks: Sequence[Look], progress: Progress) -> list[Trial]:
+        """What was looked at upon what is known so far, fitted to the end; the most probable first."""
+        trials = _spread(
+            lambda look: self.trial(current.fit, current.fit.candidates, look),
+            looks,
+            lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
+        )
+        return sorted(trials, key=lambda t: -t.evidence.total)
+
+
+def _narrowed(candidates: Sequence[Candidate], looks: Sequence[Look]) -> list[Candidate]:
+    """The candidates with one start each where it is the onset that they differ in: looking at all again costs most."""
+    best = {candidate.label: start for _, candidate, start in looks}
+    return [
+        replace(c, starts=(best[c.label],)) if c.effect in PER_CONTROL and c.label in best else c for c in candidates
+    ]
 
 
 def _spread(
@@ -260,7 +272,8 @@ def _place(
         return Place(candidate, base, tuple(first))
     without = trier.trial(chosen.fit, others)
     rest = [c for c in pool if c.effect not in without.fit.effects]
-    return Place(candidate, without, tuple(trier.stage(without, rest, lambda s, t: None)))
+    looks = trier.looks(without, rest, lambda s, t: None)
+    return Place(candidate, without, tuple(trier.finish(without, looks[:_RIVALS], lambda s, t: None)))
 
 
 def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial | None:

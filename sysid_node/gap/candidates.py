@@ -24,7 +24,7 @@ UNSEEN = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 _HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
 
 #: Candidates one control each, because each has an onset of its own.
-_PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
+PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
 
 #: Effects of one time, whose fingerprint turns with its size.
 TIMES = frozenset(
@@ -71,7 +71,7 @@ def candidates_of(simulator: Simulator, views: Sequence[View]) -> list[Candidate
             continue
         if effect in WIDENED:
             found.append(Candidate(effect, effect, (), ((),)))
-        elif effect in _PER_CONTROL:
+        elif effect in PER_CONTROL:
             found += _per_control(simulator, effect, length)
         else:
             found.append(_whole(simulator, views, effect))

@@ -304,7 +304,7 @@ def _next_flight(verdict: str, attribution: Attribution) -> str:
         )
     if best.separation <= best.flown:
         return (
-            f"the same again, longer and in still air: no other manoeuvre tried parts {_listed(attribution)} better than "
+            f"the same again, longer and in still air: no other manoeuvre parts {_listed(attribution)} better than "
             f"those flown ({best.flown:.3g} standard deviations of the sensors' noise)"
         )
     return (

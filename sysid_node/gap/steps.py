@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ class Steps:
 
     folder: Path | None = None
     digest: str = ""
+    done: dict[str, Fit] = field(default_factory=dict)  # what was fitted in this run
 
     @classmethod
     def of(cls, folder: Path | None, views: Sequence[View]) -> Steps:
@@ -36,25 +37,20 @@ class Steps:
 
     def polished(self, fit: Fit) -> Fit:
         """The fit polished, or as it was when this was done before."""
-        path = self._path("fit", fit)
-        if path is None:
-            return polish(fit)
-        if path.exists():
-            with np.load(path) as kept:
-                points, power = (tuple(kept[f"{n}{i}"] for i in range(len(fit.views))) for n in ("point", "power"))
-            return linearised(replace(fit, points=points, power=power))
-        done = polish(fit)
-        arrays = {f"point{i}": p for i, p in enumerate(done.points)} | {
-            f"power{i}": p for i, p in enumerate(done.power)
-        }
-        partial = path.with_suffix(".part.npz")
-        np.savez(partial, **arrays)  # type: ignore[arg-type]  # NumPy's stubs take the names for options
-        partial.replace(path)
-        return done
+        key = self._key("fit", fit)
+        if key not in self.done:
+            path = self._path(key, "npz")
+            if path is not None and path.exists():
+                self.done[key] = _restored(path, fit)
+            else:
+                self.done[key] = polish(fit)
+                if path is not None:
+                    _store(path, self.done[key])
+        return self.done[key]
 
     def table(self, fit: Fit, work: Callable[[], dict[str, list[float]]]) -> dict[str, list[float]]:
         """Numbers by name that were worked out about a fit, or as they were before."""
-        path = self._path("table", fit)
+        path = self._path(self._key("table", fit), "json")
         if path is None:
             return work()
         if path.exists():
@@ -75,12 +71,28 @@ class Steps:
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
 
-    def _path(self, kind: str, fit: Fit) -> Path | None:
-        if self.folder is None:
-            return None
-        self.folder.mkdir(parents=True, exist_ok=True)
+    def _key(self, kind: str, fit: Fit) -> str:
         key = hashlib.sha256((self.digest + kind + "+".join(c.label for c in fit.candidates)).encode())
         for array in (*fit.points, *fit.power, fit.nuisances.sigma):
             key.update(np.ascontiguousarray(array).tobytes())
-        suffix = "npz" if kind == "fit" else "json"
-        return self.folder / f"{self.digest[:12]}-{key.hexdigest()[:24]}.{suffix}"
+        return key.hexdigest()
+
+    def _path(self, key: str, suffix: str) -> Path | None:
+        if self.folder is None:
+            return None
+        self.folder.mkdir(parents=True, exist_ok=True)
+        return self.folder / f"{self.digest[:12]}-{key[:24]}.{suffix}"
+
+
+def _restored(path: Path, fit: Fit) -> Fit:
+    with np.load(path) as kept:
+        points, power = (tuple(kept[f"{kind}{i}"] for i in range(len(fit.views))) for kind in ("point", "power"))
+    return linearised(replace(fit, points=points, power=power))
+
+
+def _store(path: Path, fit: Fit) -> None:
+    kinds = {"point": fit.points, "power": fit.power}
+    arrays = {f"{kind}{i}": array for kind, of in kinds.items() for i, array in enumerate(of)}
+    partial = path.with_suffix(".part.npz")
+    np.savez(partial, **arrays)  # type: ignore[arg-type]  # NumPy's stubs take the names for options
+    partial.replace(path)
