@@ -27,6 +27,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "adapter = sysid_node.ros.adapters.node:main",
             "adaptive_controller = sysid_node.ros.adaptive_controller:main",
             "exciter = sysid_node.ros.exciter:main",
             "flight_simulator = sysid_node.ros.flight_simulator:main",

@@ -1,0 +1,54 @@
+"""From an autopilot's outputs to joint positions: a linear map a joint, which only who built the aircraft knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sysid_node.errors import InputError
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint moved by one output."""
+
+    name: str
+    output: str
+    trim: float  # unit of the output, where the joint is at zero
+    scale: float  # rad per unit of the output; of a throttle 1 per unit
+
+    def position(self, value: float) -> float:
+        """Where an output puts the joint: rad, or 0..1."""
+        return self.scale * (value - self.trim)
+
+
+def joints_of(text: str, outputs: Sequence[str], example: str) -> tuple[Joint, ...]:
+    """Joints from ``name=output:trim:scale``, with spaces between.
+
+    Raises InputError where there is none, one is malformed, named twice, or of an output that is not in ``outputs``.
+    """
+    words = text.split()
+    if not words:
+        raise InputError(f"parameter joints is empty: say which output moves which joint and how far, e.g. {example!r}")
+    joints = tuple(_joint(word, outputs, example) for word in words)
+    names = [joint.name for joint in joints]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"parameter joints: {twice!r} is given twice; mixing belongs in the aircraft file")
+    return joints
+
+
+def _joint(word: str, outputs: Sequence[str], example: str) -> Joint:
+    form = f"NAME=OUTPUT:TRIM:SCALE, e.g. {example.partition(' ')[0]!r}"
+    name, _, rest = word.partition("=")
+    output, *numbers = rest.split(":")
+    try:
+        trim, scale = (float(number) for number in numbers)
+    except ValueError:
+        trim = scale = math.nan
+    if not name or not math.isfinite(trim) or not math.isfinite(scale) or scale == 0.0:
+        raise InputError(f"parameter joints: {word!r} is not {form}")
+    if output not in outputs:
+        raise InputError(f"parameter joints: {word!r}: no output {output!r}; expected {outputs[0]} to {outputs[-1]}")
+    return Joint(name, output, trim, scale)
