@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from evaluation.batch.comparison import section
+from evaluation.batch.comparison import METHODS, section
 from evaluation.pages import publish
 
 #: Flights to estimate from, each with the one that checks the estimates.
@@ -13,7 +13,6 @@ FLIGHTS = {
     "cdrw_multistep": "cdrw_random",
     "cdrw_random": "cdrw_turbulence",
     "cdrw_near_stall": "cdrw_multistep",
-    "cdfp_multistep": "cdfp_random",
 }
 
 
@@ -21,11 +20,12 @@ def main() -> None:
     """Print the sections, or put them in the documentation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=FLIGHTS, help="one flight")
+    parser.add_argument("--without", action="append", default=[], choices=METHODS, help="a method to leave out")
     parser.add_argument("--page", type=Path, help="Markdown file whose sections to fill")
     args = parser.parse_args()
     for name, holdout in FLIGHTS.items():
         if args.only in (None, name):
-            publish(f"bench/methods.py {name}", section(name, holdout), args.page)
+            publish(f"bench/methods.py {name}", section(name, holdout, args.without), args.page)
 
 
 if __name__ == "__main__":
