@@ -1,5 +1,6 @@
-"""``sysid gap``: bad input is one line and exit code 2."""
+"""``sysid gap``: bad input is one line and exit code 2; what it finds can be flown and exported."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -37,3 +38,62 @@ def test_the_flight_fitted_cannot_be_held_out(tmp_path: Path, capsys: pytest.Cap
     words = ["gap", str(BAG), "--holdout", str(BAG), "--aircraft", "cdrw", "--out", str(tmp_path / "out"), "--quiet"]
     assert main(words) == 2
     assert "same flight" in said(capsys)
+
+
+STEPS = [
+    "3211:elevator:amplitude=0.06:width=0.3:start=1:every=8:repeat=3",
+    "3211:aileron:amplitude=0.06:width=0.25:start=4:every=8:repeat=3",
+    "3211:rudder:amplitude=0.12:width=0.3:start=6:every=8:repeat=3",
+]
+
+
+def fly(out: Path, aircraft: str, effects: list[str], seed: int) -> None:
+    """A flight of 26 s in still air."""
+    words = ["simulate", "--quiet", "--aircraft", aircraft, "--duration", "26", "--rate", "100", "--seed", str(seed)]
+    words += [w for spec in STEPS for w in ("--manoeuvre", spec)]
+    assert main([*words, *effects, "--out", str(out)]) == 0
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The diagnosis of a gyro that is off: an effect that no force or moment shows."""
+    folder = tmp_path_factory.mktemp("gap")
+    for seed in (1, 2):
+        fly(folder / f"flight{seed}", "cdrw", ["--effect", "imu_bias:q=0.03"], seed)
+    words = ["gap", str(folder / "flight1"), "--holdout", str(folder / "flight2"), "--aircraft", "cdrw", "--quiet"]
+    assert main([*words, "--out", str(folder / "out")]) == 0
+    return folder
+
+
+def test_a_gyro_that_is_off_is_named_with_its_size(found: Path) -> None:
+    gap = json.loads((found / "out" / "gap.json").read_text(encoding="utf-8"))
+    assert gap["verdict"] == "explained"
+    (cause,) = gap["causes"]
+    assert cause["effect"] == "imu_bias"
+    assert cause["parameters"]["q"][0] == pytest.approx(0.03, rel=0.05)
+    pitch = gap["gap"]["per_channel"]["theta"]
+    assert pitch["after"] < 0.3 * pitch["before"]
+
+
+def test_nothing_unfinished_is_left(found: Path) -> None:
+    files = {"gap.json", "where.csv", "candidates.csv", "corrected.yaml", "effects.txt", "report.html"}
+    assert {path.name for path in (found / "out").iterdir()} == files
+
+
+def test_the_corrected_model_can_be_flown(found: Path) -> None:
+    effects = (found / "out" / "effects.txt").read_text(encoding="utf-8").split()
+    assert effects[0] == "--effect" and effects[1].startswith("imu_bias:")
+    fly(found / "corrected", str(found / "out" / "corrected.yaml"), effects, 3)
+    truth = json.loads((found / "corrected.truth.json").read_text(encoding="utf-8"))
+    assert truth["effects"]["imu_bias"]["q"] == pytest.approx(0.03, rel=0.05)
+
+
+def test_the_corrected_model_can_be_exported(found: Path) -> None:
+    words = ["export", str(found / "out" / "corrected.yaml"), "--format", "jsbsim", "--quiet"]
+    assert main([*words, "--out", str(found / "model.xml")]) == 0
+    assert "<fdm_config" in (found / "model.xml").read_text(encoding="utf-8")
+
+
+def test_the_page_begins_with_words(found: Path) -> None:
+    page = (found / "out" / "report.html").read_text(encoding="utf-8")
+    assert "imu bias" in page and "What is confused with what" in page

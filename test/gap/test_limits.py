@@ -1,0 +1,49 @@
+"""Tolerances are limits: a nuisance never goes beyond three of them, whatever the data say."""
+
+import numpy as np
+import pytest
+from gap_flights import fly
+
+from sysid_node.gap.fit import Fit, blank, polish, with_candidates
+from sysid_node.gap.nuisance import LIMIT, nuisances_of
+from sysid_node.gap.view import view_of
+from sysid_node.sim import Simulator
+
+
+@pytest.fixture(scope="module")
+def shifted(aircraft) -> Fit:
+    """A centre of gravity far off, which unlimited derivatives would pass off as a Cm_alpha."""
+    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"cg_shift": {"x": 0.06}}, seed=13))
+    nuisances = nuisances_of(aircraft, view)
+    return polish(with_candidates(blank([view], nuisances), [], nuisances, ()))
+
+
+def test_none_is_beyond_its_limit_and_some_stand_at_it(shifted) -> None:
+    now, sigma, limit = shifted.stacked
+    assert (np.abs(now) <= limit * (1.0 + 1e-12)).all()
+    assert (np.abs(now / sigma) > LIMIT - 1e-6).any()
+
+
+def test_what_stands_at_its_limit_is_not_uncertain(shifted) -> None:
+    now, _, limit = shifted.stacked
+    np.testing.assert_array_equal(shifted.loose, np.abs(now) < limit * (1.0 - 1e-9))
+
+
+def test_priors_cost_what_they_say(shifted) -> None:
+    now, sigma, _ = shifted.stacked
+    assert shifted.prior_score == pytest.approx(-0.5 * np.sum((now / sigma) ** 2))
+    assert shifted.prior_score < -9.0 / 2.0
+
+
+def test_a_wider_prior_has_its_price(shifted) -> None:
+    names = shifted.views[0].simulator.names
+    wide = shifted.nuisances.without(frozenset({"derivative_error"}), names)
+    derivatives = sum(names[i].startswith("derivative_error") for i in wide.indices)
+    assert wide.widened == pytest.approx(derivatives * np.log(5.0))
+
+
+def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
+    names = shifted.views[0].simulator.names
+    kept = shifted.nuisances.without(frozenset({"command_delay"}), names)
+    left = {names[i] for i in kept.indices}
+    assert "actuator_stamp_delay.delay" not in left and "air_data_delay.delay" in left
