@@ -6,9 +6,11 @@ attitude, surfaces measured behind a lag of 0.04 s. Each flight has noise and tu
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +59,8 @@ TRIALS = (
     Trial("equation_error", "still air"),
     Trial("frequency_equation_error", "still air"),
     Trial("output_error", "still air"),
-    Trial("filter_error", "light turbulence, air not turning", "light", False, LONGITUDINAL),
     Trial("filter_error", "light turbulence", "light", True, LONGITUDINAL),
+    Trial("filter_error", "light turbulence, air not turning", "light", False, LONGITUDINAL),
     Trial("equation_error", "light turbulence", "light"),
     Trial("frequency_equation_error", "light turbulence", "light"),
 )
@@ -110,19 +112,28 @@ def _row(e: Estimate, converged: bool) -> list[float]:
     return [e.value, e.standard_error, e.lower, e.upper, float(e.valid and converged)]
 
 
-HEADS = ("method", "air", "derivatives", "valid", "coverage %: min", "mean", "max", "outside", "bias / s.e.")
+HEADS = ("method", "air", "flights", "derivatives", "valid", "coverage %: min", "mean", "max", "outside")
+HEADS = (*HEADS, "bias / s.e.", "s.e. / scatter", "> 4 s.e. %")
 
 
-def section(trials: Sequence[Trial], flights: int) -> str:
-    """The table, a line a trial."""
-    rows = []
+def section(trials: Sequence[Trial], flights: int, results: Path | None = None) -> str:
+    """The table, a line a trial; ``results`` is a CSV file that keeps lines, and gives those it has."""
+    kept = list(csv.reader(results.open(newline="", encoding="utf-8"))) if results and results.exists() else []
+    rows = {(row[0], row[1]): row for row in kept}
     for trial in trials:
-        rows.append(_line(trial, {n: judge(e, TRUTH[n]) for n, e in estimates(trial, flights).items()}))
-        print("#", *rows[-1], flush=True)
-    return f"{flights} flights of {SECONDS:g} s each.\n\n{table((*HEADS, 's.e. / scatter', '> 4 s.e. %'), rows)}"
+        if (trial.method, trial.air) in rows:
+            continue
+        verdicts = {n: judge(e, TRUTH[n]) for n, e in estimates(trial, flights).items()}
+        rows[trial.method, trial.air] = _line(trial, flights, verdicts)
+        if results:
+            with results.open("w", newline="", encoding="utf-8") as file:
+                csv.writer(file).writerows(rows.values())
+    order = [(trial.method, trial.air) for trial in TRIALS]
+    chosen = [rows[key] for key in order if key in rows]
+    return f"Flights of {SECONDS:g} s.\n\n{table(HEADS, chosen)}"
 
 
-def _line(trial: Trial, verdicts: dict[str, Verdict]) -> list[str]:
+def _line(trial: Trial, flights: int, verdicts: dict[str, Verdict]) -> list[str]:
     known = {name: v for name, v in verdicts.items() if v.valid > 1}
     covered = {name: 100 * v.coverage for name, v in known.items()}
     worst, biased = min(covered, key=covered.__getitem__), max(known, key=lambda n: abs(known[n].bias))
@@ -130,6 +141,7 @@ def _line(trial: Trial, verdicts: dict[str, Verdict]) -> list[str]:
     return [
         trial.method,
         trial.air,
+        str(flights),
         str(len(verdicts)),
         f"{100 * np.mean([v.share_valid for v in verdicts.values()]):.0f} %",
         f"{covered[worst]:.1f} ({worst})",
