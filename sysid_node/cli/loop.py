@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 ACTUATORS = "actuator_lag:time_constant=0.05"
 ONSET, EXCITE_AT, SETTLED = 30.0, 3.0, 10.0  # s: failure, first excitation, and after the failure
+PAUSE = 3.0  # s from an abort of the excitation until it is asked for again
 START_UP = 60.0  # s in which the first command must come
 WATCHED = ("Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
 NODES: Mapping[str, tuple[str, ...]] = {
@@ -148,7 +149,7 @@ def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[by
     """Ask for set-points, begin excitation, let something fail, show it all; returns what happened when."""
     console, seen = Console(), ""
     events: list[tuple[float, str]] = []
-    waited = 0.0
+    waited, excite_at = 0.0, EXCITE_AT
     with Live(console=console, auto_refresh=False) as live:
         while watch.time < plan.seconds and all(process.poll() is None for process in processes):
             watch.listen(0.1)
@@ -158,9 +159,12 @@ def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[by
                     raise RuntimeError(f"no command came within {START_UP:g} s; the logs in {plan.out} may say why")
             watch.ask_for(set_points(watch.time))
             done = [text for _, text in events]
-            if watch.time >= EXCITE_AT and "excitation begun" not in done:
+            if watch.time >= excite_at:
                 watch.excite()
-                events.append((watch.time, "excitation begun"))
+                events.append((watch.time, "excitation asked for"))
+                excite_at = math.inf
+            if excite_at == math.inf and watch.value("exciter", "last event").startswith("aborted"):
+                excite_at = watch.time + PAUSE
             if plan.fail and watch.time >= ONSET and plan.fail not in done:
                 refused = watch.set_effects(_effects(plan, failed=True))
                 if refused:
@@ -207,7 +211,7 @@ def _picture(plan: Plan, watch: LoopWatch) -> RenderableType:
 
 
 def _rms(rows: Sequence[tuple[float, Mapping[str, float]]], axis: str) -> float:
-    values = [row.get(f"{axis} error", math.nan) for _, row in rows]
+    values = [e for _, row in rows if math.isfinite(e := row.get(f"{axis} error", math.nan))]
     return math.degrees(math.sqrt(sum(v * v for v in values) / len(values))) if values else math.nan
 
 

@@ -33,6 +33,9 @@ CAUTIONS = (1.0, 2.0, 4.0, 8.0, 16.0)
 #: s between two checks of an axis.
 PERIOD = 0.5
 
+#: s of a lapse of estimates or sensors, after which what was flown before it is no longer taken up again.
+LAPSE = 5.0
+
 #: Surfaces that do less, in what the file's do (for two, the product), or the opposite, are not relied on.
 LEAST_AUTHORITY = 0.1
 
@@ -68,6 +71,8 @@ class Adaptation:
     verdict: str = "baseline"
     accepted: int = 0
     refused: int = 0
+    left: Flown | None = None  # the target that was left for the baseline, to be taken up again
+    left_at: float = math.nan  # s
 
 
 def init(axis: Axis) -> Adaptation:
@@ -76,10 +81,23 @@ def init(axis: Axis) -> Adaptation:
     return Adaptation(axis, baseline, baseline)
 
 
-def fall_back(state: Adaptation, why: str) -> None:
-    """Head for the baseline."""
-    state.check, state.used, state.verdict = None, (), why
+def fall_back(state: Adaptation, why: str, now: float) -> None:
+    """Head for the baseline at a time (s)."""
+    if state.left is None:
+        state.left, state.left_at = state.target, now
+    state.check, state.verdict = None, f"baseline: {why}"
     state.target = Flown(state.axis.believed, state.axis.baseline)
+
+
+def resume(state: Adaptation, now: float) -> None:
+    """All is well again: head for what was flown before, if that is not long ago; it has passed its check."""
+    if state.left is None:
+        return
+    if abs(now - state.left_at) <= LAPSE:
+        state.target, state.verdict = state.left, "adapted before; taken up again" if state.accepted else "baseline"
+    else:
+        state.used, state.verdict = (), "baseline: no estimates fit for use since"
+    state.left = None
 
 
 def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Settings, now: float) -> None:

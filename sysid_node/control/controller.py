@@ -46,11 +46,9 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
 def hear(state: State, time: float, beliefs: Mapping[str, Belief]) -> None:
     """Estimates that came at a time (s) of the sensors' clock."""
     state.heard = time
-    if not state.settings.adapt:
-        return
-    state.stale = ""
-    for axis in state.axes:
-        adaptation.consider(axis, beliefs, state.settings, time)
+    if state.settings.adapt and not state.stale:
+        for axis in state.axes:
+            adaptation.consider(axis, beliefs, state.settings, time)
 
 
 def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION) -> Command:
@@ -58,7 +56,12 @@ def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[f
     passed = sensed.time - state.time
     duration = min(passed, LONGEST_STEP) if passed > 0.0 else FIRST_STEP
     state.time = sensed.time
-    _fall_back(state, sensed)
+    state.stale = _why_not(state, sensed)
+    for axis in state.axes:
+        if state.stale:
+            adaptation.fall_back(axis, state.stale, sensed.time)
+        else:
+            adaptation.resume(axis, sensed.time)
     for axis in state.axes:
         adaptation.advance(axis, state.settings, duration)
     pitch, lateral = state.axes
@@ -66,14 +69,14 @@ def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[f
     return law.step(state.law, sensed, points, flown, excitation, duration)
 
 
-def _fall_back(state: State, sensed: Sensed) -> None:
-    """Head for the baseline where estimates are old or a sensor is silent."""
+def _why_not(state: State, sensed: Sensed) -> str:
+    """Why the baseline is flown: a silent sensor, old estimates; empty where estimates may be used."""
     silent = [name for name, value in sensed._asdict().items() if not math.isfinite(value)]
-    age = abs(sensed.time - state.heard)  # the clock may step back
     if silent:
-        state.stale = f"{silent[0]} not measured"
-    elif age > state.settings.stale_after:
-        state.stale = f"no estimates for {age:.1f} s" if math.isfinite(age) else "no estimates yet"
-    if state.stale:
-        for axis in state.axes:
-            adaptation.fall_back(axis, f"baseline: {state.stale}")
+        return f"{silent[0]} not measured"
+    if not state.settings.adapt:
+        return "adaptation is off"
+    age = abs(sensed.time - state.heard)  # the clock may step back
+    if age > state.settings.stale_after:
+        return f"no estimates for {age:.1f} s" if math.isfinite(age) else "no estimates yet"
+    return ""

@@ -32,7 +32,7 @@ class Episode:
     def rms(self, axis: str, start: float, stop: float) -> float:
         """Of an error between two times, rad; NaN where there is none."""
         time, errors = np.asarray(self.time), np.asarray(self.errors[axis])
-        chosen = errors[(time >= start) & (time < stop)]
+        chosen = errors[(time >= start) & (time < stop) & np.isfinite(errors)]  # not finite: no IMU then
         return float(np.sqrt(np.mean(chosen**2))) if chosen.size else math.nan
 
     def spans(self, settled: float) -> list[tuple[str, float, float]]:

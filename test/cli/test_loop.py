@@ -28,7 +28,7 @@ def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["adapted"] is True
     assert summary["tracking_error"]["whole flight"]["pitch"] < 0.1
-    assert any(event["what"] == "excitation begun" for event in summary["events"])
+    assert any(event["what"] == "excitation asked for" for event in summary["events"])
     assert "What happened" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 

@@ -129,6 +129,23 @@ def test_old_estimates_bring_the_baseline_back(state: controller.State) -> None:
     assert baseline(state)
 
 
+def test_after_a_short_lapse_what_was_flown_is_taken_up_again(state: controller.State) -> None:
+    """Also where no estimate is fit for use any more, because nothing excites the aircraft."""
+    end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
+    adapted = state.axes[0].flown.gains
+    end = flown(state, 1.0, None, end)
+    assert not np.allclose(state.axes[0].flown.gains, adapted)
+    flown(state, 3.0, beliefs(ELEVATOR, explained=0.0), end)
+    np.testing.assert_allclose(state.axes[0].flown.gains, adapted)
+
+
+def test_after_a_long_one_it_is_not(state: controller.State) -> None:
+    end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
+    end = flown(state, 8.0, None, end)
+    flown(state, 3.0, beliefs(ELEVATOR, explained=0.0), end)
+    assert baseline(state)
+
+
 def test_a_silent_sensor_brings_the_baseline_back(state: controller.State) -> None:
     end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
     for k in range(1200):
