@@ -1,10 +1,13 @@
 """Sensor noise that comes and goes with the motion.
 
-Noise in the airspeed multiplies a coefficient's motion, noise in the angle of attack the lift on its way into the drag:
+Noise in the airspeed multiplies a coefficient's motion, errors of the angle of attack the lift on its way into the drag:
 such noise is there while the regressors move, and a stationary density of the same energy makes too little of it. With
 the noise's density w(t) the estimates' covariance holds the integral of w x x' where stationary noise has that of x x'
 times the mean of w (the heteroskedastic sandwich of White, Econometrica 48, 1980). The two integrals are collected in
 the time domain; how many of the lines' products they stand for is told by those of stationary noise.
+
+The drag's part by the angle of attack is kept apart: what is left of the drag beyond the sensors' noise is an error of
+that angle, too, as where the air turns and the probe is not at the centre of gravity.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from sysid_node.online.regression import Plan
 
 Array = NDArray[np.float64]
+DOUBT = 1.5  # times the sensors' noise that a residual holds before it is more than that
 RIDGE, TINY = 1e-9, 1e-100  # set regressors apart that moved alike, or not at all
 
 
@@ -32,6 +36,9 @@ class Unevenness:
     weighted: Array | float = 0.0  # (C, P, P) of w x x'
     power: Array | float = 0.0  # (C,) of w
     moments: Array | float = 0.0  # (P, P) of x x'
+    lifted: Array | float = 0.0  # (C, P, P) of w x x', where w is by the angle of attack
+    lifted_power: Array | float = 0.0  # (C,) of that w
+    steady: Array | float = 0.0  # (C,) of the accelerometer's noise density, where it matters beside that w
     duration: float = 0.0  # s
 
     def __add__(self, other: Unevenness) -> Unevenness:
@@ -60,18 +67,27 @@ def measure(
     """
     x = rows[:, plan.columns] - mean[plan.columns]
     relative = 2.0 * aircraft.noise["airspeed"] / aircraft.reference.airspeed
-    w = (relative * (x @ theta)) ** 2
+    w, lifted, steady = (relative * (x @ theta)) ** 2, np.zeros((len(rows), theta.shape[1])), np.zeros(theta.shape[1])
+    step = duration / len(rows)
     if "CD" in plan.coefficients and "alpha" in layout.names:
         c = plan.coefficients.index("CD")
         of_alpha = theta[[i for i in plan.unknowns(c).tolist() if plan.regressors[i] == "alpha"], c].sum()
         turned = rows[:, layout.column("CL")] - of_alpha * rows[:, OFFSET]
-        w[:, c] += (aircraft.noise["alpha"] * turned) ** 2
+        lifted[:, c] = (aircraft.noise["alpha"] * turned) ** 2
+        steady[c] = duration * step * (aircraft.noise["accel"] * _per_acceleration(aircraft)) ** 2
     starts = np.arange(0, len(rows), -(-len(rows) // boxes))
     counts = np.diff(starts, append=len(rows))[:, None]
-    slow, w = np.add.reduceat(x, starts) / counts, np.add.reduceat(w, starts) * every
-    step = duration / len(rows)
-    weighted = (w.T[:, :, None] * slow).swapaxes(1, 2) @ slow
-    return Unevenness(weighted * step, w.sum(axis=0) * step, (counts * slow).T @ slow * step, duration)
+    slow = np.add.reduceat(x, starts) / counts
+    sums = [np.add.reduceat(density, starts) * (every * step) for density in (w, lifted)]
+    weighted, by_lift = ((w.T[:, :, None] * slow).swapaxes(1, 2) @ slow for w in sums)
+    powers = [w.sum(axis=0) for w in sums]
+    return Unevenness(weighted, powers[0], (counts * slow).T @ slow * step, by_lift, powers[1], steady, duration)
+
+
+def _per_acceleration(aircraft: Aircraft) -> float:
+    """Coefficient of a force that accelerates the aircraft by 1 m/s^2 at the reference."""
+    reference = aircraft.reference
+    return aircraft.mass / (0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S)
 
 
 def excess(uneven: Unevenness, even: Array, same: Array, density: Array) -> Array | float:
@@ -84,8 +100,11 @@ def excess(uneven: Unevenness, even: Array, same: Array, density: Array) -> Arra
     if uneven.duration <= 0.0:
         return 0.0
     moments = uneven.moments * same
-    mean = uneven.power / uneven.duration
-    extra = (uneven.weighted - np.multiply.outer(mean, moments)) * same
+    other = density * uneven.duration - DOUBT * (uneven.power + uneven.steady)
+    more = np.maximum(other / np.maximum(uneven.lifted_power, TINY), 1.0)
+    weighted = uneven.weighted + more[:, None, None] * uneven.lifted
+    mean = (uneven.power + more * uneven.lifted_power) / uneven.duration
+    extra = (weighted - np.multiply.outer(mean, moments)) * same
     extra *= np.minimum(density / np.maximum(mean, TINY), 1.0)[:, None, None]
     turn = np.linalg.solve(_root(moments).T, _root(even).T).T
     found: Array = turn @ extra @ turn.T

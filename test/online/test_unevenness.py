@@ -66,7 +66,7 @@ def test_bursts_make_errors_larger_than_even_noise_would() -> None:
 def test_stationary_noise_has_no_excess() -> None:
     x = np.random.default_rng(1).normal(size=(300, 2))
     moments = x.T @ x
-    even = Unevenness(0.7 * moments[None], np.array([0.7 * 3.0]), moments, 3.0)
+    even = Unevenness(0.7 * moments[None], np.array([0.7 * 3.0]), moments, duration=3.0)
     extra = unevenness.excess(even, 5.0 * moments, np.ones((2, 2)), np.array([1.0]))
     np.testing.assert_allclose(extra, 0.0, atol=1e-9)
 
