@@ -1,4 +1,4 @@
-"""``sysid convert``: a flight log as a bag on the topics that the identifier listens to."""
+"""``sysid convert``: a log, or a bag of an autopilot's topics, as a bag on those that the identifier listens to."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag_writer import STORAGES, write_streams
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.logs import READERS, read_log, streams_of
+from sysid_node.flight.streams import Streams
+from sysid_node.ros.adapters.base import Settings, adapter_for
+from sysid_node.ros.adapters.known import ADAPTERS
+from sysid_node.ros.adapters.recorded import read_recorded
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -18,11 +22,16 @@ if TYPE_CHECKING:
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
     parser = commands.add_parser("convert", help="turn a flight log into a bag", description=__doc__)
-    parser.add_argument("log", metavar="LOG", type=Path, help=f"a flight log ({', '.join(READERS)})")
+    parser.add_argument("log", metavar="LOG", type=Path, help=f"a flight log ({', '.join(READERS)}), or a bag")
     parser.add_argument(
         "--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist"
     )
     parser.add_argument("--aircraft", help="file or name: its joints carry the controls; else elevator, aileron, ...")
+    parser.add_argument("--autopilot", choices=list(ADAPTERS), help="LOG is a bag of this autopilot's own topics")
+    parser.add_argument("--joints", default="", help="with --autopilot: NAME=OUTPUT:TRIM:SCALE ... in one argument")
+    parser.add_argument(
+        "--air-temperature", type=float, default=Settings.air_temperature, help="with --autopilot: degC (default: 15)"
+    )
     parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
     parser.add_argument(
         "--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu, REP-103)"
@@ -33,11 +42,19 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Converts the log."""
-    aircraft = load_aircraft(args.aircraft) if args.aircraft else None
-    flight = read_log(args.log)
-    streams = streams_of(flight, aircraft)
+    streams = _recorded(args) if args.autopilot else _logged(args)
     write_streams(args.out, streams, args.storage, args.body_frame)
     if not args.quiet:
-        print(
-            f"{args.out}: {flight.duration:.1f} s, {len(flight)} samples; joints {', '.join(streams.actuators.names)}"
-        )
+        stamps = streams.imu.arrival.stamp_ns
+        seconds = (stamps[-1] - stamps[0]) / 1e9
+        print(f"{args.out}: {seconds:.1f} s, {stamps.size} samples; joints {', '.join(streams.actuators.names)}")
+
+
+def _logged(args: argparse.Namespace) -> Streams:
+    aircraft = load_aircraft(args.aircraft) if args.aircraft else None
+    return streams_of(read_log(args.log), aircraft)
+
+
+def _recorded(args: argparse.Namespace) -> Streams:
+    settings = Settings(args.joints, args.air_temperature)
+    return read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings))

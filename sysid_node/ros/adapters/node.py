@@ -86,15 +86,15 @@ class AdapterNode(Node):
     """``config/adapter.yaml`` says what its parameters mean.
 
     Raises InputError on wrong ones, where the autopilot's message package is not installed, and where it would hear
-    itself.
+    itself. ``options`` are rclpy's.
     """
 
-    def __init__(self) -> None:
-        super().__init__("adapter")
+    def __init__(self, adapters: Mapping[str, type[Adapter]] = ADAPTERS, **options: Any) -> None:
+        super().__init__("adapter", **options)
         declare(self, PARAMETERS, lambda values: check_each(PARAMETERS, values))
         values = values_of(self, PARAMETERS)
         self._name, self._stale_after = values["autopilot"], values["stale_after"]
-        self._adapter = adapter_for(self._name, ADAPTERS, _settings(values))
+        self._adapter = adapter_for(self._name, adapters, _settings(values))
         kinds = {topic: message_class(kind, self._adapter) for topic, kind in self._adapter.topics.items()}
         self._out: dict[type[Sample], tuple[Any, Callable[[Any], Any]]] = {
             ImuSample: (self.create_publisher(Imu, IMU, 100), imu_message),
@@ -137,7 +137,7 @@ class AdapterNode(Node):
         self._diagnostics.publish(message)
 
 
-def message_class(kind: str, adapter: Adapter) -> Any:
+def message_class(kind: str, adapter: Adapter | type[Adapter]) -> Any:
     """The class of a message type. Raises InputError where its package is not installed or lacks it."""
     package, _, name = kind.split("/")
     try:

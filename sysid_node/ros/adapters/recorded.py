@@ -87,7 +87,7 @@ def streams_of_samples(logged: list[Logged], name: str) -> Streams:
     motion = np.array([(*s.force, *s.rates) for _, s in imu]).reshape(-1, 6)
     flow = np.array([(s.true_airspeed, s.angle_of_attack, s.sideslip, s.air_density) for _, s in air]).reshape(-1, 4)
     names = joints[0][1].names if joints else ()
-    positions = np.array([s.positions for _, s in joints]).reshape(-1, len(names))
+    positions = np.array([s.positions for _, s in joints]).reshape(len(joints), len(names))
     return Streams(
         ImuStream(_arrival([one for one, _ in imu]), motion, _euler([s for _, s in imu]), "base_link"),
         AirDataStream(_arrival([one for one, _ in air]), flow),

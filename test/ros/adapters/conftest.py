@@ -7,6 +7,7 @@ rosflight_msgs/msg of github.com/rosflight/rosflight_ros_pkgs (BSD-3-Clause).
 
 from collections.abc import Callable
 from copy import deepcopy
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from rosbags.typesys import get_types_from_msg
 from rosbags.typesys.store import Typestore
 
 from sysid_node.flight.messages import type_store
+
+collect_ignore = [] if find_spec("rclpy") else ["test_node.py"]
 
 DEFINITIONS = {
     "px4_msgs/msg/SensorCombined": """
