@@ -1,10 +1,10 @@
 """Sensor noise that comes and goes with the motion.
 
-Noise in the airspeed multiplies a coefficient's motion, errors of the angle of attack the lift on its way into the drag:
-such noise is there while the regressors move, and a stationary density of the same energy makes too little of it. With
-the noise's density w(t) the estimates' covariance holds the integral of w x x' where stationary noise has that of x x'
-times the mean of w (the heteroskedastic sandwich of White, Econometrica 48, 1980). The two integrals are collected in
-the time domain; how many of the lines' products they stand for is told by those of stationary noise.
+Noise in the airspeed multiplies a coefficient's motion, errors of the angle of attack the lift on its way into the
+drag: such noise is there while the regressors move, and a stationary density of the same energy makes too little of it.
+With the noise's density w(t) the estimates' covariance holds the integral of w x x' where stationary noise has that of
+x x' times the mean of w (the heteroskedastic sandwich of White, Econometrica 48, 1980). The two integrals are collected
+in the time domain; how many of the lines' products they stand for is told by those of stationary noise.
 
 The drag's part by the angle of attack is kept apart: what is left of the drag beyond the sensors' noise is an error of
 that angle, too, as where the air turns and the probe is not at the centre of gravity.

@@ -87,3 +87,12 @@ def test_sums_and_scales() -> None:
     twice = found + found * 1.0
     assert twice.duration == pytest.approx(2.0 * found.duration)
     np.testing.assert_allclose(twice.weighted, 2.0 * found.weighted)
+
+
+def test_what_is_left_of_the_drag_comes_with_the_lift() -> None:
+    """Beyond the sensors' noise, a residual is shaped as the lift's square; within it, by the vane's noise alone."""
+    moments = np.eye(1)
+    uneven = Unevenness(np.zeros((1, 1, 1)), np.zeros(1), moments, 2.0 * moments[None], np.ones(1), np.ones(1), 1.0)
+    calm, rough = (unevenness.excess(uneven, moments, np.ones((1, 1)), np.array([s])) for s in (2.0, 8.0))
+    assert calm == pytest.approx(np.array([[[1.0]]]))  # w x x' less the mean w
+    assert rough == pytest.approx(np.array([[[8.0 - 1.5]]]))
