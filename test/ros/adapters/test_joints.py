@@ -1,5 +1,8 @@
 """The map from outputs to joints, and what is wrong with one."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from sysid_node.errors import InputError
@@ -42,6 +45,15 @@ def test_what_is_wrong_is_said_in_a_line(text: str, words: str) -> None:
 def test_every_example_is_one(autopilot: str) -> None:
     adapter = adapter_for(autopilot, ADAPTERS, Settings(joints=ADAPTERS[autopilot].example))
     assert {joint.name for joint in adapter.joints} == {"aileron", "elevator", "rudder", "throttle"}
+
+
+def test_the_page_shows_maps_that_are_accepted() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "autopilots.md").read_text(encoding="utf-8")
+    shown = re.findall(r'joints(?::=| )"([^"]+)"', page)
+    assert len(shown) == 3
+    for text in shown:
+        autopilot = "px4" if "servo" in text else "mavros"
+        assert adapter_for(autopilot, ADAPTERS, Settings(joints=text.removesuffix(" ..."))).joints
 
 
 def test_an_unknown_autopilot_is_named() -> None:
