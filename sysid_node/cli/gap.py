@@ -78,7 +78,7 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[float, str], None]]:
 
 def write_gap(folder: Path, found: Diagnosis) -> None:
     """Writes gap.json, where.csv, candidates.csv, corrected.yaml, effects.txt and report.html. Raises InputError."""
-    from sysid_node.gap.diagnose import document  # noqa: PLC0415
+    from sysid_node.gap.document import document  # noqa: PLC0415
     from sysid_node.report.gap import write_gap_report  # noqa: PLC0415
 
     content = document(found)

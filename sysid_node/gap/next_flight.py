@@ -18,9 +18,11 @@ from sysid_node.errors import InputError
 from sysid_node.excite.manoeuvre import THROTTLE
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.gap.attribute import Attribution, Cause, Trial
 from sysid_node.gap.candidates import Candidate, prior
 from sysid_node.gap.fit import Fit, real_rows, weights
 from sysid_node.gap.flights import thinned
+from sysid_node.gap.verdict import named
 from sysid_node.gap.view import View, view_like
 from sysid_node.sim import Simulator
 from sysid_node.sim.atmosphere import air_density
@@ -39,6 +41,12 @@ _PROPOSALS = (
     ("3-2-1-1 on each surface in turn while the throttle is stepped up and down", "3211", 0.3, 1.0, True),
 )
 
+#: Separation, in standard deviations, from which a flight tells two effects apart.
+_PARTED = 3.0
+
+#: What to fly where no pair of effects is in doubt.
+_LARGER = "3-2-1-1 on each surface in turn, larger and at two airspeeds, in still air"
+
 #: Amplitude of the throttle's steps, of full throttle.
 _THROTTLE_STEP = 0.25
 
@@ -50,6 +58,47 @@ class Proposal:
     words: str
     separation: float
     flown: float
+
+
+def advice(verdict: str, attribution: Attribution) -> str:
+    """What to fly, by what is in doubt."""
+    if verdict == "no_gap":
+        return ""
+    pairs = [(cause.candidate, rival.fit) for cause in attribution.causes for rival in _confused(cause)]
+    if not pairs:
+        return "" if verdict == "explained" else _LARGER
+    best = propose(attribution.chosen.fit, pairs)
+    if best is None:
+        return _LARGER
+    if best.separation < _PARTED:
+        return (
+            f"no manoeuvre parts {_listed(attribution)} (at most {best.separation:.2g} standard deviations): what they "
+            "do in flight is the same; measure on the ground"
+        )
+    if best.separation <= best.flown:
+        return (
+            f"the same again, longer and in still air: no other manoeuvre parts {_listed(attribution)} better than "
+            f"those flown ({best.flown:.3g} standard deviations of the sensors' noise)"
+        )
+    return (
+        f"{best.words}, in still air: parts {_listed(attribution)} by {best.separation:.3g} standard deviations or "
+        f"more, the manoeuvres flown by {best.flown:.3g}"
+    )
+
+
+def _listed(attribution: Attribution) -> str:
+    """The causes in doubt and what is named beside them."""
+    doubtful = [cause for cause in attribution.causes if named(cause)]
+    return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause))))
+
+
+def _confused(cause: Cause) -> list[Trial]:
+    """The best trial of each effect that is named beside a cause."""
+    best: dict[str, Trial] = {}
+    for trial in cause.rivals:
+        if trial.added is not None and trial.added.effect in named(cause):
+            best.setdefault(trial.added.effect, trial)
+    return list(best.values())
 
 
 def propose(fit: Fit, pairs: Sequence[tuple[Candidate, Fit]]) -> Proposal | None:

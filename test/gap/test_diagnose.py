@@ -6,7 +6,8 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.errors import InputError
-from sysid_node.gap.diagnose import diagnose, document
+from sysid_node.gap.diagnose import diagnose
+from sysid_node.gap.document import document
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from sysid_node.gap.diagnose import Diagnosis, document, structured
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.document import document
 from sysid_node.gap.nuisance import GUSTY
+from sysid_node.gap.verdict import structured
 from sysid_node.gap.view import CHANNELS
 from sysid_node.report import figures
 from sysid_node.report.figures import BLUE, GREEN, MUTED, PURPLE, VERMILION, Figure

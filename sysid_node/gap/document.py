@@ -1,0 +1,72 @@
+"""What gap.json holds of a diagnosis."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sysid_node.gap.attribute import Cause
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.fit import Fit
+from sysid_node.gap.verdict import explained, named, probability, structured
+from sysid_node.gap.view import CHANNELS
+
+
+def document(found: Diagnosis) -> dict[str, Any]:
+    """The content of gap.json."""
+    gap, attribution = found.gap, found.attribution
+    left = attribution.left
+    return {
+        "verdict": found.verdict,
+        "aircraft": found.aircraft.name,
+        "gap": {
+            "before": gap.before,
+            "tolerances": gap.tolerances,
+            "after": gap.after,
+            "noise_floor": gap.noise_floor,
+            "shrink_percent": gap.shrink_percent,
+            "ci95": list(gap.ci95),
+            "per_channel": gap.per_channel,
+            "window_s": found.views[0].windows.length,
+            "held_out": found.held_out,
+        },
+        "air_motion": max(view.gusts for view in found.views),
+        "where": found.where,
+        "causes": [_cause(found, cause) for cause in attribution.causes],
+        "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],
+        "unexplained": {
+            "share": 1.0 - explained(attribution) if structured(attribution) else 0.0,
+            "where": [w for w in found.where if w["station"] == "unexplained"][:3],
+            "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
+        },
+        "next_flight": found.next_flight,
+    }
+
+
+def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
+    return {
+        "effect": cause.candidate.effect,
+        "label": cause.candidate.label,
+        "station": cause.candidate.station,
+        "parameters": parameters(found.attribution.corrected, cause),
+        "probability": probability(found.attribution, cause),
+        "gap_after": found.gap.after,
+        "indistinguishable_from": named(cause),
+    }
+
+
+def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:
+    """Value and standard error of each of a cause's parameters, in the simulator's units."""
+    simulator, places = fit.views[0].simulator, {index: place for place, index in enumerate(fit.indices)}
+    errors = np.sqrt(np.diag(fit.covariance))
+    if cause.candidate.indices:
+        return {
+            simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])]
+            for i in cause.candidate.indices
+        }
+    ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    ordered += [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if not s]
+    places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
+    own = [i for i in ordered if simulator.parameters[i][0] == cause.candidate.effect]
+    return {simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])] for i in own}

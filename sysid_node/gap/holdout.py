@@ -1,0 +1,41 @@
+"""What flight not fitted says of an explanation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from sysid_node.gap import close
+from sysid_node.gap.attribute import Attribution
+from sysid_node.gap.close import Gap
+from sysid_node.gap.evidence import Evidence, held_out
+from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.structure import Structure, instrumented
+from sysid_node.gap.view import View
+
+
+@dataclass(frozen=True)
+class Check:
+    """Evidence of the derivatives alone and of the whole explanation, and the gap, on ``views``."""
+
+    views: tuple[View, ...]
+    base: Evidence
+    final: Evidence
+    gap: Gap
+
+    def as_filed(self, left: Structure) -> Check:
+        """The same of the aircraft file as it is."""
+        before = tuple(v.residual(v.simulator.neutral()) for v in self.views)
+        base = replace(self.base, residuals=before)
+        return replace(self, base=base, final=base, gap=close.gap_of(self.views, before, base, base, left))
+
+
+def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> Check:
+    """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
+    if unseen:
+        base, final = (held_out(f, unseen, own) for f in (instrumented(attribution.base.fit), attribution.corrected))
+    else:
+        base, final = attribution.base.evidence, attribution.chosen.evidence
+    views = base.views
+    before = [v.residual(v.simulator.neutral()) for v in views]
+    return Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))

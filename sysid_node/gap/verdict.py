@@ -1,0 +1,85 @@
+"""The verdict: from what was accepted, what is left over, and what flight not fitted says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.admission import excitation
+from sysid_node.gap.attribute import NOTICED, Attribution, Cause, power_left
+from sysid_node.gap.evidence import Evidence
+from sysid_node.gap.holdout import Check
+from sysid_node.gap.view import View
+
+#: Probability from which an effect counts as told apart from its rivals.
+_TOLD_APART = 0.8
+
+#: Share of the remainder on some axis that must be structure to matter, and its standard deviations above chance.
+_STRUCTURED, _DEVIATIONS = 0.12, 6.0
+
+#: Standard deviations above chance below which coherence is taken as chance.
+_CHANCE = 4.0
+
+#: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
+_EXPLAINED = 0.5
+
+#: Probability, with what is left over counted against it, below which no cause is said to explain.
+_LIKELY = 0.5
+
+#: A rival with this probability is named.
+_NAMED = 0.03
+
+#: Power over the sensors' noise below which a flight tells nothing.
+_TELLING = 6.0
+
+
+def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) -> str:
+    """One of gap.json's five words."""
+    if max(excitation(view).max() for view in views) < _TELLING:
+        return "unsupported"
+    if not attribution.causes:
+        return "unknown_effect" if structured(attribution) else "no_gap"
+    if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
+        return "unknown_effect"
+    sure = [c.probability >= _TOLD_APART and probability(attribution, c) >= _LIKELY for c in attribution.causes]
+    return "explained" if all(sure) else "ambiguous"
+
+
+def structured(attribution: Attribution) -> bool:
+    """Whether what is left holds structure that matters."""
+    left, size = attribution.left, np.sqrt(_structure_left(attribution))
+    return bool(np.any((left.share > _STRUCTURED) & (left.deviations > _DEVIATIONS) & (size > NOTICED)))
+
+
+def explained(attribution: Attribution) -> float:
+    """Share that the effects take away of what lies above the tolerances and is not noise, all channels together."""
+    motion = _motion(attribution.chosen.evidence)
+    gone = (power_left(attribution.base.evidence) - power_left(attribution.chosen.evidence)) / motion
+    taken = max(float(gone.sum()), 0.0)
+    whole = taken + float(_structure_left(attribution).sum())
+    return taken / whole if whole > 0.0 else 1.0
+
+
+def _structure_left(attribution: Attribution) -> Array:
+    """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
+    left, evidence = attribution.left, attribution.chosen.evidence
+    share = np.where(left.deviations > _CHANCE, left.share, 0.0)
+    return np.asarray(share * power_left(evidence) / _motion(evidence))
+
+
+def _motion(evidence: Evidence) -> Array:
+    """Power (12,) of what was measured, about the windows' means."""
+    power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.views)
+    return np.asarray(np.maximum(power, 1e-300))
+
+
+def probability(attribution: Attribution, cause: Cause) -> float:
+    """Of a cause, less by the share of the structure that is left and no listed effect explains."""
+    return cause.probability * explained(attribution)
+
+
+def named(cause: Cause) -> list[str]:
+    """Effects that are named beside a cause."""
+    return [effect for effect, p in cause.alternatives if p > _NAMED]
