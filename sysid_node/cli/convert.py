@@ -32,6 +32,9 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument(
         "--air-temperature", type=float, default=Settings.air_temperature, help="with --autopilot: degC (default: 15)"
     )
+    parser.add_argument(
+        "--air-data-delay", type=float, default=Settings.air_data_delay, help="with --autopilot: s (default: 0)"
+    )
     parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
     parser.add_argument(
         "--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu, REP-103)"
@@ -56,5 +59,5 @@ def _logged(args: argparse.Namespace) -> Streams:
 
 
 def _recorded(args: argparse.Namespace) -> Streams:
-    settings = Settings(args.joints, args.air_temperature)
+    settings = Settings(args.joints, args.air_temperature, args.air_data_delay)
     return read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings))

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 from sysid_node.errors import InputError
@@ -49,13 +50,25 @@ class JointSample(NamedTuple):
 Sample = ImuSample | AirSample | JointSample
 
 
+#: What the settings may be, by name.
+RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {"air_temperature": (-60.0, 60.0), "air_data_delay": (0.0, 1.0)}
+)
+
+
 @dataclass(frozen=True)
 class Settings:
-    """What no message says."""
+    """What no message says. Raises InputError on a value outside ``RANGES``."""
 
     joints: str = ""  # which output moves which joint; see ``joints_of``
     air_temperature: float = 15.0  # degC, of the outside air where the pressure is measured
     air_data_delay: float = 0.0  # s, by which airspeed is stamped too late
+
+    def __post_init__(self) -> None:
+        for name, (lower, upper) in RANGES.items():
+            value = getattr(self, name)
+            if not lower <= value <= upper:
+                raise InputError(f"{name} = {value!r}: expected {lower:g} to {upper:g}")
 
 
 class Adapter(ABC):

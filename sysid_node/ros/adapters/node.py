@@ -21,6 +21,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.ros import conversion
 from sysid_node.ros.adapters.attitude import other_axes
 from sysid_node.ros.adapters.base import (
+    RANGES,
     Adapter,
     AirSample,
     ImuSample,
@@ -58,8 +59,7 @@ PARAMETERS = (
         "degC",
         "Outside air, for the density where the autopilot measures the pressure alone (mavros, rosflight).",
         "Before every flight: 3 degC are 1 % of the density.",
-        lower=-60.0,
-        upper=60.0,
+        *RANGES["air_temperature"],
     ),
     Parameter(
         "air_data_delay",
@@ -67,8 +67,7 @@ PARAMETERS = (
         "s",
         "By so much airspeed is stamped too late, as where it is stamped when it arrives.",
         "To the link's latency where docs/autopilots.md says that stamps are times of arrival.",
-        lower=0.0,
-        upper=1.0,
+        *RANGES["air_data_delay"],
     ),
     Parameter(
         "stale_after",

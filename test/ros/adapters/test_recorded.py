@@ -144,5 +144,6 @@ def test_what_is_wrong_is_said_in_a_line(messages, store, tmp_path, capsys) -> N
             read_recorded(bag, adapter)
         assert words in str(error.value)
         assert "\n" not in str(error.value)
-    assert main(["convert", str(BAG), "--out", str(tmp_path / "out"), "--autopilot", "px4"]) == 2
-    assert "parameter joints is empty" in capsys.readouterr().err
+    for options, words in (((), "joints is empty"), (("--air-temperature", "288"), "288.0: expected -60 to 60")):
+        assert main(["convert", str(BAG), "--out", str(tmp_path / "out"), "--autopilot", "px4", *options]) == 2
+        assert words in capsys.readouterr().err
