@@ -55,7 +55,7 @@ FLIGHTS = {
         {"accel": 0.03, "gyro": 0.001, "airspeed": 0.1, "alpha": 0.001, "beta": 0.001, "attitude": 0.001},
     ),
     "thor": Flight(
-        "thor_75a.csv", known.thor, (5.0, 80.0), (85.0, 160.0), False,
+        "thor_75a.csv", known.thor, (5.0, 55.0), (85.0, 135.0), False,
         {"accel": 0.15, "gyro": 0.01, "airspeed": 0.2, "alpha": 0.006, "beta": 0.006, "attitude": 0.005},
     ),
     "twin_otter": Flight(
