@@ -56,16 +56,23 @@ class Flown:
     attitude: Array  # (N, 3) true pitch, roll, sideslip
     wanted: Array  # (N, 3) the reference model's
     surfaces: Array  # (N, 3)
+    exciting: NDArray[np.bool_]  # (N,)
     cautions: list[str]  # what the pitch and lateral gains were last said to be
     events: list[inflight.Event]
     lost: float  # s, when control was lost; inf = never
 
-    def error(self, start: float, stop: float) -> Array:
-        """(3,) rms of pitch, roll and sideslip from what was wanted, rad; infinite once control is lost."""
+    def error(self, start: float, stop: float, without: NDArray[np.bool_] | None = None) -> Array:
+        """(3,) rms of pitch, roll and sideslip from what was wanted, rad; infinite once control is lost.
+
+        Samples (N,) ``without`` do not count; NaN where none is left.
+        """
         if self.lost < stop:
             return np.full(3, np.inf)
         chosen = (self.time >= start) & (self.time < stop)
-        return np.sqrt(np.mean((self.attitude - self.wanted)[chosen] ** 2, axis=0))
+        if without is not None:
+            chosen &= ~without
+        square = np.sum((self.attitude - self.wanted)[chosen] ** 2, axis=0)
+        return np.asarray(np.sqrt(square / (np.count_nonzero(chosen) or np.nan)))
 
 
 @cache
@@ -99,13 +106,15 @@ def fly(sortie: Sortie) -> Flown:
         _estimate(session, pilot, exciter, now)
         command, wanted = _command(pilot, exciter, now, set_points(now.time, trim.alpha, sortie.asked))
         true = _attitude(now.state)
-        rows.append((now.time, *true, *wanted, *now.surfaces[:3]))
+        rows.append((now.time, *true, *wanted, *now.surfaces[:3], exciter.active))
         if not (np.abs(true) < (1.0, 1.4, 0.6)).all():
             lost = now.time
             break
     table = np.array(rows)
     said = [axis.verdict for axis in pilot.axes]
-    return Flown(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:], said, exciter.events, lost)
+    return Flown(
+        table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10] > 0.0, said, exciter.events, lost
+    )
 
 
 def _estimate(session: Session, pilot: controller.State, exciter: inflight.State, now: live.Reading) -> None:
