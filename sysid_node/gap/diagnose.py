@@ -13,7 +13,7 @@ from sysid_node.gap.admission import admitted, require_others
 from sysid_node.gap.attribute import Attribution, Progress, attribute
 from sysid_node.gap.close import Gap
 from sysid_node.gap.confusion import Confusion, confusion_of
-from sysid_node.gap.evidence import Evidence
+from sysid_node.gap.evidence import Evidence, carried
 from sysid_node.gap.flights import RATE, Flight
 from sysid_node.gap.holdout import check
 from sysid_node.gap.localise import Shape
@@ -21,7 +21,7 @@ from sysid_node.gap.next_flight import advice
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.verdict import verdict_of
-from sysid_node.gap.view import View, view_of
+from sysid_node.gap.view import View, gusts_of, view_of
 from sysid_node.sim import Simulator
 
 
@@ -41,6 +41,7 @@ class Diagnosis:
     next_flight: str
     held_out: bool
     confusion: Confusion
+    air_motion: float  # rms of the air's motion across the flight path, m/s
 
 
 def diagnose(
@@ -76,9 +77,10 @@ def diagnose(
     verdict = verdict_of(views, attribution, checked)
     progress(0.95, "what to fly next")
     found = localise.where(attribution, [v.residual(simulator.neutral()) for v in views])
+    air = max(gusts_of(v, carried(attribution.corrected, v)) for v in checked.views)
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(
         aircraft, verdict, checked.gap, found, attribution, localise.missing(attribution), checked.views, checked.base,
-        checked.final, flight, bool(holdouts), confusion_of(attribution.base, attribution.trials),
+        checked.final, flight, bool(holdouts), confusion_of(attribution.base, attribution.trials), air,
     )  # fmt: skip

@@ -31,7 +31,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "window_s": found.views[0].windows.length,
             "held_out": found.held_out,
         },
-        "air_motion": max(view.gusts for view in found.views),
+        "air_motion": found.air_motion,
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
         "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],

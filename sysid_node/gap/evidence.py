@@ -95,7 +95,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
     residuals: list[Complex] = []
     for view, theirs in zip(views, nuisances, strict=True):
         kept = theirs.without(fit.effects, view.simulator.names)
-        point = _carried(fit, view)
+        point = carried(fit, view)
         power = np.maximum(_train_power(fit, view), view.noise)
         power = np.where(view.axes, power, 1.0)
         weight = weights(view.windows, power)
@@ -120,7 +120,7 @@ def _ordered(nuisances: Nuisances) -> list[int]:
     return [*indices[nuisances.shared].tolist(), *indices[~nuisances.shared].tolist()]
 
 
-def _carried(fit: Fit, view: View) -> Array:
+def carried(fit: Fit, view: View) -> Array:
     """The parameters of a flight not seen: what is shared from the fit, its own nuisances neutral."""
     point = view.simulator.neutral()
     shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]

@@ -98,7 +98,7 @@ class View:
     measured: Complex  # (W, L, 12)
     noise: Array  # (L, 12) power that the sensors' noise leaves in measured minus predicted
     axes: NDArray[np.bool_]  # (12,): what was measured
-    gusts: float = 0.0  # rms of the air's motion across the flight path, m/s
+    gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, as the aircraft file has it
 
     @property
     def commands(self) -> Array:
@@ -139,7 +139,7 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
     axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
     calm = _measured_noise(_bare(simulator, flight, record, windows, axes, LONGEST), seed)
-    calm = replace(calm, gusts=_gusts(calm))
+    calm = replace(calm, gusts=gusts_of(calm, simulator.neutral()))
     fading = _fading(calm)
     if fading == LONGEST:
         return calm
@@ -165,14 +165,18 @@ def _bare(
     return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
 
 
-def _gusts(calm: View) -> float:
-    """Root-mean-square motion of the air across the flight path (m/s): flow angles that no motion accounts for."""
-    vanes = len(COEFFICIENTS) + np.flatnonzero(calm.axes[len(COEFFICIENTS) :][1:3]) + 1
+def gusts_of(view: View, theta: Array) -> float:
+    """Root-mean-square motion of the air across the flight path (m/s): flow angles that no motion accounts for.
+
+    With a long memory of the air, at parameters (P,); the median of the windows, which the observer's start leaves out.
+    """
+    vanes = len(COEFFICIENTS) + np.flatnonzero(view.axes[len(COEFFICIENTS) :][1:3]) + 1
     if not vanes.size:
         return 0.0
-    residual = (np.abs(calm.residual(calm.simulator.neutral())) ** 2).mean(axis=0)[1:, vanes]
-    power = np.maximum(residual - calm.noise[1:, vanes], 0.0).sum(axis=0) * 2.0 / calm.windows.size
-    return float(calm.record["V"].mean() * np.sqrt(power.mean()))
+    calm = replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
+    power = (np.abs(calm.residual(theta)[:, 1:, vanes]) ** 2).sum(axis=1)
+    beyond = np.maximum(np.median(power, axis=0) - view.noise[1:, vanes].sum(axis=0), 0.0)
+    return float(view.record["V"].mean() * np.sqrt(2.0 / view.windows.size * beyond.mean()))
 
 
 def _fading(calm: View) -> float:

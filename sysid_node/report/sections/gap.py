@@ -9,6 +9,7 @@ import numpy as np
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
+from sysid_node.gap.evidence import carried
 from sysid_node.gap.nuisance import GUSTY
 from sysid_node.gap.verdict import structured
 from sysid_node.gap.view import CHANNELS
@@ -31,6 +32,9 @@ _WORDS = {
     "psi": "heading",
 }
 
+#: How much smaller the error of a reading must have become for it to be drawn.
+_MENDED = 1.3
+
 #: Of a channel's gap: as the file has it, with derivatives and biases fitted, with the causes, noise.
 _STAGES = ("before", "tolerances", "after", "noise_floor")
 
@@ -44,12 +48,11 @@ def paragraph(found: Diagnosis) -> str:
 
 def _weather(found: Diagnosis) -> str:
     """How much the air moved, where it did."""
-    view = max(found.views, key=lambda v: v.gusts)
-    if view.gusts < GUSTY * view.record["V"].mean():
+    if found.air_motion < GUSTY * found.views[0].record["V"].mean():
         return ""
     return (
-        f" The air was not still: across the flight path it moved by {number(view.gusts, 2)} m/s (root mean square), "
-        "which is taken as weather, not as the aircraft's doing."
+        f" The air was not still: across the flight path it moved by {number(found.air_motion, 2)} m/s (root mean "
+        "square), which is taken as weather, not as the aircraft's doing."
     )
 
 
@@ -60,7 +63,8 @@ def _findings(found: Diagnosis) -> str:
     whose = "flight held out" if found.held_out else "parts of the flight that were not fitted"
     falls = (
         f"on {whose} the error over all channels falls from {number(gap.before, 2)} to {number(gap.after, 2)} of the "
-        f"motion; noise alone would leave {number(gap.noise_floor, 2)}"
+        f"motion, {number(gap.shrink_percent, 3)} % of what could be closed; noise alone would leave "
+        f"{number(gap.noise_floor, 2)}"
         if gap.after < 0.95 * gap.before
         else f"on {whose} the error over all channels is {number(gap.before, 2)} of the motion"
     )
@@ -143,7 +147,7 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
     layout = {
         "barmode": "stack",
         "showlegend": True,
-        "xaxis": figures.axis("coefficient"),
+        "xaxis": figures.axis("channel", dtick=1),
         "yaxis": figures.axis("share of the gap, %", rangemode="tozero"),
     }
     rows = [
@@ -157,18 +161,18 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
 
 
 def flight(found: Diagnosis) -> Mapping[str, Any]:
-    """The coefficients as measured, as the file has them, and as corrected."""
+    """The coefficients, and readings that the causes mend, as measured, as the file has them, and as corrected."""
     view = found.views[0]
     fit = found.attribution.corrected
     neutral = view.simulator.neutral()
-    point = neutral.copy()
-    shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-    carried = [*fit.indices, *shared]
-    point[carried] = fit.points[0][carried]
+    point = carried(fit, view)
     before, after = view.predicted_series(neutral), view.predicted_series(point)
     panels = []
-    for k in np.flatnonzero(view.axes[: len(COEFFICIENTS)]):
-        offset = [float(x[:, k].mean() - view.series[:, k].mean()) for x in (before, after)]
+    gaps = found.gap.per_channel
+    mended = [name in gaps and gaps[name]["before"] > _MENDED * gaps[name]["after"] for name in CHANNELS]
+    force = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
+    for k in np.flatnonzero(view.axes & (force | mended)):
+        offset = [float(x[:, k].mean() - view.series[:, k].mean()) if force[k] else 0.0 for x in (before, after)]
         time, *curves = thin_curve(
             view.record.time, view.series[:, k], before[:, k] - offset[0], after[:, k] - offset[1]
         )
@@ -177,9 +181,9 @@ def flight(found: Diagnosis) -> Mapping[str, Any]:
             figures.line(time, c, n, colour=colour, dash=dash, width=1.3)
             for c, (n, colour, dash) in zip(curves, styles, strict=True)
         ]
-        layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(COEFFICIENTS[k])}
-        words = _WORDS[COEFFICIENTS[k]]
-        panels.append((symbol(COEFFICIENTS[k]), words, Figure(f"{words}: measured and simulated", traces, layout)))
+        layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(CHANNELS[k])}
+        words = _WORDS[CHANNELS[k]]
+        panels.append((symbol(CHANNELS[k]), words, Figure(f"{words}: measured and simulated", traces, layout)))
     return {"panels": panels, "held_out": found.held_out}
 
 
