@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
-from sysid_node.online import information, regression, signals, transform
+from sysid_node.online import information, reconstruction, regression, signals, transform
 from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
 from sysid_node.online.experience import experiences
 from sysid_node.online.prior import beliefs
@@ -65,7 +65,8 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         memory=memory,
     )
     running = transform.start(grid, layout.transformed, memory)
-    return State(model, running, plan, information.nothing(layout), experiences=experiences(plan, layout))
+    nothing, flow = information.nothing(layout), reconstruction.init(aircraft)
+    return State(model, running, plan, nothing, flow, experiences=experiences(plan, layout))
 
 
 def _lowest(controls: int) -> tuple[float, ...]:
@@ -78,8 +79,10 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s).
 
     A sample that lacks a value, has an impossible one, or does not come after the last one, is left out and counted in
-    ``incomplete``. Where the first sample has no thrust it is taken as unknown, and as none, from then on.
+    ``incomplete``. Where the first sample has no thrust it is taken as unknown, and as none, from then on; where it
+    lacks a flow angle, that is reconstructed from then on.
     """
+    sample = reconstruction.complete(state.flow, time, sample, state.model.settings.max_gap)
     if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = time + state.model.settings.settle_time
     if not time >= state.begin:

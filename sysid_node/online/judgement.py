@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import regression
+from sysid_node.online import reconstruction, regression
 from sysid_node.online.present import Present
 from sysid_node.online.regression import student_95
 from sysid_node.online.state import Grounds, Renewed, State
@@ -32,9 +32,18 @@ def grounds(state: State, renewed: Renewed) -> Grounds:
     firm = (np.where(plan.mine > 0.0, renewed.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
     sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost & ~renewed.doubted)[table.coefficient]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
+    structure = state.model.aircraft.structure
+    flaws = np.array(
+        [
+            reconstruction.flaw(state.flow, state.piece_start, name, structure[name.partition("_")[0]])
+            for name in table.names
+        ],
+        dtype=object,
+    )
     return Grounds(
-        sound=sound & ~spoilt,
+        sound=sound & ~spoilt & (flaws == ""),
         spoilt=spoilt,
+        flaws=flaws,
         quantiles=student_95(freedom)[table.coefficient],
         fits=list(
             zip(
@@ -111,6 +120,7 @@ def _reasons(
     reasons[:, (renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = "converging"
     if not state.thrust_known:
         reasons[:, table.needs_thrust] = "thrust not measured"
+    reasons[:, grounds.flaws != ""] = grounds.flaws[grounds.flaws != ""]
     reasons[:, renewed.doubted[c]] = "contradicted"
     reasons[:, renewed.lost[c]] = "outside model"
     return reasons

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import change, information, noise, regression, timing, transform, unevenness
+from sysid_node.online import change, information, noise, reconstruction, regression, timing, transform, unevenness
 from sysid_node.online.change import PIECE, Looking, Watch
 from sysid_node.online.contradiction import Reference
 from sysid_node.online.experience import experiences, learn
@@ -128,6 +128,11 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     if compensation is not None and not solution.usable:
         solution, compensation = regression.solve(plan, gram), None
     spread = regression.uncertainty(plan, solution, total)
+    if state.flow.active:
+        model = state.model
+        spread.covariance += reconstruction.doubt(
+            state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, plan, solution, total
+        )
     scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
     variance = spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online import estimator, signals, transform
+from sysid_node.online import estimator, reconstruction, signals, transform
 from sysid_node.online.estimates import estimates_at
 from sysid_node.online.renewal import renew
 from sysid_node.online.settings import Settings
@@ -94,6 +94,7 @@ class _Chunk:
 
 def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     """What ``update`` computes of each sample by itself, for many."""
+    samples = reconstruction.complete_many(state.flow, time, samples, state.model.settings.max_gap)
     usable, missing = _usable(state, time, samples)
     given, kept = time, np.concatenate([[0], np.cumsum(usable)])
     time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]

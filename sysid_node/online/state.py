@@ -14,6 +14,7 @@ from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.change import Watch
 from sysid_node.online.experience import Experience
 from sysid_node.online.information import Information, Spectrum
+from sysid_node.online.reconstruction import Reconstruction
 from sysid_node.online.regression import Plan, Solution, Uncertainty
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import Layout, MomentumGain, ScalarSignals
@@ -50,6 +51,7 @@ class Grounds:
 
     sound: NDArray[np.bool_]  # (D,) nothing speaks against it but its own error
     spoilt: NDArray[np.bool_]  # (D,) by a control that is not on time
+    flaws: NDArray[np.object_]  # (D,) what the lack of a flow angle's sensor takes away, "" for nothing
     quantiles: Array  # (D,) half an interval over a standard error
     fits: list[tuple[float, float, int]]  # by coefficient: what ``FitQuality`` says besides R squared
 
@@ -79,6 +81,7 @@ class State:
     transform: Transform
     plan: Plan  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
+    flow: Reconstruction  # of the flow angles that are not measured
     past_time: float = math.nan
     inside: deque[tuple[float, Information]] = field(
         default_factory=deque
