@@ -26,6 +26,7 @@ from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
+from sysid_node.online import reconstruction
 from sysid_node.online.alignment import Aligned, align_streams
 from sysid_node.online.run import run as run_online
 from sysid_node.online.schedule import due_times
@@ -93,14 +94,18 @@ def write_replay(folder: Path, done: Replay, truth: Mapping[str, float] | None =
     every = max(len(done.history) // TABLE_ROWS, 1)
     # While the estimator settles nothing is included yet, and estimates have the same time.
     shown = {estimates.time: estimates for estimates in (*done.history[every - 1 :: every], done.final)}
+    flow = reconstruction.init(done.aircraft)
+    aligned, gap = done.aligned, done.settings.max_gap
+    samples = reconstruction.complete_many(flow, aligned.time, aligned.samples, gap)
     result = replay_result(
         done.aircraft,
         done.settings,
-        time=done.aligned.time,
-        samples=done.aligned.samples,
+        time=aligned.time,
+        samples=samples,
         history=list(shown.values()),
-        rejected=flat(done.aligned.rejected),
+        rejected=flat(aligned.rejected),
         truth=truth,
+        remarks=reconstruction.remarks(flow),
     )
     settings = {**result.settings, "publish_rate": done.publish_rate}
     write_run(folder, replace(result, settings=settings))

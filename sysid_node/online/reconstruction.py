@@ -136,6 +136,15 @@ def complete_many(filter_: Reconstruction, time: Array, samples: Array, max_gap:
     return np.array([first, *(complete(filter_, t, sample, max_gap) for t, sample in rest)])
 
 
+def remarks(filter_: Reconstruction) -> list[str]:
+    """What a reader of the estimates should know of the angles; nothing where vanes measure both."""
+    missing = filter_.missing or (False, False)
+    angles = [angle for angle, absent in zip(("angle of attack", "sideslip"), missing, strict=True) if absent]
+    if not angles or filter_.kinematics is None:
+        return []
+    return [f"Not measured, so reconstructed from IMU and airspeed: {' and '.join(angles)}."]
+
+
 def flaw(filter_: Reconstruction, at: float, name: str, regressors: Sequence[str]) -> str:
     """Why the derivative of this name and coefficient's regressors cannot be known ``at`` (s); "" where it can."""
     if not filter_.active or filter_.missing is None:

@@ -135,3 +135,12 @@ def test_a_file_without_a_lift_slope_cannot_make_angles() -> None:
 def test_vanes_are_believed() -> None:
     time, samples = flown()
     assert completed(AIRCRAFT, time, samples) is samples
+
+
+@pytest.mark.parametrize(("columns", "said"), [((ALPHA,), "attack."), ((ALPHA, BETA), "sideslip."), ((6,), "")])
+def test_it_says_what_is_reconstructed(columns: tuple[int, ...], said: str) -> None:
+    filter_ = reconstruction.init(AIRCRAFT)
+    reconstruction.complete(filter_, 0.0, without(flown()[1], *columns)[0].tolist(), 0.2)
+    assert "".join(reconstruction.remarks(filter_)).endswith(said) and bool(reconstruction.remarks(filter_)) == bool(
+        said
+    )
