@@ -15,7 +15,8 @@ samples.
 
 ``prediction`` is the same chain on measured signals: ``predict_coefficients(simulator, theta, signals_of(simulator,
 record))`` and its slopes, without integrating the motion. ``sortie`` flies whole flights (trim, weather, autopilot,
-noise), ``live`` flies one sample at a time, ``recording`` turns flights into messages, ``dryden`` makes turbulence, ``export`` writes other simulators' models.
+noise), ``live`` one sample at a time; ``recording`` turns flights into messages, ``dryden`` makes turbulence,
+``export`` writes other simulators' models.
 The page docs/effects.md describes every effect.
 
 Everything is SI, radians, body axes forward-right-down, float64.
