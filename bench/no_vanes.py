@@ -28,8 +28,6 @@ TIME = np.array([59.99])  # s
 SETTINGS = (
     Setting("still air", autopilot=False),
     Setting("light turbulence", "light", autopilot=False),
-    Setting("still air, closed loop"),
-    Setting("light, closed loop", "light"),
 )
 ANGLES = [SAMPLE_COLUMNS.index(name) for name in ("alpha", "beta")]
 
