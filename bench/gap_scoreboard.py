@@ -35,7 +35,9 @@ def main() -> None:
     parser.add_argument("--until", help="begin no case after this time of day, HH:MM")
     parser.add_argument("--fly", action="store_true", help="fly the cases, diagnose nothing yet")
     parser.add_argument("--judge", action="store_true", help="score what is there, fly nothing")
-    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/withheld"), help="where cases are kept (default: out/withheld)"
+    )
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     folder = args.out.resolve() / args.set
