@@ -10,7 +10,7 @@ from sysid_node.gap.attribute import Cause
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.verdict import explained, named, probability, structured
-from sysid_node.gap.view import CHANNELS
+from sysid_node.gap.view import CHANNELS, COEFFICIENTS
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "window_s": found.views[0].windows.length,
             "held_out": found.held_out,
         },
-        "air_motion": found.air_motion,
+        "air_motion": found.air_motion if found.views[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
         "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],

@@ -59,9 +59,15 @@ class _State(NamedTuple):
 
 
 def motion_of(record: FlightRecord) -> Motion | None:
-    """A record's signals, with the rates' derivatives; None without attitude."""
-    if not all(np.isfinite(record[name]).all() for name in READINGS[3:]):
+    """A record's signals, with the rates' derivatives; None without roll and pitch angle.
+
+    A heading that was not measured is zero: nothing but its own prediction depends on it.
+    """
+    if not all(np.isfinite(record[name]).all() for name in ("phi", "theta")):
         return None
+
+    measured = bool(np.isfinite(record["psi"]).all())
+    heading = jnp.asarray(record["psi"] if measured else np.zeros(len(record)))
 
     def columns(*names: str) -> Scalar:
         return jnp.asarray(np.column_stack([record[name] for name in names]))
@@ -71,7 +77,7 @@ def motion_of(record: FlightRecord) -> Motion | None:
         columns("p", "q", "r"),
         columns("p_rate", "q_rate", "r_rate"),
         columns(*READINGS[:3]),
-        jnp.unwrap(columns(*READINGS[3:]), axis=0),
+        jnp.unwrap(jnp.column_stack([columns("phi", "theta"), heading]), axis=0),
     )
 
 

@@ -31,7 +31,7 @@ _CLOCKS = {
 }
 
 #: Share of the airspeed from which on the air's motion counts.
-GUSTY = 0.01
+_GUSTY = 0.01
 
 #: Noise of the aircraft file that a bias may be as large as.
 _BIASES = {
@@ -92,7 +92,7 @@ def _turning_air(aircraft: Aircraft, view: View) -> dict[str, float]:
 
     The pitching gust of a wing as long as the gusts are short: q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2).
     """
-    if view.gusts < GUSTY * view.record["V"].mean():
+    if view.gusts < _GUSTY * view.record["V"].mean():
         return {}
     damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
     return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}

@@ -138,6 +138,7 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     windows = Windows.over(len(record), simulator.rate)
     axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
     axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
+    axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
     calm = _measured_noise(_bare(simulator, flight, record, windows, axes, LONGEST), seed)
     calm = replace(calm, gusts=gusts_of(calm, simulator.neutral()))
     fading = _fading(calm)

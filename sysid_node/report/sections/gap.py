@@ -10,7 +10,6 @@ import numpy as np
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.evidence import carried
-from sysid_node.gap.nuisance import GUSTY
 from sysid_node.gap.verdict import structured
 from sysid_node.gap.view import CHANNELS
 from sysid_node.report import figures
@@ -32,6 +31,9 @@ _WORDS = {
     "psi": "heading",
 }
 
+#: Motion of the air that is not worth a word, m/s rms.
+_STILL = 0.2
+
 #: How much smaller the error of a reading must have become for it to be drawn.
 _MENDED = 1.3
 
@@ -48,7 +50,7 @@ def paragraph(found: Diagnosis) -> str:
 
 def _weather(found: Diagnosis) -> str:
     """How much the air moved, where it did."""
-    if found.air_motion < GUSTY * found.views[0].record["V"].mean():
+    if found.air_motion < _STILL:
         return ""
     return (
         f" The air was not still: across the flight path it moved by {number(found.air_motion, 2)} m/s (root mean "
