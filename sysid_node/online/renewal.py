@@ -7,11 +7,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import change, information, noise, reconstruction, regression, timing, transform, unevenness
+from sysid_node.online import (
+    change,
+    exogeneity,
+    information,
+    noise,
+    reconstruction,
+    regression,
+    timing,
+    transform,
+    unevenness,
+)
 from sysid_node.online.change import PIECE, Looking, Watch
 from sysid_node.online.contradiction import Reference
 from sysid_node.online.experience import experiences, learn
 from sysid_node.online.information import Information
+from sysid_node.online.regression import Plan, Solution, Uncertainty
 from sysid_node.online.state import Renewed, State
 from sysid_node.online.unevenness import Unevenness
 
@@ -134,7 +145,7 @@ def _solve_all(state: State, segment: Information) -> Renewed:
             state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, plan, solution, total
         )
     scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
-    variance = spread.covariance.diagonal(axis1=1, axis2=2).T
+    variance = _variances(state, total, plan, solution, spread)
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     none = np.zeros(len(plan.coefficients), dtype=bool)
     state.renewals += 1
@@ -147,6 +158,15 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     state.renewed = renewed
     state.watch.references.append(Reference(state.transform.last, plan, solution, spread))
     return renewed
+
+
+def _variances(state: State, total: Information, plan: Plan, solution: Solution, spread: Uncertainty) -> Array:
+    """(P, C) squared standard errors, gusts that the deflections may know of allowed for."""
+    aircraft, omega = state.model.aircraft, state.model.spectrum.omega
+    per_line, step = total.bias / _line_seconds(state, total), total.energy / max(total.samples, 1.0)
+    sensed = exogeneity.sensed(aircraft, plan, solution, per_line, total.uneven, step, omega)
+    variances: Array = exogeneity.inflation(spread, sensed) * spread.covariance.diagonal(axis1=1, axis2=2).T
+    return variances
 
 
 def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
