@@ -101,7 +101,7 @@ def processor_seconds(pid: int) -> float:
 
 
 def listen(node, flight: BaseProcess, pid: int) -> tuple[list[tuple[int, int]], dict[str, str], float]:
-    """Latencies (ns) until publication and arrival, the last words of /diagnostics by key, the node's share of a core."""
+    """Latencies (ns) until publication and arrival, last words of /diagnostics by key, the node's share of a core."""
     latencies: list[tuple[int, int]] = []
     words: dict[str, str] = {}
     used = began = 0.0
