@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 ALPHA, BETA = SAMPLE_COLUMNS.index("alpha"), SAMPLE_COLUMNS.index("beta")
 AIR_INTERVAL = SAMPLE_COLUMNS.index("air_interval")
 EVERY = 0.1  # s between corrections
+FINEST = 1e-5  # rad: no vane has less noise, whatever a file says
 HIDDEN = 10.0  # times the energy of the gusts in the airspeed that a reconstructed angle must move
 MIDDLE = 2.0 * math.pi * 0.5  # rad/s: middle of the band, where the integrated noise is likened to a vane's
 _G = 9.80665
@@ -246,7 +247,7 @@ def _kinematics(aircraft: Aircraft) -> Kinematics | None:
         airspeed=aircraft.reference.airspeed,
         airspeed_noise=noise["airspeed"],
         walks=np.array([velocity] * 3 + [attitude] * 2 + [bias] * 2) ** 2,
-        interval=integrated / max(noise["alpha"], noise["beta"]) ** 2,
+        interval=integrated / max(noise["alpha"], noise["beta"], FINEST) ** 2,
     )
 
 
