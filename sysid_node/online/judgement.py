@@ -21,6 +21,7 @@ COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a w
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
 POOR = 0.7  # share of a coefficient's motion left unexplained beyond which no estimate of it is valid
+NARROWEST = 1e-12  # share of an estimate under which its standard error is rounding
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
@@ -70,6 +71,7 @@ def judge(
     motion = current.gram.reshape(len(values), -1).take(table.motion, axis=1)
     inflation = current.diagonal.take(table.unknown, axis=1) * motion
     good = (errors <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
+    good &= errors > NARROWEST * np.abs(values)
     slope = ~table.offset
     buried = slope & (motion < np.maximum(BURIED * renewed.total.bias.take(table.motion), regression.TINY))
     hidden = buried | (slope & (inflation > HOPELESS))
