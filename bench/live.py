@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.experimental import EventsExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates  # found once sysid_node.ros is there
@@ -118,7 +118,7 @@ def listen(node, flight: BaseProcess, pid: int) -> tuple[list[tuple[int, int]], 
 
     node.create_subscription(DerivativeEstimates, "/identifier/derivatives", on_estimates, 100)
     node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
-    executor = EventsExecutor()
+    executor = SingleThreadedExecutor()  # the events executor gives callbacks no message info
     executor.add_node(node)
     while flight.is_alive():
         executor.spin_once(timeout_sec=0.2)

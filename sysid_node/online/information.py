@@ -120,15 +120,14 @@ def project(lines: Array) -> Array:
 
 def inverse2(gram: Array) -> Array:
     """(..., 2, 2) inverses of symmetric matrices; of the first element alone where the second column brings nothing."""
-    inverses = np.empty(gram.shape)
-    for at in np.ndindex(gram.shape[:-2]):
-        (a, b), (_, d) = gram[at].tolist()
+    rows = []
+    for a, b, _, d in gram.reshape(-1, 4).tolist():
         det = a * d - b * b
         if det > 1e-12 * a * d:
-            inverses[at] = (d / det, -b / det), (-b / det, a / det)
+            rows.append((d / det, -b / det, -b / det, a / det))
         else:
-            inverses[at] = (1.0 / a if a > 0.0 else 0.0, 0.0), (0.0, 0.0)
-    return inverses
+            rows.append((1.0 / a if a > 0.0 else 0.0, 0.0, 0.0, 0.0))
+    return np.array(rows).reshape(gram.shape)
 
 
 def noise_covariance(lines: Spectrum, begin: float, end: float) -> Array:
