@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import os
 import signal
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from rich.live import Live
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.cli.apart import make_folder, own_domain
 from sysid_node.cli.live_table import Moment, Reference, live_table
 from sysid_node.errors import InputError
 from sysid_node.flight.align import why_nothing_aligned
@@ -85,13 +85,8 @@ def run(args: argparse.Namespace) -> None:
     if not args.rate > 0.0:
         raise InputError(f"--rate {args.rate:g}: expected a number over zero")
     flight = _read(args.bag, load_aircraft(args.aircraft))
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {args.out}: cannot be made ({error.strerror}); give another folder") from None
-    # A domain of its own: neither hears nor disturbs other ROS programs, here or on the network.
-    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    make_folder(args.out)
+    own_domain()
     follower, history = _fly(flight, args.aircraft, args.rate, args.out)
     result = replay_result(
         flight.aircraft,

@@ -9,7 +9,6 @@ import argparse
 import contextlib
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -26,6 +25,7 @@ from rich.text import Text
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.cli.apart import make_folder, own_domain
 from sysid_node.errors import InputError
 from sysid_node.report.loop import Episode, write_loop
 
@@ -78,13 +78,8 @@ def run(args: argparse.Namespace) -> None:
     if not 5.0 <= args.seconds <= 36000.0:
         raise InputError(f"--seconds {args.seconds:g}: expected 5 to 36000")
     aircraft = load_aircraft(args.aircraft)
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {args.out}: cannot be made ({error.strerror}); give another folder") from None
-    # A domain of its own: neither hears nor disturbs other ROS programs, here or on the network.
-    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    make_folder(args.out)
+    own_domain()
     plan = Plan(aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.out)
     episode = _fly(plan)
     write_loop(args.out, episode)

@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -34,15 +35,11 @@ from sysid_node.ros.loop_node import (
     values_by_name,
 )
 from sysid_node.ros.monitor import Durations
-from sysid_node.ros.parameters import Parameter
+from sysid_node.ros.parameters import Parameter, setting
 from sysid_node.ros.spin import run_program, serve
 
 _DEFAULT = Settings()
-
-
-def _setting(name: str, unit: str, meaning: str, change: str) -> Parameter:
-    return Parameter(name, float(getattr(_DEFAULT, name)), unit, meaning, change, *RANGES[name])
-
+_setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,

@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -20,15 +21,11 @@ from sysid_node.flight.topics import AIR_DATA, IMU
 from sysid_node.ros import conversion
 from sysid_node.ros.beliefs import precision_of
 from sysid_node.ros.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, attitude_of, named
-from sysid_node.ros.parameters import Parameter
+from sysid_node.ros.parameters import Parameter, setting
 from sysid_node.ros.spin import run_program, serve
 
 _DEFAULT = Settings()
-
-
-def _setting(name: str, unit: str, meaning: str, change: str) -> Parameter:
-    return Parameter(name, float(getattr(_DEFAULT, name)), unit, meaning, change, *RANGES[name])
-
+_setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,

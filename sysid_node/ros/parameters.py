@@ -42,6 +42,13 @@ class Parameter:
         return f"{kind[type(self.default)]}{allowed}, e.g. {_yaml(self.default)}"
 
 
+def setting(
+    defaults: object, ranges: Mapping[str, tuple[float, float]], name: str, unit: str, meaning: str, change: str
+) -> Parameter:
+    """The parameter that sets the field ``name`` of a dataclass of settings, within its range."""
+    return Parameter(name, float(getattr(defaults, name)), unit, meaning, change, *ranges[name])
+
+
 _ESTIMATOR = Settings()
 
 PARAMETERS = (

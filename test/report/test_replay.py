@@ -1,5 +1,6 @@
 """What is drawn of a replay, against a flight whose forces and moments follow from a known model by hand."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -107,6 +108,8 @@ def test_short_records_give_what_they_can(aircraft, count, tmp_path):
     history = [believed(aircraft, 1.0)] if count else []
     short = {"time": time[:count], "samples": samples[:count], "history": history, "rejected": {"imu/data: stale": 1}}
     write_run(tmp_path, replay_result(aircraft, SETTINGS, **short))
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["samples"] == count
+    assert "</html>" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_incomplete_samples_are_left_out(aircraft):
