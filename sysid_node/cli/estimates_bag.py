@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import chain
+from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.typesys.store import Typestore
 
 from sysid_node.flight.bag_writer import add_topic, header, new_bag, stamp_columns
@@ -16,7 +16,10 @@ from sysid_node.flight.cdr import encode, layout_of
 from sysid_node.flight.messages import type_store
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE
-from sysid_node.online.types import Estimates
+from sysid_node.online.rows import DerivativeRows, FitRows
+from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
+
+Array = NDArray[np.float64]
 
 _NUMBERS = ("value", "standard_error", "lower", "upper", "valid")
 _FIT_NUMBERS = ("r_squared", "residual_std", "degrees_of_freedom", "samples")
@@ -35,8 +38,8 @@ def write_estimates(
         some = [history[i] for i in places]
         layout = layout_of(store, DERIVATIVES_TYPE, _template(store, some[0], aircraft, method, frame_id))
         columns = stamp_columns(stamps_ns[places])
-        columns |= _columns("derivatives", _NUMBERS, [estimates.derivatives.values() for estimates in some])
-        columns |= _columns("fits", _FIT_NUMBERS, [estimates.fits.values() for estimates in some])
+        columns |= _columns("derivatives", _NUMBERS, [_derivatives(estimates.derivatives) for estimates in some])
+        columns |= _columns("fits", _FIT_NUMBERS, [_fits(estimates.fits) for estimates in some])
         for i, data in zip(places, encode(layout, columns, len(some)), strict=True):
             messages[i] = data
     with new_bag(path) as writer:
@@ -50,8 +53,11 @@ def _alike(history: Sequence[Estimates]) -> Iterable[list[int]]:
     groups: dict[tuple[str, ...], list[int]] = {}
     for i, estimates in enumerate(history):
         derivatives = estimates.derivatives
-        key = (*derivatives, *[d.status for d in derivatives.values()], *estimates.fits)
-        groups.setdefault(key, []).append(i)
+        if isinstance(derivatives, DerivativeRows):
+            statuses = derivatives.statuses
+        else:
+            statuses = tuple(d.status for d in derivatives.values())
+        groups.setdefault((*derivatives, *statuses, *estimates.fits), []).append(i)
     return groups.values()
 
 
@@ -74,10 +80,25 @@ def _template(store: Typestore, estimates: Estimates, aircraft: str, method: str
     return bytes(store.serialize_cdr(message, DERIVATIVES_TYPE))
 
 
-def _columns(field: str, names: Sequence[str], rows: Sequence[Iterable[Any]]) -> dict[str, Any]:
+def _derivatives(rows: Mapping[str, DerivativeEstimate]) -> Array:
+    """(n, 5) what ``_NUMBERS`` names of n derivatives."""
+    if isinstance(rows, DerivativeRows):
+        return np.vstack([rows.numbers, rows.valid]).T
+    return _table(rows, _NUMBERS)
+
+
+def _fits(rows: Mapping[str, FitQuality]) -> Array:
+    """(n, 4) what ``_FIT_NUMBERS`` names of n coefficients."""
+    if isinstance(rows, FitRows):
+        return np.column_stack([rows.r_squared, rows.rest])
+    return _table(rows, _FIT_NUMBERS)
+
+
+def _table(rows: Mapping[str, Any], names: Sequence[str]) -> Array:
+    return np.array([attrgetter(*names)(row) for row in rows.values()], np.float64).reshape(-1, len(names))
+
+
+def _columns(field: str, names: Sequence[str], tables: Sequence[Array]) -> dict[str, Any]:
     """Columns of a sequence of parts: ``derivatives.3.value`` -> (n,), of n messages with equally many parts."""
-    flat = list(map(attrgetter(*names), chain.from_iterable(rows)))
-    if not flat:
-        return {}
-    table = np.array(flat, np.float64).reshape(len(rows), -1, len(names))
+    table = np.array(tables)
     return {f"{field}.{i}.{name}": table[:, i, j] for i in range(table.shape[1]) for j, name in enumerate(names)}

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sysid_node.online import judgement, signals, transform
 from sysid_node.online.present import Present, count_beliefs, offsets, present_at
+from sysid_node.online.rows import DerivativeRows, FitRows
 from sysid_node.online.state import Grounds, State
-from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
+from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,8 @@ def estimates_at(
     """The same at several ``times`` (s) since the last renewal, at which the transform was ``lines`` (2F + 1, T)."""
     current, renewed = present_at(state, lines, times), state.renewed
     if current is None or renewed is None:
-        names = [f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors]
-        return [Estimates(time, {name: _unknown(state, name) for name in names}, {}) for time in times]
+        every = [f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors]
+        return [Estimates(time, {name: _unknown(state, name) for name in every}, {}) for time in times]
     table = state.model.table
     grounds = renewed.grounds = renewed.grounds or judgement.grounds(state, renewed)
     if state.model.settings.use_prior:
@@ -41,20 +42,18 @@ def estimates_at(
     errors = np.sqrt(np.maximum(errors, 0.0))
     statuses = judgement.judge(state, renewed, grounds, current, values, errors, nows)
     halves = grounds.quantiles * errors
-    numbers = np.stack([values, errors, values - halves, values + halves], axis=1).tolist()
-    missing = {name: _unknown(state, name) for name in table.unformed}
+    numbers = np.stack([values, errors, values - halves, values + halves], axis=1)
+    names = table.names
+    if table.unformed:
+        missing = [_unknown(state, name) for name in table.unformed]
+        lacking = np.array([row[1:5] for row in missing]).T
+        numbers = np.concatenate([numbers, np.broadcast_to(lacking, (K, *lacking.shape))], axis=2)
+        names += table.unformed
+        statuses = [status + tuple(row.status for row in missing) for status in statuses]
     return [
-        Estimates(time, _rows(table.names, columns, status) | missing, fit)
-        for time, columns, status, fit in zip(times, numbers, statuses, _fits(state, grounds, current), strict=True)
+        Estimates(time, DerivativeRows(names, *row), fit)
+        for time, *row, fit in zip(times, numbers, statuses, _fits(state, grounds, current), strict=True)
     ]
-
-
-def _rows(
-    names: Sequence[str], columns: Sequence[Sequence[float]], statuses: Sequence[str]
-) -> dict[str, DerivativeEstimate]:
-    """The derivatives of one moment by name."""
-    valid = [status == "ok" for status in statuses]
-    return dict(zip(names, map(DerivativeEstimate, names, *columns, valid, statuses), strict=True))
 
 
 def _unknown(state: State, name: str) -> DerivativeEstimate:
@@ -66,13 +65,9 @@ def _unknown(state: State, name: str) -> DerivativeEstimate:
     return DerivativeEstimate(name, math.nan, math.inf, -math.inf, math.inf, False, reason or "converging")
 
 
-def _fits(state: State, grounds: Grounds, current: Present) -> list[dict[str, FitQuality]]:
+def _fits(state: State, grounds: Grounds, current: Present) -> list[FitRows]:
     """Quality of each coefficient's fit at each of the K moments."""
-    names = state.plan.coefficients
     squares = current.gram.reshape(len(current.time), -1).take(state.plan.square, axis=1)
     explained = 1.0 - current.solution.residual / np.maximum(squares, 1e-300)
-    shares = np.minimum(np.maximum(explained, 0.0), 1.0).tolist()
-    return [
-        {name: FitQuality(name, share, *fit) for name, share, fit in zip(names, row, grounds.fits, strict=True)}
-        for row in shares
-    ]
+    shares = np.minimum(np.maximum(explained, 0.0), 1.0)
+    return [FitRows(state.plan.coefficients, row, grounds.fits) for row in shares]

@@ -1,0 +1,87 @@
+"""Tables of estimates whose rows are made when they are first looked at.
+
+Most estimates of a replay are only drawn or stored as columns; a Python object for each number of each of them would
+take longer than solving for it.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online.types import DerivativeEstimate, FitQuality
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+
+class _Rows(Mapping[str, T]):
+    """A table by name; a copy through pickle is a plain dictionary."""
+
+    __slots__ = ("_rows", "names")
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self.names = names
+        self._rows: dict[str, T] | None = None
+
+    @abstractmethod
+    def _made(self) -> Iterator[T]:
+        """The rows in the order of the names."""
+
+    def _table(self) -> dict[str, T]:
+        if self._rows is None:
+            self._rows = dict(zip(self.names, self._made(), strict=True))
+        return self._rows
+
+    def __getitem__(self, name: str) -> T:
+        return self._table()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __repr__(self) -> str:
+        return repr(self._table())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return dict, (self._table(),)
+
+
+class DerivativeRows(_Rows[DerivativeEstimate]):
+    """D derivatives: ``numbers`` (4, D) are value, standard error, lower and upper end of the interval."""
+
+    __slots__ = ("numbers", "statuses")
+
+    def __init__(self, names: tuple[str, ...], numbers: Array, statuses: tuple[str, ...]) -> None:
+        super().__init__(names)
+        self.numbers, self.statuses = numbers, statuses
+
+    def _made(self) -> Iterator[DerivativeEstimate]:
+        return map(DerivativeEstimate, self.names, *self.numbers.tolist(), self.valid, self.statuses)
+
+    @property
+    def valid(self) -> list[bool]:
+        """(D,) whether each is to be believed."""
+        return [status == "ok" for status in self.statuses]
+
+
+class FitRows(_Rows[FitQuality]):
+    """C coefficients: ``r_squared`` (C,), and the rest of each fit's quality."""
+
+    __slots__ = ("r_squared", "rest")
+
+    def __init__(self, names: tuple[str, ...], r_squared: Array, rest: list[tuple[float, float, int]]) -> None:
+        super().__init__(names)
+        self.r_squared, self.rest = r_squared, rest
+
+    def _made(self) -> Iterator[FitQuality]:
+        return (
+            FitQuality(name, share, *rest)
+            for name, share, rest in zip(self.names, self.r_squared.tolist(), self.rest, strict=True)
+        )
