@@ -20,9 +20,10 @@ from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online import information, reconstruction, regression, signals, transform
 from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
+from sysid_node.online.change import PIECE
 from sysid_node.online.experience import experiences
 from sysid_node.online.prior import beliefs
-from sysid_node.online.renewal import RENEWAL, begin_segment, finish_segment, renew
+from sysid_node.online.renewal import begin_segment, renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import NUISANCES, OUTPUTS, Layout
 from sysid_node.online.state import Model, State
@@ -61,7 +62,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         momentum=signals.momentum_gain(aircraft),
         believed=beliefs(aircraft, plan)[0],
         auxiliary=auxiliary_model(aircraft, layout, grid.omega),
-        segment_time=max(segment_time, 4.0 * RENEWAL),
+        segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
     )
     running = transform.start(grid, layout.transformed, memory)
@@ -153,9 +154,8 @@ def over_interval(layout: Layout, step: Any, before: Array, after: Array, gain: 
 
 def interrupt(state: State, time: float) -> None:
     """Nothing is known of the time since the last sample: finish the segment there and begin one here."""
-    if state.transform.last > state.piece_start:
-        renew(state)
-        finish_segment(state)
+    if state.transform.last > state.segment_start:
+        renew(state, last=True)
     state.watch.pieces.clear()
     state.transform.last = time
     begin_segment(state, transform.current(state.transform), time)

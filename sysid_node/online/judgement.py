@@ -33,14 +33,10 @@ def grounds(state: State, renewed: Renewed) -> Grounds:
     firm = (np.where(plan.mine > 0.0, renewed.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
     sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost & ~renewed.doubted)[table.coefficient]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
-    structure = state.model.aircraft.structure
-    flaws = np.array(
-        [
-            reconstruction.flaw(state.flow, state.piece_start, name, structure[name.partition("_")[0]])
-            for name in table.names
-        ],
-        dtype=object,
-    )
+    flaws = np.full(len(table.names), "", dtype=object)
+    if state.flow.active:
+        structure, at = state.model.aircraft.structure, state.piece_start
+        flaws[:] = [reconstruction.flaw(state.flow, at, n, structure[n.partition("_")[0]]) for n in table.names]
     return Grounds(
         sound=sound & ~spoilt & (flaws == ""),
         spoilt=spoilt,

@@ -48,7 +48,7 @@ def present_at(state: State, lines: Sequence[Array], times: Sequence[float]) -> 
     gram += renewed.base
     # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
     energy = renewed.total.energy
-    growth = np.array([(energy + max(time - state.piece_start, 0.0)) / max(energy, 1e-9) for time in times])
+    growth = np.array([(energy + max(time - renewed.time, 0.0)) / max(energy, 1e-9) for time in times])
     growth = growth[:, None, None]
     noise = renewed.compensation
     solution = regression.solve(state.plan, gram, None if noise is None else noise * growth)

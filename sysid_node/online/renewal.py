@@ -1,4 +1,7 @@
-"""What the estimator does every half second of data: measure the segment, solve, and look for changes."""
+"""What the estimator does every half second of data, when a piece of the watch is complete: look for changes, and
+
+every second or so measure the segment and renew what the estimates between rest on.
+"""
 
 from __future__ import annotations
 
@@ -27,37 +30,47 @@ from sysid_node.online.state import Renewed, State
 from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
-RENEWAL = PIECE  # s of data between renewals
 RECENT = 8  # pieces about whose mean motion is counted
-TIMING_EVERY = 4  # renewals between looks at the controls' timing, which changes slowly
+SOON = 20.0  # s of data up to which everything is renewed with every piece
+SOLVE_EVERY = 2  # pieces, later: the noise's colour is known better, and changes more slowly
+TIMING_EVERY = 4  # pieces between looks at the controls' timing, which changes more slowly still
 
 
-def renew(state: State) -> None:
-    """Renew all that changes slowly; see ``Renewed``."""
+def renew(state: State, last: bool = False) -> None:
+    """Renew what changes slowly, see ``Renewed``; all of it where this is the ``last`` time in the segment."""
     time = state.transform.last
     lines = transform.current(state.transform)
     _watch_piece(state, lines)
-    _weigh_piece(state)
-    renewed = _solve_all(state, _measure_segment(state, lines))
+    last = last or time - state.segment_start >= state.model.segment_time
+    state.pieces += 1
+    if last or _is_due(state):
+        _weigh_recent(state)
+        _solve_all(state, _measure_segment(state, lines))
     if state.model.settings.detect_changes:
-        _look_for_changes(state, renewed, lines)
-    if time - state.segment_start >= state.model.segment_time:
+        _look_for_changes(state, lines)
+    if last:
         finish_segment(state)
         begin_segment(state, lines, time)
     else:
         _begin_piece(state, lines, time)
 
 
+def _is_due(state: State) -> bool:
+    """Whether it is time to solve for everything again."""
+    renewed = state.renewed
+    return renewed is None or renewed.total.energy < SOON or state.pieces % SOLVE_EVERY == 0
+
+
 def begin_segment(state: State, lines: Array, time: float) -> None:
     """Begin a segment and a piece of the watch at ``time`` (s), where the transform is ``lines``."""
     state.segment, state.segment_start, state.samples, state.intervals = lines, time, 0, 0.0
-    state.uneven = Unevenness()
+    state.uneven, state.weighed_until = Unevenness(), time
+    state.recent.clear()
     _begin_piece(state, lines, time)
 
 
 def _begin_piece(state: State, lines: Array, time: float) -> None:
-    state.piece, state.piece_start, state.renew_at = lines, time, time + RENEWAL
-    state.recent.clear()
+    state.piece, state.piece_start, state.renew_at = lines, time, time + PIECE
 
 
 def _fading(state: State, since: float) -> float:
@@ -72,20 +85,23 @@ def _watch_piece(state: State, lines: Array) -> None:
         state.watch.pieces.append((state.piece_start, piece))
 
 
-def _weigh_piece(state: State) -> None:
-    """Count how unevenly the piece's noise comes."""
-    duration = state.transform.last - state.piece_start
+def _weigh_recent(state: State) -> None:
+    """Count how unevenly the noise came since this was last counted."""
+    now = state.transform.last
+    duration = now - state.weighed_until
     if duration <= 0.0 or not state.recent:
         return
     pieces, every = list(state.watch.pieces)[-RECENT:], state.intervals / max(state.samples, 1)
     # about the mean of the last seconds, as slower motion is not in the lines
-    mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (state.transform.last - pieces[0][0])
+    mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (now - pieces[0][0])
     model, rows = state.model, np.array(state.recent)
     boxes = max(round(2.0 * model.settings.frequencies[2] * duration), 1)
-    piece = unevenness.measure(
+    found = unevenness.measure(
         model.aircraft, model.layout, model.plan, model.believed, rows, mean, duration, every, boxes
     )
-    state.uneven = state.uneven + piece
+    state.uneven = state.uneven + found
+    state.weighed_until = now
+    state.recent.clear()
 
 
 def _measure_segment(state: State, lines: Array) -> Information:
@@ -122,7 +138,7 @@ def _past(state: State) -> Information:
     return state.past
 
 
-def _solve_all(state: State, segment: Information) -> Renewed:
+def _solve_all(state: State, segment: Information) -> None:
     """Estimates, their covariance and the noise's part, from the finished segments and the present one."""
     last = state.renewed
     past = _past(state)
@@ -148,16 +164,14 @@ def _solve_all(state: State, segment: Information) -> Renewed:
     variance = _variances(state, total, plan, solution, spread)
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     none = np.zeros(len(plan.coefficients), dtype=bool)
-    state.renewals += 1
-    if last is None or state.renewals % TIMING_EVERY == 0:
+    if last is None or state.pieces % TIMING_EVERY == 0:
         lags = timing.examine(plan, state.model.layout, solution, spread, gram)
     else:
         lags = last.timing
     base = past.grams.sum(axis=0)
-    renewed = Renewed(total, solution, spread, compensation, base, factors, lags, strength, none, none)
-    state.renewed = renewed
-    state.watch.references.append(Reference(state.transform.last, plan, solution, spread))
-    return renewed
+    now = state.transform.last
+    state.renewed = Renewed(now, total, solution, spread, compensation, base, factors, lags, strength, none, none)
+    state.watch.references.append(Reference(now, plan, solution, spread))
 
 
 def _variances(state: State, total: Information, plan: Plan, solution: Solution, spread: Uncertainty) -> Array:
@@ -169,12 +183,14 @@ def _variances(state: State, total: Information, plan: Plan, solution: Solution,
     return variances
 
 
-def _look_for_changes(state: State, renewed: Renewed, lines: Array) -> None:
+def _look_for_changes(state: State, lines: Array) -> None:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
-    model, now = state.model, state.transform.last
+    model, now, renewed = state.model, state.transform.last, state.renewed
+    if renewed is None:
+        return
     looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, now, _memory(state))
     finding = change.examine(looking, state.experiences)
-    renewed.lost, renewed.doubted = finding.lost, finding.doubted
+    renewed.lost, renewed.doubted, renewed.grounds = finding.lost, finding.doubted, None
     if finding.since is not None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:
@@ -189,6 +205,7 @@ def _memory(state: State) -> float:
 def _begin_anew(state: State, lines: Array, since: float) -> None:
     """Forget all that was before ``since`` (s), the start of a piece."""
     now = state.transform.last
+    _weigh_recent(state)
     kept = [piece * _fading(state, start + PIECE) for start, piece in state.watch.pieces if start >= since - 1e-6]
     then = lines - np.sum(kept, axis=0)
     _learn_before(state, then / _fading(state, since), since)

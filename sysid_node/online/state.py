@@ -60,6 +60,7 @@ class Grounds:
 class Renewed:
     """What ``renew`` last found; per-sample estimates lean on it until the next time."""
 
+    time: float  # s, when it was found
     total: Information
     solution: Solution
     uncertainty: Uncertainty
@@ -90,7 +91,8 @@ class State:
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
-    recent: list[Array] = field(default_factory=list)  # (T,) signals of the piece's samples
+    recent: list[Array] = field(default_factory=list)  # (T,) signals of the samples since ``weighed_until``
+    weighed_until: float = math.nan  # time up to which ``uneven`` counts
     uneven: Unevenness = field(default_factory=Unevenness)  # of the present segment
     renew_at: float = math.inf
     previous: tuple[float, Array, tuple[float, ...]] | None = None  # time, signals, (p, q, r, ca, sa)
@@ -103,5 +105,5 @@ class State:
     renewed: Renewed | None = None
     watch: Watch = field(default_factory=Watch)
     experiences: list[Experience] = field(default_factory=list)  # by block of the plan
-    renewals: int = 0
+    pieces: int = 0  # of the watch, finished
     changed_at: float = -math.inf

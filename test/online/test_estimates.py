@@ -84,7 +84,7 @@ def test_between_renewals_estimates_use_every_sample(flown: tuple[Array, Array],
     """``present`` at the last sample against a renewal at that sample: the same least squares."""
     time, rows = flown
     state = fed(time[:samples], rows[:samples])
-    renew(state)
+    renew(state, last=True)
     now = present(state)
     assert now is not None
     assert state.renewed is not None
