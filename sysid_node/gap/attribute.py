@@ -231,8 +231,8 @@ def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
         rows, slopes = look.residual(values), look.jacobian(values)
         step = np.linalg.lstsq(slopes, -rows, rcond=None)[0]
         stepped = np.clip(values + step, low, high)
-        for there in (values, stepped):
-            cost = float(np.sum(look.residual(there) ** 2))
+        for there, left in ((values, rows), (stepped, look.residual(stepped))):
+            cost = float(np.sum(left**2))
             if cost < best[0]:
                 best = (cost, candidate, tuple(there.tolist()))
     return best
