@@ -115,9 +115,7 @@ def effect_options(found: Diagnosis) -> list[str]:
     simulator = fit.views[0].simulator
     options = []
     for cause in found.attribution.causes:
-        indices = cause.candidate.indices or tuple(
-            i for i, (e, _) in enumerate(simulator.parameters) if e == cause.candidate.effect
-        )
+        indices = cause.candidate.entries
         pairs = [f"{simulator.parameters[i][1].name}={fit.points[0][i]:.6g}" for i in indices]
         if cause.candidate.effect != "derivative_error":
             options.append(":".join([cause.candidate.effect, *pairs]))

@@ -17,7 +17,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import PER_CONTROL, TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
-from sysid_node.gap.fit import Fit, Projected, blank, linearised, polish, with_candidates
+from sysid_node.gap.fit import Fit, Projected, blank, linearised, with_candidates
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import power_of
 from sysid_node.gap.steps import Steps
@@ -43,6 +43,9 @@ NOTICED = 0.05
 #: Rivals of a cause that are fitted to the end.
 _RIVALS = 4
 
+#: Probability in a cause's stead from which a rival is also tried beside it.
+_WORTH_TRYING = 0.01
+
 #: Times that the causes stand against their rivals, at most.
 _SWEEPS = 3
 
@@ -51,7 +54,7 @@ _CLEARLY = 1.0
 
 Progress = Callable[[float, str], None]
 
-#: Cost of a candidate at a first look, and the values from which its fit starts.
+#: Deviance that a candidate leaves at a first look, and the values from which its fit starts.
 Look = tuple[float, Candidate, tuple[float, ...]]
 
 _Work = TypeVar("_Work")
@@ -122,7 +125,7 @@ def attribute(
     progress(0.8, "whether another effect would do as well")
     chosen, places = _refined(trier, base, chosen, stages)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
-    causes = tuple(sorted((_cause(chosen, place) for place in places), key=lambda cause: -cause.probability))
+    causes = tuple(sorted((_cause(trier, chosen, place) for place in places), key=lambda cause: -cause.probability))
     corrected = instrumented(instrumented(chosen.fit))
     return Attribution(base, chosen, corrected, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
 
@@ -148,20 +151,23 @@ class Trier:
 
     def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
         """A first look at each, the best first: what it takes away where the nuisances can do no more."""
-        fresh = with_candidates(current.fit, current.fit.candidates, self.nuisances, ())
 
         def work() -> dict[str, list[float]]:
-            problem = Projected(fresh)
+            problem = Projected(current.fit)
             looks = _spread(
-                lambda candidate: _first_look(fresh, problem, candidate),
+                lambda candidate: _first_look(current.fit, problem, candidate),
                 candidates,
                 lambda s: progress(0.5 * s, "a first look at every effect"),
             )
             return {candidate.label: [cost, *start] for cost, candidate, start in looks}
 
-        table = self.steps.table(fresh, work)
+        table = self.steps.table(current.fit, work)
         found = [(table[c.label][0], c, tuple(table[c.label][1:])) for c in candidates if c.label in table]
         return sorted(found, key=lambda look: look[0])
+
+    def beside(self, chosen: Trial, rival: Candidate) -> Trial:
+        """A rival added to what was chosen."""
+        return self.finish(chosen, self.looks(chosen, [rival], lambda s, t: None), lambda s, t: None)[0]
 
     def finish(self, current: Trial, looks: Sequence[Look], progress: Progress) -> list[Trial]:
         """What was looked at upon what is known so far, fitted to the end; the most probable first."""
@@ -198,11 +204,25 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     sure = probabilities([trial.evidence.scores, without.evidence.scores])[0] > _SURE
     if _trifling(trial):
         return False
-    left, whole = power_left(without.evidence), power_left(base.evidence)
-    gone = left - power_left(trial.evidence)
+    left, now = power_left(without.evidence), power_left(trial.evidence)
     motion = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views)
-    matters = (gone > MATERIAL * left) & (gone > MATERIAL_OF_ALL * whole) & (gone > NOTICED**2 * motion)
-    return bool(sure and np.any(matters))
+    gone = left - now
+    matters = (gone > MATERIAL * left) & (gone > NOTICED**2 * motion)
+    if not (sure and matters.any()):
+        return False
+    share = _power_lacking(base, without, trial) - now
+    return bool(np.any(matters & (share > MATERIAL_OF_ALL * power_left(base.evidence))))
+
+
+def _power_lacking(base: Trial, without: Trial, trial: Trial) -> Array:
+    """Power (12,) that is left of a trial when what it has more than another is taken away, the others as they are.
+
+    The others would bend to hold its share: a lag twice as long for an engine half as strong. Nuisances do their best.
+    """
+    kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
+    lacking = with_candidates(trial.fit, kept, base.fit.nuisances, ())
+    points = Projected(lacking).points(lacking.values)
+    return np.asarray(sum(power_of(v.residual(p)) for v, p in zip(lacking.views, points, strict=True)))
 
 
 def _trifling(trial: Trial) -> bool:
@@ -219,22 +239,26 @@ def power_left(evidence: Evidence) -> Array:
 
 
 def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
-    """The cost that one Gauss-Newton step from the best start leaves, with the weights as they are."""
+    """What is left after one Gauss-Newton step from the best start, of the candidate and of all that is known so far.
+
+    What is known so far must be let move along: alone it has bent to hold the other's share, and would hide it.
+    """
     if not candidate.indices:
         widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
-        return polish(widened, rounds=1, reweigh=False).cost, candidate, ()
-    low, high = bounds(fit.views[0].simulator, candidate.indices)
+        problem = Projected(widened)
+        return problem.deviance(problem.residual(widened.values)), candidate, ()
+    low, high = bounds(fit.views[0].simulator, (*fit.indices, *candidate.indices))
     best: Look = (np.inf, candidate, candidate.starts[0])
+    look = problem.looking(candidate)
     for start in candidate.starts:
-        look = problem.looking(candidate.indices)
-        values = np.array(start)
-        rows, slopes = look.residual(values), look.jacobian(values)
-        step = np.linalg.lstsq(slopes, -rows, rcond=None)[0]
+        values = np.concatenate([fit.values, start])
+        rows = look.residual(values)
+        step = np.linalg.lstsq(look.jacobian(values), -rows, rcond=None)[0]
         stepped = np.clip(values + step, low, high)
         for there, left in ((values, rows), (stepped, look.residual(stepped))):
-            cost = float(np.sum(left**2))
-            if cost < best[0]:
-                best = (cost, candidate, tuple(there.tolist()))
+            deviance = look.deviance(left)
+            if deviance < best[0]:
+                best = (deviance, candidate, tuple(there[fit.values.size :].tolist()))
     return best
 
 
@@ -286,14 +310,22 @@ def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial |
     return best if best.evidence.total > chosen.evidence.total + _CLEARLY else None
 
 
-def _cause(chosen: Trial, place: Place) -> Cause:
-    """Its probability, summed over the ways in which its effect could act, and who else could be to blame."""
+def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
+    """Its probability, summed over all sets of effects that were tried with it, and who else could be to blame.
+
+    A rival is to blame instead only as far as it does not predict still better beside the cause: what adds up is no
+    alternative (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
+    """
     candidate = place.candidate
-    own = [chosen, *(t for t in place.rivals if t.added is not None and t.added.label != candidate.label)]
-    shares = probabilities([*(t.evidence.scores for t in own), place.without.evidence.scores])
-    by_effect: dict[str, float] = {}
-    labels = [candidate.effect, *(t.added.effect for t in own[1:] if t.added)]
-    for effect, share in zip(labels, shares[: len(own)], strict=True):
+    rivals = [t for t in place.rivals if t.added is not None and t.added.label != candidate.label]
+    instead = probabilities([chosen.evidence.scores, *(t.evidence.scores for t in rivals)])[1:]
+    strong = [t for t, share in zip(rivals, instead, strict=True) if share > _WORTH_TRYING]
+    both = [trier.beside(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
+    sets = [chosen, *both, *rivals]
+    shares = probabilities([*(t.evidence.scores for t in sets), place.without.evidence.scores])
+    by_effect = {candidate.effect: float(shares[: 1 + len(both)].sum())}
+    for trial, share in zip(rivals, shares[1 + len(both) : -1], strict=True):
+        effect = trial.added.effect if trial.added else ""
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
     return Cause(candidate, by_effect[candidate.effect], tuple(rivals_left), place.rivals)

@@ -53,8 +53,14 @@ class Candidate:
 
     effect: str
     label: str  # the effect, and the control where it is one control's
-    indices: tuple[int, ...]  # none where only a nuisance's prior widens
+    indices: tuple[int, ...]  # none where only nuisances' priors widen
     starts: tuple[tuple[float, ...], ...]
+    widened: tuple[int, ...] = ()  # of these entries
+
+    @property
+    def entries(self) -> tuple[int, ...]:
+        """All entries that it moves."""
+        return (*self.indices, *self.widened)
 
     @property
     def station(self) -> str:
@@ -69,8 +75,8 @@ def candidates_of(simulator: Simulator, views: Sequence[View]) -> list[Candidate
     for effect in EFFECTS:
         if effect in UNSEEN:
             continue
-        if effect in WIDENED:
-            found.append(Candidate(effect, effect, (), ((),)))
+        if effect == WIDENED:
+            found += _per_coefficient(simulator)
         elif effect in PER_CONTROL:
             found += _per_control(simulator, effect, length)
         else:
@@ -129,6 +135,16 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         yield "frequency", (3.5, 5.0, 9.0)
     if effect == "ground_effect":
         yield "height", (0.5, 3.0)
+
+
+def _per_coefficient(simulator: Simulator) -> list[Candidate]:
+    """Derivatives beyond their tolerances, one coefficient's at a time: all at once would pass for almost anything."""
+    by_coefficient: dict[str, list[int]] = {}
+    for i, (effect, parameter) in enumerate(simulator.parameters):
+        known = simulator.aircraft.derivatives.get(parameter.name)
+        if effect == WIDENED and known is not None and known.tolerance:
+            by_coefficient.setdefault(parameter.name.partition("_")[0], []).append(i)
+    return [Candidate(WIDENED, f"{WIDENED} of {c}", (), ((),), tuple(own)) for c, own in by_coefficient.items()]
 
 
 def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:

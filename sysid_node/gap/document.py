@@ -68,5 +68,5 @@ def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:
     ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
     ordered += [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if not s]
     places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
-    own = [i for i in ordered if simulator.parameters[i][0] == cause.candidate.effect]
+    own = [i for i in ordered if i in cause.candidate.widened]
     return {simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])] for i in own}

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.fit import Fit, real_rows, residual_power, solve, weights
+from sysid_node.gap.fit import Fit, amplitudes, real_rows, residual_power, solve, weights
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, View
@@ -94,7 +94,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
     scores: list[float] = []
     residuals: list[Complex] = []
     for view, theirs in zip(views, nuisances, strict=True):
-        kept = theirs.without(fit.effects, view.simulator.names)
+        kept = theirs.without(fit.effects, view.simulator.names, fit.widened)
         point = carried(fit, view)
         power = np.maximum(_train_power(fit, view), view.noise)
         power = np.where(view.axes, power, 1.0)
@@ -161,14 +161,6 @@ def _predictive(
     spread = SHARE * rows.shape[0] * float(np.sum(lines[:, None] * np.log(own_power) * view.axes))
     score = -spread - 0.5 * float(scaled @ scaled) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
     return score, amplitudes(change, weights(view.windows, power))
-
-
-def amplitudes(rows: Array, weight: Array) -> Complex:
-    """Weighted real rows (w, R) as amplitudes (w, L, 12) again."""
-    parts = rows.reshape(rows.shape[0], 2, -1, len(CHANNELS))
-    weight = weight.reshape(2, -1, len(CHANNELS))
-    raw = np.where(weight > 0, parts / np.where(weight > 0, weight, 1.0), 0.0)
-    return np.asarray(raw[:, 0] + 1j * raw[:, 1])
 
 
 def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:

@@ -21,7 +21,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import Candidate, bounds, prior
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex, Windows
-from sysid_node.gap.view import View
+from sysid_node.gap.view import CHANNELS, View
 
 #: Rounds of linearising the nuisances anew; a fourth changes nothing that matters.
 _ROUNDS = 3
@@ -51,6 +51,11 @@ class Fit:
     def indices(self) -> tuple[int, ...]:
         """Entries of the vector that the candidates fit."""
         return tuple(dict.fromkeys(i for c in self.candidates for i in c.indices))
+
+    @property
+    def widened(self) -> tuple[int, ...]:
+        """Entries of nuisances whose priors the candidates widen."""
+        return tuple(i for c in self.candidates for i in c.widened)
 
     @property
     def loose(self) -> NDArray[np.bool_]:
@@ -131,6 +136,14 @@ def real_rows(amplitudes: Complex, weight: Array) -> Array:
     return np.asarray(parts.reshape(parts.shape[0], -1, *parts.shape[3:]))
 
 
+def amplitudes(rows: Array, weight: Array) -> Complex:
+    """Weighted real rows (w, R) as amplitudes (w, L, 12) again."""
+    parts = rows.reshape(rows.shape[0], 2, -1, len(CHANNELS))
+    weight = weight.reshape(2, -1, len(CHANNELS))
+    raw = np.where(weight > 0, parts / np.where(weight > 0, weight, 1.0), 0.0)
+    return np.asarray(raw[:, 0] + 1j * raw[:, 1])
+
+
 def residual_power(view: View, residual: Complex) -> Array:
     """Power (L, 12) of a residual (W, L, 12), smoothed by band, at least the sensors' noise."""
     power = view.windows.smoothed((np.abs(residual) ** 2).mean(axis=0))
@@ -149,7 +162,8 @@ def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisan
     all else neutral."""
     view = fit.views[0]
     names, neutral = view.simulator.names, view.simulator.neutral()
-    kept = nuisances.without(frozenset(c.effect for c in candidates), names)
+    widened = tuple(i for c in candidates for i in c.widened)
+    kept = nuisances.without(frozenset(c.effect for c in candidates), names, widened)
     old, chosen = set(fit.indices), {i for c in candidates for i in c.indices}
     points = []
     for point in fit.points:
@@ -232,11 +246,21 @@ class Projected:
         step[self.free] = np.linalg.solve(self.R, self.Q.T @ self._rows(values))
         return step
 
-    def looking(self, indices: Sequence[int]) -> Projected:
-        """The same nuisances, but another set of parameters to move."""
-        other = copy(self)
-        other.indices = list(indices)
-        other.centre, other.sigma = prior(self.fit.views[0].simulator, indices)
+    def looking(self, candidate: Candidate) -> Projected:
+        """The same nuisances but for those that the candidate is or replaces; its parameters move with the others."""
+        other, names = copy(self), self.fit.views[0].simulator.names
+        other.indices = [*self.fit.indices, *candidate.indices]
+        other.centre, other.sigma = prior(self.fit.views[0].simulator, other.indices)
+        nuisances = self.fit.nuisances
+        kept = nuisances.without(frozenset({candidate.effect}), names).indices
+        own = np.isin(nuisances.indices, candidate.indices)  # now a parameter that moves: from where the others start
+        gone, neutral = (np.zeros(self.now.size, bool) for _ in range(2))
+        for flight in range(len(self.fit.views)):
+            places = _places(nuisances, flight)
+            gone[places] |= own | ~np.isin(nuisances.indices, kept)
+            neutral[places] |= ~own
+        if gone.any():
+            other._settle(self.free & ~gone, np.where(gone, -self.now * neutral, self.shift))
         return other
 
     def _rows(self, values: Array) -> Array:
@@ -264,6 +288,25 @@ class Projected:
         blocks.append(np.zeros((self.now.size, values.size)))
         matrix = np.vstack(blocks)
         return np.vstack([matrix - self.Q @ (self.Q.T @ matrix), np.diag(1.0 / self.sigma)])
+
+    def deviance(self, rows: Array) -> float:
+        """Minus twice the log probability of a ``residual``, up to a constant, as if of its own spectrum.
+
+        The spectrum is profiled out: with the weights as they are, an effect would be worth little just where what it
+        explains is most of the remainder.
+        """
+        data = sum(view.windows.count * weight.size for view, weight in zip(self.fit.views, self.weights, strict=True))
+        total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.nuisances.widened, 0
+        for view, weight in zip(self.fit.views, self.weights, strict=True):
+            shape = (view.windows.count, weight.size)
+            own = rows[first : first + shape[0] * shape[1]].reshape(shape)
+            first += own.size
+            power = np.mean(np.abs(amplitudes(own, weight)) ** 2, axis=0)
+            floor = np.where(view.axes, np.maximum(view.windows.smoothed(power), view.noise), 1.0)
+            lines = np.ones((power.shape[0], 1))
+            lines[0] = 0.5
+            total += 2.0 * SHARE * shape[0] * float(np.sum(lines * (np.log(floor) + power / floor)))
+        return total
 
     def points(self, values: Array) -> tuple[Array, ...]:
         """All parameters by flight, with the nuisances' best at these values."""

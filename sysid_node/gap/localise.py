@@ -62,15 +62,10 @@ def _steps(fit: Fit) -> list[list[Complex]]:
     points, steps = [neutral.copy() for _ in fit.views], []
     for candidate in fit.candidates:
         for point, fitted in zip(points, fit.points, strict=True):
-            own = [*candidate.indices] or _entries(fit, candidate.effect)
+            own = list(candidate.entries)
             point[own] = fitted[own]
         steps.append([v.residual(p) for v, p in zip(fit.views, points, strict=True)])
     return [*steps, [v.residual(p) for v, p in zip(fit.views, fit.points, strict=True)]]
-
-
-def _entries(fit: Fit, effect: str) -> list[int]:
-    """Entries of the vector that belong to an effect."""
-    return [i for i, (e, _) in enumerate(fit.views[0].simulator.parameters) if e == effect]
 
 
 def _power(residuals: Sequence[Complex]) -> Array:

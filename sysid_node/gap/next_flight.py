@@ -168,7 +168,7 @@ def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
 def _separation(view: View, point: Array, cause: Candidate, rival: Fit, fit: Fit) -> float:
     """Of a cause's response from the nearest that its rival and the nuisances can do, in standard deviations."""
     neutral = view.simulator.neutral()
-    own = list(cause.indices) or [i for i, (e, _) in enumerate(view.simulator.parameters) if e == cause.effect]
+    own = list(cause.entries)
     without, instead = point.copy(), point.copy()
     without[own] = neutral[own]
     instead[own] = neutral[own]

@@ -18,8 +18,8 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.view import View
 
-#: Effects whose parameters are all nuisances; as a candidate, each is the same with a wider prior.
-WIDENED = {"derivative_error": 5.0}
+#: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a prior so much wider.
+WIDENED, WIDER = "derivative_error", 5.0
 
 #: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
 LIMIT = 3.0
@@ -52,16 +52,15 @@ class Nuisances:
     shared: NDArray[np.bool_]
     widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
 
-    def without(self, effects: frozenset[str], names: tuple[str, ...]) -> Nuisances:
-        """Those that do not belong to these effects, unless only their prior widens."""
-        gone = {e for e in effects if e not in WIDENED}
+    def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
+        """Those that do not belong to these effects; the priors of some are widened."""
+        gone = {e for e in effects if e != WIDENED}
         gone |= {clock for clock, same in _CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
-        wide = np.array([WIDENED.get(e, 1.0) if (e := names[i].partition(".")[0]) in effects else 1.0
-                         for i in self.indices])  # fmt: skip
+        wide = np.where(np.isin(self.indices, widened), WIDER, 1.0)
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
-        widened = float(np.log(wide[keep]).sum())
-        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], widened)
+        more = self.widened + float(np.log(wide[keep]).sum())
+        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
 
 
 def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:

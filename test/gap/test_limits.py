@@ -37,9 +37,12 @@ def test_priors_cost_what_they_say(shifted) -> None:
 
 def test_a_wider_prior_has_its_price(shifted) -> None:
     names = shifted.views[0].simulator.names
-    wide = shifted.nuisances.without(frozenset({"derivative_error"}), names)
-    derivatives = sum(names[i].startswith("derivative_error") for i in wide.indices)
-    assert wide.widened == pytest.approx(derivatives * np.log(5.0))
+    own = tuple(i for i, name in enumerate(names) if name.startswith("derivative_error.Cm_"))
+    wide = shifted.nuisances.without(frozenset({"derivative_error"}), names, own)
+    moved = np.isin(wide.indices, own)
+    assert 4 <= moved.sum() < len(wide.indices)
+    np.testing.assert_allclose(wide.sigma / shifted.nuisances.sigma, np.where(moved, 5.0, 1.0))
+    assert wide.widened == pytest.approx(moved.sum() * np.log(5.0))
 
 
 def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
