@@ -65,12 +65,51 @@ def _noise(aircraft: Aircraft, airspeed: float) -> dict[str, float]:
     return noise
 
 
+@dataclass(frozen=True)
+class Slope:
+    """How one sensor's reading enters both sides of the equations, at each time: derivatives (N,) by name."""
+
+    coefficients: Mapping[str, Array]
+    regressors: Mapping[str, Array]
+
+
+#: Sensors that enter the equations not only through one additive term, and a small step of their reading (m/s, rad).
+_STEPS = {"V": 1e-4, "alpha": 1e-5, "beta": 1e-5}
+
+
+def sensor_slopes(aircraft: Aircraft, record: FlightRecord) -> dict[str, tuple[Array, Slope]]:
+    """The air data's readings (N,), and how the equations depend on each, at the times of ``equations``."""
+    s = _accelerated(_complete_samples(aircraft, record)[0])
+
+    def sides(name: str, step: float) -> tuple[dict[str, Array], dict[str, Array]]:
+        moved = _moved_to_cg(aircraft, {**s, name: s[name] + step})
+        coefficients, _ = _coefficients(aircraft, moved)
+        return coefficients, _regressors(aircraft, moved, coefficients["CL"])
+
+    found = {}
+    for name, step in _STEPS.items():
+        if name in s:
+            above, below = sides(name, step), sides(name, -step)
+            slopes = [{n: (a[n] - b[n]) / (2.0 * step) for n in a} for a, b in zip(above, below, strict=True)]
+            found[name] = s[name], Slope(*slopes)
+    return found
+
+
 def at_cg(aircraft: Aircraft, record: FlightRecord) -> dict[str, Array]:
     """The record's signals with specific forces and air data moved to the CG, and angular accelerations ``pdot`` ..."""
-    s = {name: values.copy() for name, values in record.columns.items()}
+    return _moved_to_cg(aircraft, _accelerated(record))
+
+
+def _accelerated(record: FlightRecord) -> dict[str, Array]:
+    """The record's signals and angular accelerations ``pdot`` ..."""
+    rates = {f"{name}dot": differentiate(record.time, record[name]) for name in "pqr"}
+    return {name: values.copy() for name, values in record.columns.items()} | rates
+
+
+def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, Array]:
+    s = dict(signals)
     rates = np.column_stack([s["p"], s["q"], s["r"]])
-    accelerations = np.column_stack([differentiate(record.time, rates[:, i]) for i in range(3)])
-    s |= {f"{name}dot": accelerations[:, i] for i, name in enumerate("pqr")}
+    accelerations = np.column_stack([s["pdot"], s["qdot"], s["rdot"]])
     force = np.column_stack([s["ax"], s["ay"], s["az"]]) - _lever(aircraft.sensors.imu, rates, accelerations)
     s |= dict(zip(("ax", "ay", "az"), force.T, strict=True))
     alpha, beta = (s.get(name, np.zeros_like(s["V"])) for name in ("alpha", "beta"))

@@ -14,10 +14,11 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
-from sysid_node.batch.coefficients import Equations, equations, usable
+from sysid_node.batch.coefficients import Equations, Slope, equations, sensor_slopes, usable
 from sysid_node.batch.identifiability import sentences
 from sysid_node.batch.regression import Regression, regress
 from sysid_node.batch.result import Answer, Estimate, Fit
+from sysid_node.batch.sensor_noise import Noise, Noisy, white_variance
 from sysid_node.batch.signals import lowpass
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -32,20 +33,57 @@ def equation_error(aircraft: Aircraft, records: Sequence[FlightRecord], low_pass
     ``low_pass`` Hz bounds what is used of the signals; 0 uses all. Raises InputError where signals are missing.
     """
     flights = [equations(aircraft, record) for record in records]
+    sensors = [sensor_slopes(aircraft, record) for record in records]
     fits = {
-        coefficient: _fit(coefficient, regressors, flights, low_pass)
+        coefficient: _fit(coefficient, regressors, flights, sensors, low_pass)
         for coefficient, regressors in structure_of(aircraft, flights).items()
     }
     return collected("equation_error", fits, flights)
 
 
-def _fit(coefficient: str, regressors: Sequence[str], flights: Sequence[Equations], low_pass: float) -> Regression:
+def _fit(
+    coefficient: str,
+    regressors: Sequence[str],
+    flights: Sequence[Equations],
+    sensors: Sequence[Mapping[str, tuple[Array, Slope]]],
+    low_pass: float,
+) -> Regression:
     names = [f"{coefficient}_{name}" for name in regressors]
     ys = [lowpass(flight.time, flight.coefficients[coefficient], low_pass) for flight in flights]
     Xs = [columns(flight, regressors) for flight in flights]
-    fit = regress(names, ys, [lowpass(flight.time, X, low_pass) for flight, X in zip(flights, Xs, strict=True)])
+    passed = [lowpass(flight.time, X, low_pass) for flight, X in zip(flights, Xs, strict=True)]
+    noisy = [
+        Noisy(
+            lowpass(flight.time, X, low_pass),
+            _share_passed(flight.time, low_pass),
+            noises(flight.time, of_sensors, coefficient, regressors, low_pass),
+        )
+        for flight, X, of_sensors in zip(flights, passed, sensors, strict=True)
+    ]
+    fit = regress(names, ys, passed, noisy=noisy)
     values = np.array([estimate.value for estimate in fit.estimates.values()])
     return replace(fit, modelled=[X @ values for X in Xs])
+
+
+def noises(
+    time: Array, sensors: Mapping[str, tuple[Array, Slope]], coefficient: str, regressors: Sequence[str], cutoff: float
+) -> list[Noise]:
+    """What each of the air data's noise does to one equation; its size as the readings show it above ``cutoff`` Hz."""
+    return [
+        Noise(
+            white_variance(time, reading, cutoff),
+            slope.coefficients[coefficient],
+            np.column_stack([slope.regressors[name] for name in regressors]),
+        )
+        for reading, slope in sensors.values()
+    ]
+
+
+def _share_passed(time: Array, low_pass: float) -> float:
+    """How much of white noise's variance the filter lets through."""
+    impulse = np.zeros((time.size, 1))
+    impulse[time.size // 2] = 1.0
+    return float(np.sum(lowpass(time, impulse, low_pass) ** 2))
 
 
 def structure_of(aircraft: Aircraft, flights: list[Equations]) -> dict[str, tuple[str, ...]]:

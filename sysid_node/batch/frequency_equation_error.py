@@ -10,16 +10,17 @@ domain, and do not depend on how densely the frequencies lie.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.coefficients import Equations, equations
-from sysid_node.batch.equation_error import collected, columns, structure_of
+from sysid_node.batch.coefficients import Equations, Slope, equations, sensor_slopes
+from sysid_node.batch.equation_error import collected, columns, noises, structure_of
 from sysid_node.batch.regression import Regression, regress
 from sysid_node.batch.result import Fit
+from sysid_node.batch.sensor_noise import Noise, Noisy
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -42,8 +43,9 @@ def frequency_equation_error(
     the flights hold too few independent frequencies for the model.
     """
     flights = [equations(aircraft, record) for record in records]
+    sensors = [sensor_slopes(aircraft, record) for record in records]
     fits = {
-        coefficient: _fit(coefficient, regressors, flights, frequencies)
+        coefficient: _fit(coefficient, regressors, flights, sensors, frequencies)
         for coefficient, regressors in structure_of(aircraft, flights).items()
     }
     return collected("frequency_equation_error", fits, flights)
@@ -55,9 +57,11 @@ def regress_in_band(
     ys: Sequence[Array],
     Xs: Sequence[Array],
     frequencies: Frequencies,
+    noises: Sequence[Sequence[Noise]] = (),
 ) -> Regression:
     """Least squares of ``ys`` (N,) on ``Xs`` (N, p) within the band; constants must not be among the regressors.
 
+    ``noises``: what is known of the sensors' noise, flight by flight.
     Raises InputError where the band is impossible or holds too few independent lines.
     """
     lines = _lines(frequencies, times)
@@ -70,7 +74,12 @@ def regress_in_band(
         )
     instruments = [_band_passed(t, X, lines) for t, X in zip(times, Xs, strict=True)]
     # neither constant nor line changes the estimates, but they would leak into the residuals' spectrum
-    fit = regress(names, [_detrended(y) for y in ys], [_detrended(X) for X in Xs], instruments, freedom)
+    sides = [_detrended(y) for y in ys], [_detrended(X) for X in Xs]
+    noisy = [
+        Noisy(Z, lines.size * float(np.median(np.diff(t))) ** 2, several)
+        for Z, t, several in zip(instruments, times, noises, strict=bool(noises))
+    ]
+    fit = regress(names, *sides, instruments, freedom, noisy)
     values = np.array([estimate.value for estimate in fit.estimates.values()])
     return replace(fit, modelled=[X @ values for X in Xs])
 
@@ -110,18 +119,24 @@ def _detrended(x: Array) -> Array:
     return np.asarray(x - drift @ np.linalg.lstsq(drift, x, rcond=None)[0])
 
 
-def _fit(coefficient: str, regressors: Sequence[str], flights: list[Equations], frequencies: Frequencies) -> Regression:
+def _fit(
+    coefficient: str,
+    regressors: Sequence[str],
+    flights: Sequence[Equations],
+    sensors: Sequence[Mapping[str, tuple[Array, Slope]]],
+    frequencies: Frequencies,
+) -> Regression:
     """One coefficient: the derivatives within the band, then the offset, where the model has one."""
     varying = [name for name in regressors if name != "0"]
     times, ys = [flight.time for flight in flights], [flight.coefficients[coefficient] for flight in flights]
     Xs = [columns(flight, varying) for flight in flights]
-    fit = regress_in_band([f"{coefficient}_{name}" for name in varying], times, ys, Xs, frequencies)
+    noise_of = [noises(t, s, coefficient, varying, frequencies[2]) for t, s in zip(times, sensors, strict=True)]
+    fit = regress_in_band([f"{coefficient}_{name}" for name in varying], times, ys, Xs, frequencies, noise_of)
     rest = [y - modelled for y, modelled in zip(ys, fit.modelled, strict=True)]
     offset = regress([f"{coefficient}_0"], rest, [np.ones((r.size, 1)) for r in rest])
     modelled = [m + o for m, o in zip(fit.modelled, offset.modelled, strict=True)]
-    noise = offset.noise
     if "0" not in regressors:
-        return Regression(fit.estimates, fit.covariance, modelled, noise, fit.lost)
+        return Regression(fit.estimates, fit.covariance, modelled, offset.noise, fit.lost)
     return _joined(regressors, fit, offset, np.concatenate(Xs).mean(axis=0), modelled)
 
 

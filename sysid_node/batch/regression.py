@@ -10,6 +10,7 @@ import numpy as np
 from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
 from sysid_node.batch.identifiability import Groups, status_of, undetermined
 from sysid_node.batch.result import Estimate, interval
+from sysid_node.batch.sensor_noise import Noisy, taken_out, widened
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
@@ -34,11 +35,13 @@ def regress(
     Xs: Sequence[Array],
     instruments: Sequence[Array] | None = None,
     freedom: float = np.inf,
+    noisy: Sequence[Noisy] = (),
 ) -> Regression:
     """Least squares of ``ys`` (N,) on ``Xs`` (N, p), several flights together.
 
     ``instruments`` (N, p) replace X in the normal equations Z' (y - X theta) = 0, for least squares in a band of
     frequencies; Z' X must be symmetric. ``freedom`` is the most degrees of freedom that the intervals may count on.
+    ``noisy``: what is known of the regressors' noise, flight by flight.
     Regressors that the data cannot tell apart share their effect (minimum norm) and are marked invalid. Raises
     InputError with fewer than twice as many samples as regressors.
     """
@@ -47,15 +50,20 @@ def regress(
         raise InputError(f"{samples} samples for {len(names)} regressors ({', '.join(names)}); give a longer flight")
     Zs = Xs if instruments is None else instruments
     information: Array = np.sum([Z.T @ X for Z, X in zip(Zs, Xs, strict=True)], axis=0)
+    lost = undetermined(information, names)
+    moment: Array = np.sum([Z.T @ y for Z, y in zip(Zs, ys, strict=True)], axis=0)
+    if noisy and not lost:
+        information, moment = taken_out(information, moment, noisy)
     inverse = _inverse(0.5 * (information + information.T))
-    values = inverse @ np.sum([Z.T @ y for Z, y in zip(Zs, ys, strict=True)], axis=0)
+    values = inverse @ moment
     modelled = [X @ values for X in Xs]
     residuals = [y - m for y, m in zip(ys, modelled, strict=True)]
     noise = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
     covariance = coloured_covariance(
         inverse, [X[:, None, :] for X in Xs], [r[:, None] for r in residuals], [Z[:, None, :] for Z in Zs]
     )
-    lost = undetermined(information, names)
+    if noisy:
+        covariance = widened(covariance, inverse, values, noisy)
     scatter: Array = np.sum([Z.T @ Z for Z in Zs], axis=0)
     white = noise * np.sqrt(np.clip(np.diag(inverse @ scatter @ inverse), 0.0, None) * samples / (samples - len(names)))
     freedom = min(freedom, degrees_of_freedom([len(y) for y in ys]))
