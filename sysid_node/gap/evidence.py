@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.fit import Fit, amplitudes, real_rows, residual_power, solve, weights
+from sysid_node.gap.fit import Fit, amplitudes, moved, real_rows, residual_power, solve, weights
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, View
@@ -32,11 +32,15 @@ _GROUPS = 8
 
 @dataclass(frozen=True)
 class Evidence:
-    """Scores (G,) of groups of windows not seen, and their residuals (W, L, 12) by flight."""
+    """Scores (G,) of groups of windows not seen, and their residuals (W, L, 12) by flight.
+
+    ``points`` are the parameters (P,) that each group was predicted with, by flight and group.
+    """
 
     scores: Array
     residuals: tuple[Complex, ...]
     views: tuple[View, ...]
+    points: tuple[tuple[Array, ...], ...]
 
     @property
     def total(self) -> float:
@@ -54,25 +58,28 @@ def cross_validated(fit: Fit) -> Evidence:
     assert fit.information is not None
     scores: list[float] = []
     residuals: list[Complex] = []
+    points: list[tuple[Array, ...]] = []
     grams = [np.einsum("wru,wrv->wuv", J * fit.loose, J * fit.loose, optimize=True) for J in fit.slopes]
     whole = [gram.sum(axis=0) for gram in grams]
     elsewhere = [fit.prior_information + sum(w for k, w in enumerate(whole) if k != i) for i in range(len(whole))]
     for i, (view, power, rows, full) in enumerate(zip(fit.views, fit.power, fit.rows, fit.slopes, strict=True)):
         slopes = full * fit.loose
         residual = amplitudes(rows, weights(view.windows, power))
-        unseen = residual.copy()
+        unseen, steps = residual.copy(), []
         for group in groups_of(view):
             aside = np.arange(max(group[0] - 1, 0), min(group[-1] + 2, view.windows.count))
             others = np.setdiff1d(np.arange(view.windows.count), aside)
             J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
             information = elsewhere[i] + grams[i][others].sum(axis=0)
             step = -solve(information, J.T @ r)
+            steps.append(step)
             own_power = residual_power(view, residual[others]) if others.size > 2 else power
             score, part = _predictive(view, power, own_power, rows[group], slopes[group], step, information)
             scores.append(score)
             unseen[group] = part
         residuals.append(unseen)
-    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views)
+        points.append(tuple(moved(fit, step).points[i] for step in steps))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views, tuple(points))
 
 
 def _without_shapes(fit: Fit) -> Array:
@@ -93,6 +100,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
     known = np.linalg.inv(_without_shapes(fit))[: chosen + shared, : chosen + shared]
     scores: list[float] = []
     residuals: list[Complex] = []
+    points: list[tuple[Array, ...]] = []
     for view, theirs in zip(views, nuisances, strict=True):
         kept = theirs.without(fit.effects, view.simulator.names, fit.widened)
         point = carried(fit, view)
@@ -111,7 +119,8 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
             score, _ = _predictive(view, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
             scores.append(score)
         residuals.append(view.residual(point))
-    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(views))
+        points.append((point,) * len(groups_of(view)))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(views), tuple(points))
 
 
 def _ordered(nuisances: Nuisances) -> list[int]:

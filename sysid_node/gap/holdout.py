@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from sysid_node.gap import close
 from sysid_node.gap.attribute import Attribution
 from sysid_node.gap.close import Gap
-from sysid_node.gap.evidence import Evidence, held_out
+from sysid_node.gap.evidence import Evidence, groups_of, held_out
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.structure import Structure, instrumented
 from sysid_node.gap.view import View
@@ -26,7 +26,8 @@ class Check:
     def as_filed(self, left: Structure) -> Check:
         """The same of the aircraft file as it is."""
         before = tuple(v.residual(v.simulator.neutral()) for v in self.views)
-        base = replace(self.base, residuals=before)
+        filed = tuple((v.simulator.neutral(),) * len(groups_of(v)) for v in self.views)
+        base = replace(self.base, residuals=before, points=filed)
         return replace(self, base=base, final=base, gap=close.gap_of(self.views, before, base, base, left))
 
 

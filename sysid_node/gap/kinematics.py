@@ -42,13 +42,15 @@ class Motion(NamedTuple):
     attitude: Scalar  # (N, 3) phi, theta, psi rad, without jumps
 
 
-class _Sample(NamedTuple):
-    """One sample of what the sensors' effects leave of it."""
+class Sample(NamedTuple):
+    """One sample of the motion, or a series of them, that the sensors' effects hide."""
 
-    force: Vector  # at the CG
+    force: Vector  # specific, at the CG
     rates: Vector
     velocity: Vector  # relative to the air, at the CG, as the probe has it
-    attitude: Vector
+    attitude: Vector  # Euler angles
+    flow: Scalar  # (..., 3) airspeed, alpha, beta at the probe
+    probe: Scalar  # (..., 3) what a lagged probe holds of them
 
 
 class _State(NamedTuple):
@@ -86,7 +88,7 @@ def reconstruct(
 ) -> Scalar:
     """Readings (N, 6), columns ``READINGS``, that parameters (P,) expect, each from the samples before it; pure."""
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
-    samples = _undone(chain, motion)
+    samples = undone(chain, motion)
     first = jax.tree.map(lambda series: series[0], samples)
     flow = _at_probe(chain, first.velocity, first.rates)
     start = _State(first.velocity, first.attitude, flow, flow)
@@ -97,8 +99,8 @@ def reconstruct(
     return jnp.concatenate([shift_cubic(air, late_air), shift_cubic(attitude, late_imu)], axis=1)
 
 
-def _undone(chain: Chain, motion: Motion) -> _Sample:
-    """The motion that the readings tell of, at the time of the samples."""
+def undone(chain: Chain, motion: Motion) -> Sample:
+    """The motion (N,) that the readings tell of, at the time of the samples."""
     effects, step = chain.effects, chain.step
     late_imu, late_air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
     force, rates, turning, attitude = (
@@ -114,7 +116,7 @@ def _undone(chain: Chain, motion: Motion) -> _Sample:
     flow = sensors.before_lag(effects, reading, jnp.asarray(jnp.gradient(reading, axis=0)) / step)
     probe = sensors.air_data_arm(chain.model, effects, chain.body)
     velocity = airflow.velocity_of(*flow.T).minus(rates.cross(probe))
-    return _Sample(at_cg, rates, velocity, attitude)
+    return Sample(at_cg, rates, velocity, attitude, flow, reading)
 
 
 def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str, str]) -> Vector:
@@ -125,13 +127,13 @@ def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str
 
 
 def _advance(
-    chain: Chain, fading: Scalar | float, state: _State, before: _Sample, now: _Sample
+    chain: Chain, fading: Scalar | float, state: _State, before: Sample, now: Sample
 ) -> tuple[_State, Scalar]:
     """Predicts the readings (6,) of now, then corrects."""
     h = chain.step
-    k1 = _rates_of_change(state.velocity, state.attitude, before)
+    k1 = rates_of_change(state.velocity, state.attitude, before)
     middle = (state.velocity.plus(k1[0].times(h)), state.attitude.plus(k1[1].times(h)))
-    k2 = _rates_of_change(*middle, now)
+    k2 = rates_of_change(*middle, now)
     velocity = state.velocity.plus(k1[0].plus(k2[0]).times(0.5 * h))
     attitude = state.attitude.plus(k1[1].plus(k2[1]).times(0.5 * h))
     truth = _at_probe(chain, velocity, now.rates)
@@ -142,7 +144,7 @@ def _advance(
     return _State(velocity, attitude, probe, truth), reading
 
 
-def _rates_of_change(velocity: Vector, attitude: Vector, sample: _Sample) -> tuple[Vector, Vector]:
+def rates_of_change(velocity: Vector, attitude: Vector, sample: Sample) -> tuple[Vector, Vector]:
     """Of velocity (m/s^2) and Euler angles (rad/s)."""
     sin_roll, cos_roll = jnp.sin(attitude.x), jnp.cos(attitude.x)
     sin_pitch, cos_pitch = jnp.sin(attitude.y), jnp.cos(attitude.y)

@@ -254,13 +254,13 @@ def _noise_power(view: View, random: np.random.Generator) -> Array:
     clean = view.residual(neutral)
     power = np.zeros(clean.shape[1:])
     for _ in range(_REALISATIONS):
-        record = thinned(_noisier(view, random), view.simulator.rate)
+        record = thinned(noisier(view, random), view.simulator.rate)
         again = _bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
         power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / _REALISATIONS
     return np.maximum(view.windows.smoothed(power), 1e-18)
 
 
-def _noisier(view: View, random: np.random.Generator) -> Flight:
+def noisier(view: View, random: np.random.Generator) -> Flight:
     """The flight with the sensors' noise added once more, as strong in the band as each topic's rate makes it."""
     record, sigmas = view.flight.record, view.simulator.aircraft.noise
     own_rate = 1.0 / float(np.median(np.diff(record.time)))
