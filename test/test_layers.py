@@ -20,8 +20,9 @@ BELOW = {
     "control": {"aircraft", "flight"},
     "batch": {"aircraft", "flight", "sim"},
     "excite": {"aircraft", "flight", "sim"},
+    "faults": {"aircraft", "flight", "online"},
     "gap": {"aircraft", "flight", "sim", "online", "batch", "control", "excite"},
-    "ros": {"aircraft", "flight", "sim", "online", "batch", "control", "excite", "gap"},
+    "ros": {"aircraft", "flight", "sim", "online", "batch", "control", "excite", "faults", "gap"},
 }
 BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["cli"] = {*BELOW["report"], "report"}

@@ -1,0 +1,97 @@
+"""How strongly a stretch of flight speaks for a change of the aircraft or its sensors: Bayes factors.
+
+The stretch's whitened residuals against the model that is held are summed up by an information matrix J (D, D) and a
+score v (D,) over the derivatives. The held ones are known with a covariance P: what that allows for is taken out,
+
+    J' = J - J (J + P^-1)^-1 J,    v' = v - J (J + P^-1)^-1 v.
+
+A fault shifts the derivatives by s + B phi, phi ~ N(0, diag(spread^2)). The logarithm of its Bayes factor against no
+fault is, with G = B'J'B and g = B'(v' - J's),
+
+    s'v' - s'J's / 2 + g'(G + L)^-1 g / 2 - log(|G + L| / |L|) / 2,     L = diag(spread^-2),
+
+the generalised likelihood ratio of Willsky & Jones (IEEE Trans. Automatic Control 21, 1976) with its price for freedom
+(Kass & Raftery, "Bayes factors", J. American Statistical Association 90, 1995).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shift:
+    """What a fault does to the derivatives: s (D,), B (D, m), and how large phi may be (m,)."""
+
+    fixed: Array
+    free: Array
+    spread: Array
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Logarithm of the Bayes factor, and phi with its covariance."""
+
+    factor: float
+    size: Array  # (m,)
+    covariance: Array  # (m, m)
+
+
+def marginal(J: Array, v: Array, precision: Array) -> tuple[Array, Array]:
+    """J' and v' of the module's text; ``precision`` (D,) is the diagonal of P^-1."""
+    solved = cho_solve(cho_factor(J + np.diag(precision)), np.column_stack([J, v]))
+    return J - J @ solved[:, :-1], v - J @ solved[:, -1]
+
+
+def weigh(J: Array, v: Array, shift: Shift, excess: float = 1.0) -> Weighed:
+    """Of a marginal J and v, whose residuals have ``excess`` times the variance that they were whitened by."""
+    s, B = shift.fixed, shift.free
+    pulled = J @ s
+    prior = shift.spread**-2
+    G = B.T @ J @ B / excess + np.diag(prior)
+    g = B.T @ (v - pulled) / excess
+    covariance = np.asarray(np.linalg.inv(G), dtype=np.float64)
+    size = covariance @ g
+    freedom = np.linalg.slogdet(G)[1] - float(np.log(prior).sum())
+    factor = float(s @ v - 0.5 * s @ pulled) / excess + 0.5 * float(g @ size) - 0.5 * freedom
+    return Weighed(factor, size, covariance)
+
+
+def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness: Array, excess: float) -> Weighed:
+    """As ``weigh``, of J and v that are not marginal, where a fault may differ from its shift by ``looseness`` (D,).
+
+    A fault is hardly ever as simple as its hypothesis: without this, one with more freedom would explain the rest.
+    """
+    s, m = shift.fixed, shift.spread.size
+    kept = np.diag(precision)
+    none = _evidence(J / excess, v / excess, kept)
+    prior = np.concatenate([shift.spread**-2, 1.0 / (1.0 / precision + looseness**2)])
+    B = np.hstack([shift.free, np.eye(len(v))])
+    left = (v - J @ s) / excess
+    factor, size, covariance = _evidence(B.T @ J @ B / excess, B.T @ left, np.diag(prior))
+    factor += float(s @ v - 0.5 * s @ J @ s) / excess - none[0]
+    return Weighed(factor, size[:m], covariance[:m, :m])
+
+
+def _evidence(G: Array, g: Array, prior: Array) -> tuple[float, Array, Array]:
+    """Of parameters with a normal prior of this precision: log evidence over that of none, mean, covariance."""
+    covariance = np.asarray(np.linalg.inv(G + prior), dtype=np.float64)
+    mean = covariance @ g
+    freedom = np.linalg.slogdet(G + prior)[1] - np.linalg.slogdet(prior)[1]
+    return 0.5 * float(g @ mean) - 0.5 * float(freedom), mean, covariance
+
+
+def statistic(J: Array, v: Array, shift: Shift) -> float:
+    """Mean square of the score along the free directions: 1 where nothing has failed and the whitening holds."""
+    B = shift.free
+    G, g = B.T @ J @ B, B.T @ v
+    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
+    G = G / np.outer(scale, scale) + 1e-6 * np.eye(len(g))
+    g = g / scale
+    return float(g @ np.linalg.solve(G, g)) / len(g)

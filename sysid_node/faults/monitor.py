@@ -1,0 +1,225 @@
+"""The fault monitor: ``init``, ``update`` with every aligned sample, ``hear`` the identifier's estimates.
+
+    state = init(aircraft, Settings())
+    fault = update(state, time, sample)        # as ``online.estimator.update`` takes it; None while nothing is wrong
+
+Ten times a second the last half to eight seconds are weighed against the model that is held (``evidence``). The first
+Bayes factor beyond the threshold is an alarm. From then on all that is learned is held, the fault's onset is where the
+evidence begins, and all that has come since is weighed anew: which fault, how large. When the last seconds no longer
+speak of it, the alarm ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.faults import blocks, colour, held
+from sysid_node.faults.blocks import PERIOD, Block
+from sysid_node.faults.colour import ORDER
+from sysid_node.faults.held import Known
+from sysid_node.faults.hypotheses import hypotheses
+from sysid_node.faults.report import Found, fault_of
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
+from sysid_node.faults.terms import terms
+from sysid_node.faults.types import VANE_STUCK, Fault
+from sysid_node.faults.weighing import (
+    Stretch,
+    excess,
+    explained,
+    statistics,
+    stretch,
+    stretches,
+    stuck_vanes,
+    weights,
+)
+from sysid_node.online.signals import OFFSET
+
+Array = NDArray[np.float64]
+
+EVERY = 5  # a span of n times so many blocks is looked at with every n-th block
+LEAST = 3  # blocks that a fault must have lasted
+RENEWED = 10  # blocks after which hypotheses and whitening are made anew
+OFFSETS = 30.0  # s over which offsets are learned
+USUAL = 60.0  # s over which the usual size of a statistic is
+DATED = 5.0  # s after an alarm in which its onset is sought
+MUCH, LITTLE = 0.2, 1.5  # share of the largest Bayes factor's logarithm; times the least variance left
+OUTLIER = 10.0  # a statistic beyond this is no usual one
+
+
+def init(aircraft: Aircraft, settings: Settings) -> State:
+    """A monitor that has seen nothing."""
+    made = blocks.init(aircraft)
+    known = terms(aircraft, made.layout)
+    return State(aircraft, settings, known, made, held.init(known), colour.init(settings.memory, PERIOD))
+
+
+def hear(state: State, time: float, known: Mapping[str, Known]) -> None:
+    """The identifier's estimates at a time (s, as of the samples)."""
+    if state.alarm is None:
+        held.hear(state.held, time, known)
+
+
+def update(state: State, time: float, sample: Sequence[float]) -> Fault | None:
+    """Take in a sample; returns what is wrong at present."""
+    block = blocks.add(state.blocks, time, sample)
+    if block is not None:
+        take(state, block)
+    return state.fault
+
+
+def take(state: State, block: Block) -> None:
+    """Take in a block."""
+    if not block.follows:
+        state.raw.clear()
+        state.pieces.clear()
+    design = np.zeros((6, len(state.terms.names)))
+    design[state.terms.output, np.arange(design.shape[1])] = block.regressors[state.terms.column]
+    residual = block.outputs - design @ state.held.values
+    state.count += 1
+    if state.count * PERIOD <= state.settings.learning:
+        _learn(state, block, residual)
+    elif len(state.raw) == ORDER:
+        _judge(state, _piece(state, block, design, residual))
+    state.raw.append((design, residual))
+
+
+def _piece(state: State, block: Block, design: Array, residual: Array) -> Piece:
+    """The block, whitened."""
+    k = block.regressors[OFFSET]
+    off = residual - k * state.held.offsets
+    for (earlier, before), share in zip(reversed(state.raw), state.colour.filter, strict=True):
+        design = design - share[:, None] * earlier
+        off = off - share * (before - k * state.held.offsets)
+    A, b = state.colour.unmix @ design, state.colour.unmix @ off
+    return Piece(block, residual, A, b, A.T @ A, A.T @ b)
+
+
+def _judge(state: State, piece: Piece) -> None:
+    state.pieces.append(piece)
+    if state.alarm is not None:
+        if state.count % EVERY == 0:
+            _follow(state, state.alarm)
+        return
+    if state.count % RENEWED == 0 or not state.hypotheses:
+        _renew(state)
+    _watch(state)
+    if state.alarm is None and len(state.pieces) > LAG:
+        old = state.pieces[-LAG - 1]
+        _learn(state, old.block, old.residual)
+
+
+def _learn(state: State, block: Block, residual: Array) -> None:
+    """From a block of sound flight."""
+    colour.learn(state.colour, residual, block.follows)
+    known = state.held
+    weight = max(PERIOD / OFFSETS, 1.0 / (state.count or 1))
+    known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
+    known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
+
+
+def _renew(state: State) -> None:
+    """What is held, and how it could fail, from what has been learned."""
+    last = state.pieces[-1].block.time
+    held.ripen(state.held, last)
+    colour.settle(state.colour)
+    state.precision = held.precision(state.held, state.settings.slack)
+    state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held))
+
+
+def _watch(state: State) -> None:
+    """Look for a fault in the spans that are due."""
+    new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses)))
+    threshold = state.settings.threshold
+    for row, span in enumerate(SPANS):
+        if state.count % max(span // EVERY, 1) or span > len(state.pieces):
+            continue
+        over = stretch(state, span)
+        usual = state.usual[-span - 1][row] if span < len(state.usual) else new[row]
+        factors = _proven(state, over, usual, threshold)
+        if factors > threshold:
+            _alarm(state, over, usual)
+            return
+        share = max(span // EVERY, 1) * PERIOD / USUAL
+        new[row] += share * (np.minimum(statistics(state, over), OUTLIER) - new[row])
+    state.usual.append(new)
+
+
+def _proven(state: State, over: Stretch, usual: Array, threshold: float) -> float:
+    """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
+    found = weights(state, over, usual)
+    best = max(stuck_vanes(state, over).values(), default=0.0)
+    for place, weighed in enumerate(found):
+        if weighed.factor > threshold:
+            left = max(excess(state, over, place, weighed), float(usual[place]), 1.0)
+            ratio = max(float(usual[place]), 1.0) / left
+            best = max(best, weighed.factor * ratio)
+    return best
+
+
+def _alarm(state: State, over: Stretch, usual: Array) -> None:
+    """Something has failed."""
+    now, earliest = over.pieces[-1].block.time, state.pieces[-min(len(state.pieces), LAG)].block.time - PERIOD
+    state.alarm = Alarm(now, earliest, earliest, usual)
+    _follow(state, state.alarm)
+
+
+def _follow(state: State, alarm: Alarm) -> None:
+    """Weigh what has come since the onset; end the alarm where the last seconds speak of nothing."""
+    now = state.pieces[-1].block.time
+    if now - alarm.found <= DATED:
+        alarm.since = _onset(state, alarm)
+    over = stretch(state, max(_since(state, alarm.since), LEAST))
+    found = explained(state, over, alarm.usual)
+    vanes = stuck_vanes(state, over)
+    factors = np.array([*(w.factor for w in found), *vanes.values()])
+    place = int(np.argmax(factors))
+    times = Found(min(alarm.since, alarm.found), alarm.found, float(1.0 / np.exp(factors - factors[place]).sum()))
+    if place < len(found):
+        state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
+    else:
+        state.fault = Fault(VANE_STUCK, list(vanes)[place - len(found)], *(math.nan,) * 3, "", *times)
+    if now - alarm.found > LAG * PERIOD and _over(state, place, alarm):
+        state.alarm = state.fault = None
+        state.pieces.clear()
+        state.usual.clear()
+
+
+def _since(state: State, time: float) -> int:
+    """Blocks since a time (s)."""
+    return sum(piece.block.time > time + 0.5 * PERIOD for piece in state.pieces)
+
+
+def _onset(state: State, alarm: Alarm) -> float:
+    """Since when (s): the likelihood's maximum over the onset, of a hypothesis that explains what came then.
+
+    One with much freedom explains the moment of the change, too, and so sets in too early: of the hypotheses that
+    explain much, the earliest onset counts from which on little is left to be explained.
+    """
+    # the filter's memory of the blocks before the change ends shortly after it: none sets in later than that
+    latest = max(_since(state, alarm.found) - ORDER - 1, LEAST)
+    counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
+    spans = stretches(state, counts)
+    factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
+    much = factors.max(axis=0) > MUCH * factors.max()
+    best = sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True)
+    left = [_left(state, spans[i], alarm.usual) for i in best]
+    chosen = next(i for i, rest in zip(best, left, strict=True) if rest <= LITTLE * min(left))
+    return state.pieces[-counts[chosen]].block.time - PERIOD
+
+
+def _left(state: State, over: Stretch, usual: Array) -> float:
+    """The least of the variance that a hypothesis leaves."""
+    return min(excess(state, over, place, weighed) for place, weighed in enumerate(weights(state, over, usual)))
+
+
+def _over(state: State, place: int, alarm: Alarm) -> bool:
+    """Whether the last seconds speak against the fault."""
+    over = stretch(state, LAG)
+    factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over).values()]
+    return factors[place] < 0.0

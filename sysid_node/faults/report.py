@@ -1,0 +1,62 @@
+"""From the hypothesis that explains most to a fault in words and numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.faults.evidence import Weighed
+from sysid_node.faults.hypotheses import Hypothesis
+from sysid_node.faults.terms import Terms
+from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, Change, Fault
+
+Array = NDArray[np.float64]
+
+WIDE = 1.96
+AT_LIMIT = 0.9  # share of its travel beyond which a stuck surface is hard over
+SURE = 3.0  # standard errors beyond which a derivative has changed for sure
+
+
+class Found(NamedTuple):
+    """Times (s) of onset and alarm, and the probability among all hypotheses."""
+
+    since: float
+    found: float
+    probability: float
+
+
+def fault_of(hypothesis: Hypothesis, weighed: Weighed, terms: Terms, found: Found) -> Fault:
+    """The fault that a hypothesis stands for, as it was weighed."""
+    kind, part, freely = hypothesis.kind, hypothesis.part, weighed.size.size == 1
+    if kind == DAMAGE or not freely:
+        changes = _changes(hypothesis, weighed, terms)
+        return Fault(kind, part, math.nan, math.nan, math.nan, "", *found, changes)
+    middle, wide = float(weighed.size[0]), WIDE * math.sqrt(float(weighed.covariance[0, 0]))
+    ends = [_said(kind, x) for x in (middle, middle - wide, middle + wide)]
+    unit = "1" if kind in (LOSS, AIRSPEED) else "rad"
+    if kind == STUCK and abs(middle) >= AT_LIMIT * hypothesis.limit:
+        kind = HARD_OVER
+    return Fault(kind, part, ends[0], min(ends[1:]), max(ends[1:]), unit, *found)
+
+
+def _said(kind: str, size: float) -> float:
+    """What is reported: of an airspeed by what share it reads wrong, of a vane how far off it reads."""
+    if kind == AIRSPEED:
+        return 1.0 / math.sqrt(max(1.0 + size, 0.01)) - 1.0
+    return -size if kind == VANE_OFFSET else size
+
+
+def _changes(hypothesis: Hypothesis, weighed: Weighed, terms: Terms) -> tuple[Change, ...]:
+    """The derivatives that have changed for sure, the surest first."""
+    errors = np.sqrt(np.diag(weighed.covariance))
+    which = np.flatnonzero(hypothesis.shift.free.any(axis=1))
+    sureness = np.abs(weighed.size) / errors
+    return tuple(
+        Change(terms.names[which[i]], float(size), float(size - WIDE * error), float(size + WIDE * error))
+        for i in np.argsort(-sureness).tolist()
+        for size, error in [(weighed.size[i], errors[i])]
+        if sureness[i] > SURE
+    )

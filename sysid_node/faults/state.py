@@ -1,0 +1,66 @@
+"""What the fault monitor remembers."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.faults.blocks import Block, Blocks
+from sysid_node.faults.colour import ORDER, Colour
+from sysid_node.faults.held import Held
+from sysid_node.faults.hypotheses import Hypothesis
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.terms import Terms
+from sysid_node.faults.types import Fault
+
+Array = NDArray[np.float64]
+
+SPANS = (5, 10, 20, 40, 80)  # blocks looked back over
+LAG = SPANS[-1]  # blocks that must have shown nothing before what is older is learned
+LONGEST = 200  # blocks of a fault that are weighed
+
+
+class Piece(NamedTuple):
+    """A block against the held model."""
+
+    block: Block
+    residual: Array  # (6,) without the learned offsets
+    design: Array  # (6, D) whitened
+    whitened: Array  # (6,) residual
+    J: Array  # (D, D)
+    v: Array  # (D,)
+
+
+@dataclass
+class Alarm:
+    """A fault under way: when it was found, the earliest it can have begun, and since when it is taken to be (s)."""
+
+    found: float
+    earliest: float
+    since: float
+    usual: Array  # (H,) size of the statistics before it
+
+
+@dataclass
+class State:
+    """All that the monitor remembers."""
+
+    aircraft: Aircraft
+    settings: Settings
+    terms: Terms
+    blocks: Blocks
+    held: Held
+    colour: Colour
+    pieces: deque[Piece] = field(default_factory=lambda: deque(maxlen=LONGEST))
+    raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual
+    hypotheses: list[Hypothesis] = field(default_factory=list)
+    precision: Array = field(default_factory=lambda: np.empty(0))  # (D,)
+    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block
+    count: int = 0
+    alarm: Alarm | None = None
+    fault: Fault | None = None

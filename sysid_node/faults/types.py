@@ -1,0 +1,56 @@
+"""What the fault monitor says. SI, radians."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+#: Kinds of faults. The first five are of a surface, then of a sensor, then of the airframe.
+LOSS, STUCK, HARD_OVER, SHIFTED = "loss of effectiveness", "stuck surface", "hard-over", "surface shifted"
+NOT_FOLLOWING = "surface does not follow"
+AIRSPEED, VANE_OFFSET, VANE_STUCK, SILENT = "airspeed wrong", "vane offset", "vane stuck", "sensor silent"
+DAMAGE = "structural damage"
+
+
+class Change(NamedTuple):
+    """By how much a derivative has changed, with its 95 % interval."""
+
+    name: str
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault: what, of what, how much, since when (s of the samples' time), and how sure."""
+
+    kind: str
+    part: str  # elevator; airspeed, alpha, beta; longitudinal, lateral
+    size: float  # see ``unit``
+    lower: float  # 95 % interval of the size; NaN where it has none
+    upper: float
+    unit: str
+    since: float
+    found: float  # s, when it was found
+    probability: float  # among all hypotheses
+    changes: tuple[Change, ...] = ()  # of a damage: the derivatives that changed for sure, the surest first
+
+    @property
+    def text(self) -> str:
+        """In one line."""
+        words = f"{self.part}: {self.kind}"
+        if not math.isnan(self.size):
+            words += f", {_amount(self.size, self.unit)}"
+        if not math.isnan(self.lower):
+            words += f" ({_amount(self.lower, self.unit)} to {_amount(self.upper, self.unit)})"
+        if self.changes:
+            words += ", " + ", ".join(f"{c.name} {c.value:+.3g}" for c in self.changes[:3])
+        return words
+
+
+def _amount(value: float, unit: str) -> str:
+    if unit == "rad":
+        return f"{math.degrees(value):+.1f} deg"
+    return f"{100.0 * value:.0f} %" if unit == "1" else f"{value:.3g} {unit}".strip()

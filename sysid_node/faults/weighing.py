@@ -1,0 +1,108 @@
+"""All hypotheses over one stretch of flight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.faults import colour
+from sysid_node.faults.evidence import Weighed, marginal, statistic, weigh, weigh_loosely
+from sysid_node.faults.state import Piece, State
+from sysid_node.faults.vanes import stuck_factor
+from sysid_node.online.signals import OFFSET
+
+Array = NDArray[np.float64]
+
+#: Vanes: column of a block's air data, and the coefficient that tells their angle.
+VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index("CY"))}
+
+
+LOOSE = 0.1  # share by which a fault may differ from its hypothesis
+
+
+class Stretch(NamedTuple):
+    """The last blocks, what they sum up to, and that without what the held model's errors allow; see ``evidence``."""
+
+    pieces: Sequence[Piece]
+    whole: tuple[Array, Array]
+    J: Array
+    v: Array
+
+
+def stretch(state: State, count: int) -> Stretch:
+    """The last ``count`` blocks."""
+    pieces = list(islice(state.pieces, len(state.pieces) - count, None))
+    J = np.sum([piece.J for piece in pieces], axis=0)
+    v = np.sum([piece.v for piece in pieces], axis=0)
+    return Stretch(pieces, (J, v), *marginal(J, v, state.precision))
+
+
+def stretches(state: State, counts: Sequence[int]) -> list[Stretch]:
+    """As many as there are counts, which rise by one."""
+    first = stretch(state, counts[0])
+    found, (J, v) = [first], first.whole
+    for count in counts[1:]:
+        piece = state.pieces[-count]
+        J, v = J + piece.J, v + piece.v
+        found.append(Stretch([piece, *found[-1].pieces], (J, v), *marginal(J, v, state.precision)))
+    return found
+
+
+def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
+    """Each hypothesis with what it leaves out (``evidence.weigh_loosely``), by the variance that the best leaves."""
+    first = weights(state, over, usual)
+    best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
+    scale = max(float(usual.max()), best, 1.0)
+    found = []
+    for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
+        moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
+        found.append(weigh_loosely(*over.whole, hypothesis.shift, state.precision, LOOSE * moved, scale))
+    return found
+
+
+def statistics(state: State, over: Stretch) -> Array:
+    """(H,) of each hypothesis; see ``evidence.statistic``."""
+    return np.array([statistic(over.J, over.v, h.shift) for h in state.hypotheses])
+
+
+def weights(state: State, over: Stretch, usual: Array) -> list[Weighed]:
+    """Each hypothesis; ``usual`` (H,) is the size of its statistic where nothing has failed."""
+    return [
+        weigh(over.J, over.v, h.shift, max(float(u), 1.0))
+        for h, u in zip(state.hypotheses, usual.tolist(), strict=True)
+    ]
+
+
+def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
+    """The residuals' variance that a hypothesis leaves, over the usual one: air may have become rougher, too.
+
+    The largest of the six coefficients'.
+    """
+    shift = state.hypotheses[place].shift
+    moved = shift.fixed + shift.free @ weighed.size
+    left = np.array([piece.whitened - piece.design @ moved for piece in over.pieces])
+    return float((left**2).mean(axis=0).max())
+
+
+def stuck_vanes(state: State, over: Stretch) -> dict[str, float]:
+    """Logarithms of the Bayes factors of jammed vanes."""
+    found = {}
+    for vane, (column, output) in VANES.items():
+        terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
+        if not terms.size:
+            found[vane] = 0.0
+            continue
+        slope = float(state.held.values[terms[0]])
+        read = np.array([piece.block.air[column] for piece in over.pieces])
+        off = [(p.residual[output] / p.block.regressors[OFFSET] - state.held.offsets[output]) for p in over.pieces]
+        asked = read + np.array(off) / slope
+        samples = np.mean([piece.block.samples for piece in over.pieces])
+        noise = state.aircraft.noise[vane] ** 2 / float(samples)
+        difference = float(colour.scale(state.colour)[output] / slope) ** 2
+        found[vane] = stuck_factor(read, asked, state.colour.filter[:, output], noise, difference)
+    return found

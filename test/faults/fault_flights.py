@@ -1,0 +1,79 @@
+"""Made-up flights of a known aircraft: blocks whose residuals are coloured noise, and faults put into them.
+
+The truth is the aircraft file: k C = k (C_0 + C_alpha alpha + ...) holds exactly but for the noise, so that what a
+monitor finds can be compared with what was put in.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.faults import monitor
+from sysid_node.faults.blocks import PERIOD, Block
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.state import State
+from sysid_node.faults.types import Fault
+from sysid_node.online.signals import OFFSET, OUTPUTS
+
+Array = NDArray[np.float64]
+
+AIRCRAFT = load_aircraft("cdrw")
+NOISE = np.array([0.008, 0.002, 0.002, 0.0015, 0.0015, 0.0008])  # of the coefficients, in a block
+MEMORY = 0.6  # share of the noise that the next block keeps
+SIZES = {"alpha": 0.03, "beta": 0.03, "p": 0.03, "q": 0.004, "r": 0.01, "de": 0.03, "da": 0.03, "dr": 0.05}
+TRIM = {"alpha": 0.07, "de": 0.01}
+Truth = Callable[[dict[str, float], dict[str, float]], tuple[dict[str, float], dict[str, float]]]
+
+
+def sound(values: dict[str, float], signals: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """Derivatives and regressors that make the forces, of the file's and the measured ones: the same."""
+    return values, signals
+
+
+class Maker:
+    """Makes blocks, one after the other; noise and motion are first-order autoregressions."""
+
+    def __init__(self, seed: int, names: tuple[str, ...]) -> None:
+        self.random = np.random.default_rng(seed)
+        self.names = names
+        self.count = 0
+        self.noise = np.zeros(6)
+        self.motion = dict.fromkeys(SIZES, 0.0)
+        self.values = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
+
+    def block(self, truth: Truth = sound, rough: float = 1.0) -> Block:
+        """The next one; ``rough`` times the noise."""
+        self.count += 1
+        fresh = self.random.standard_normal(6) * NOISE * rough * np.sqrt(1.0 - MEMORY**2)
+        self.noise = MEMORY * self.noise + fresh
+        for name, size in SIZES.items():
+            self.motion[name] = 0.85 * self.motion[name] + size * 0.53 * self.random.standard_normal()
+        measured = {name: self.motion[name] + TRIM.get(name, 0.0) for name in SIZES} | {"0": 1.0}
+        values, signals = truth(self.values, dict(measured))
+        outputs = self.noise.copy()
+        for name, value in values.items():
+            c, _, r = name.partition("_")
+            outputs[COEFFICIENTS.index(c)] += value * signals[r]
+        row = np.zeros(len(self.names))
+        for name, value in measured.items():
+            row[OFFSET if name == "0" else self.names.index(name)] = value
+        row[:OUTPUTS] = outputs
+        air = np.array([18.0, measured["alpha"], measured["beta"]])
+        return Block(PERIOD * self.count, outputs, row, air, 20, self.count > 1)
+
+
+def monitored(seed: int, **settings: float) -> tuple[State, Maker]:
+    """A monitor that knows the derivatives to 2 %, and a maker of flights."""
+    state = monitor.init(AIRCRAFT, Settings(**settings))
+    state.held.errors = 0.02 * np.abs(state.held.values) + 1e-5
+    return state, Maker(seed, state.blocks.layout.names)
+
+
+def fly(state: State, maker: Maker, seconds: float, truth: Truth = sound, rough: float = 1.0) -> Fault | None:
+    """Fly on for so long; what is wrong at the end."""
+    for _ in range(round(seconds / PERIOD)):
+        monitor.take(state, maker.block(truth, rough))
+    return state.fault

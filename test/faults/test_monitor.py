@@ -1,0 +1,173 @@
+"""What the fault monitor finds is what was put into the flight (``fault_flights``), and nothing where nothing was."""
+
+import math
+
+import numpy as np
+import pytest
+from fault_flights import AIRCRAFT, Truth, fly, monitored
+
+from sysid_node.errors import InputError
+from sysid_node.faults import monitor
+from sysid_node.faults.held import Known
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, VANE_STUCK
+
+ONSET = 40.0  # s
+
+
+def lost(symbol: str, share: float) -> Truth:
+    """A surface has lost a share of its effect."""
+    return lambda d, x: (d, x | {symbol: (1.0 - share) * x[symbol]})
+
+
+def stuck(symbol: str, angle: float) -> Truth:
+    """A surface stands at an angle, and its commands are all that is known of it."""
+    return lambda d, x: (d, x | {symbol: angle})
+
+
+def read_off(angle: str, by: float) -> Truth:
+    """A vane reads too much; lift and drag, made of what it reads, are turned by as much."""
+
+    def truth(d: dict[str, float], x: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+        true = x | {angle: x[angle] - by}
+        if angle == "beta":
+            return d, true
+        turned = {f"CD_{r}": d[f"CD_{r}"] + by * d[f"CL_{r}"] for r in ("0", "alpha", "q", "de")}
+        turned |= {f"CL_{r}": d[f"CL_{r}"] - by * d[f"CD_{r}"] for r in ("0", "alpha", "q", "de")}
+        return d | turned, true
+
+    return truth
+
+
+def slow(error: float) -> Truth:
+    """The airspeed reads off by a share: dynamic pressure is another, non-dimensional rates are larger by one power."""
+    scale = 1.0 / (1.0 + error)
+
+    def truth(d: dict[str, float], x: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+        return d, {name: value * (scale if name in "pqr" else scale**2) for name, value in x.items()}
+
+    return truth
+
+
+def damaged(d: dict[str, float], x: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """Half the pitch damping and a third of the pitch stiffness are gone."""
+    return d | {"Cm_q": 0.5 * d["Cm_q"], "Cm_alpha": 0.65 * d["Cm_alpha"]}, x
+
+
+@pytest.mark.parametrize(
+    ("truth", "kind", "part", "size"),
+    [
+        (lost("de", 0.5), LOSS, "elevator", 0.5),
+        (lost("da", 0.4), LOSS, "aileron", 0.4),
+        (lost("dr", 0.6), LOSS, "rudder", 0.6),
+        (stuck("de", 0.05), STUCK, "elevator", 0.05),
+        (stuck("da", -0.1), STUCK, "aileron", -0.1),
+        (stuck("dr", 0.34), HARD_OVER, "rudder", 0.34),
+        (slow(-0.2), AIRSPEED, "airspeed", -0.2),
+        (read_off("alpha", 0.04), VANE_OFFSET, "alpha", 0.04),
+        (read_off("beta", -0.06), VANE_OFFSET, "beta", -0.06),
+    ],
+)
+def test_which_how_much_and_since_when(truth: Truth, kind: str, part: str, size: float) -> None:
+    state, maker = monitored(seed=3)
+    assert fly(state, maker, ONSET) is None
+    fault = fly(state, maker, 8.0, truth)
+    assert fault is not None
+    assert (fault.kind, fault.part) == (kind, part), fault.text
+    assert fault.lower <= size <= fault.upper, fault.text
+    assert fault.size == pytest.approx(size, rel=0.2)
+    assert ONSET - 0.5 <= fault.since <= ONSET + 3.0
+    assert fault.since <= fault.found
+
+
+def test_damage_names_the_derivatives_that_changed() -> None:
+    state, maker = monitored(seed=4)
+    fly(state, maker, ONSET)
+    fault = fly(state, maker, 12.0, damaged)
+    assert fault is not None
+    assert (fault.kind, fault.part) == (DAMAGE, "longitudinal")
+    assert "Cm_alpha" in [change.name for change in fault.changes]
+    change = next(change for change in fault.changes if change.name == "Cm_alpha")
+    assert change.lower <= -0.35 * AIRCRAFT.derivatives["Cm_alpha"].value <= change.upper
+
+
+def test_a_jammed_vane() -> None:
+    """It reads a constant with its noise while lift says that the angle varies."""
+    state, maker = monitored(seed=5)
+    fly(state, maker, ONSET)
+    column = maker.names.index("alpha")
+    for _ in range(80):
+        block = maker.block()
+        read = 0.07 + 0.001 * maker.random.standard_normal()
+        row, air = block.regressors.copy(), block.air.copy()
+        row[column] = air[1] = read
+        monitor.take(state, block._replace(regressors=row, air=air))
+    assert state.fault is not None
+    assert (state.fault.kind, state.fault.part) == (VANE_STUCK, "alpha"), state.fault.text
+
+
+def test_nothing_is_found_where_nothing_failed() -> None:
+    """Five minutes; by chance one in hundreds of such flights may raise an alarm (``false_alarms``)."""
+    state, maker = monitored(seed=1)
+    for _ in range(30):
+        assert fly(state, maker, 10.0) is None
+
+
+def test_rougher_air_is_no_fault() -> None:
+    state, maker = monitored(seed=6)
+    fly(state, maker, 60.0)
+    for _ in range(3):
+        assert fly(state, maker, 10.0, rough=3.0) is None
+
+
+def test_the_alarm_ends_with_the_fault() -> None:
+    state, maker = monitored(seed=7)
+    fly(state, maker, ONSET)
+    assert fly(state, maker, 8.0, lost("de", 0.6)) is not None
+    assert fly(state, maker, 20.0) is None
+    assert fly(state, maker, 30.0, lost("de", 0.6)) is not None
+
+
+def test_a_gap_is_bridged_without_an_alarm() -> None:
+    state, maker = monitored(seed=8)
+    fly(state, maker, ONSET)
+    maker.count += 50
+    monitor.take(state, maker.block()._replace(follows=False))
+    assert fly(state, maker, 20.0) is None
+
+
+def test_the_last_good_derivatives_are_held() -> None:
+    """What the identifier says is taken up ten seconds later, and nothing that comes after an alarm."""
+    state, maker = monitored(seed=9)
+    fly(state, maker, ONSET)
+    place = state.terms.names.index("Cm_de")
+    monitor.hear(state, ONSET, {"Cm_de": Known(-0.47, 0.004, True), "CL_alpha": Known(9.9, 0.1, False)})
+    fly(state, maker, 12.0)
+    assert state.held.values[place] == -0.47
+    assert state.held.errors[place] == 0.004
+    assert state.held.values[state.terms.names.index("CL_alpha")] == AIRCRAFT.derivatives["CL_alpha"].value
+    fly(state, maker, 8.0, lost("de", 0.6))
+    monitor.hear(state, 60.0, {"Cm_de": Known(-0.19, 0.004, True)})
+    fly(state, maker, 20.0, lost("de", 0.6))
+    assert state.held.values[place] == -0.47
+
+
+def test_samples_of_another_rate_or_with_holes_are_averaged_alike() -> None:
+    """A steady turn: the means are the samples' values, whatever the rate; what lacks a value is left out."""
+    for rate in (50, 200):
+        state = monitor.init(AIRCRAFT, Settings())
+        sample = [0.1, 0.0, -9.8, 0.0, 0.02, 0.1, 18.0, 0.07, 0.0, 1.2, 5.0, 0.01, 0.01, 0.0, 0.0]
+        heard = []
+        for k in range(rate):
+            holed = [math.nan if k % 7 == 3 and i == 6 else x for i, x in enumerate(sample)]
+            block = monitor.blocks.add(state.blocks, k / rate, holed)
+            heard += [] if block is None else [block]
+        assert len(heard) >= 8
+        for block in heard:
+            np.testing.assert_allclose(block.air, [18.0, 0.07, 0.0], rtol=1e-12)
+            assert block.outputs[0] == pytest.approx(heard[0].outputs[0], rel=1e-12)
+
+
+def test_impossible_settings() -> None:
+    with pytest.raises(InputError, match="slack"):
+        Settings(slack=2.0)
