@@ -48,7 +48,7 @@ def _errors(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float
     fields = {k: v for k, v in label.items() if k in Case.__dataclass_fields__}
     plant = Plant(Case(**fields), which)
     truth = _flown(plant, plant.truth, label["effects"])
-    effects = _effects((case / "out" / "effects.txt").read_text(encoding="utf-8"))
+    effects = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     try:
         corrected = load_aircraft(str(case / "out" / "corrected.yaml"))
         before = _flown(plant, load_aircraft(str(case / "aircraft.yaml")), {})
@@ -78,7 +78,7 @@ def _apart(model: Array, truth: Array) -> float:
     return float(np.sqrt(np.mean(off / np.mean(windows(truth) ** 2, axis=(0, 1)))))
 
 
-def _effects(text: str) -> dict[str, dict[str, float]]:
+def effects_of(text: str) -> dict[str, dict[str, float]]:
     """Of the lines ``--effect name:key=value:...`` of effects.txt, in the plant's words."""
     found: dict[str, dict[str, float]] = {}
     for line in text.splitlines():

@@ -58,11 +58,11 @@ class Plant:
         return Rigid(self.flown_by, effects, RATE)
 
     def fly(self, effects: Effects, flight: int) -> Log:
-        """The flight that is fitted (0) or held out (1). Raises DivergedError."""
+        """The flight that is fitted (0), held out (1), or a further one like it in other air. Raises DivergedError."""
         airframe = self.airframe(effects)
         random = np.random.default_rng([SETS[self.which], self.case.seed, 1 + flight])
         air, own = random.spawn(2)
-        plan = parse_manoeuvre(self.case.manoeuvres[flight], _with_thrust(self.truth), RATE, SECONDS)
+        plan = parse_manoeuvre(self.case.manoeuvres[min(flight, 1)], _with_thrust(self.truth), RATE, SECONDS)
         planned = {n: plan.deflections[n] for n in airframe.controls}
         planned["thrust"] = plan.deflections["throttle"] * _thrust_unit(self.truth)
         highest = _thrust_unit(self.truth)

@@ -7,6 +7,7 @@ matters; then a backward check. Significant is not enough: a clock's odd millise
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -19,16 +20,15 @@ from sysid_node.gap.candidates import PER_CONTROL, TIMES, Candidate, bounds, can
 from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, with_candidates
 from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.onset import sought
 from sysid_node.gap.spectra import power_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.structure import Structure, instrumented, structure_of
 from sysid_node.gap.view import View
 
-#: Effects at once, at most.
-MOST = 3
-
-#: Candidates that are fitted to the end after a first look at all.
-_POLISHED = 6
+#: For the first, second and third effect: explanations that it is tried upon (the best single one need not belong to
+#: the best pair), and candidates that are fitted to the end upon each after a first look at all.
+_STAGES = ((1, 6), (3, 4), (1, 4))
 
 #: Probability, against doing without, from which an effect is accepted.
 _SURE = 0.95
@@ -111,17 +111,16 @@ def attribute(
     candidates, trier = candidates_of(views[0].simulator, views), Trier(nuisances, steps or Steps())
     progress(0.0, "derivatives within their tolerances")
     base = trier.trial(blank(views, nuisances), [])
-    chosen, stages = base, []
-    for count in range(MOST):
-        rest = [c for c in candidates if c.effect not in chosen.fit.effects]
-        looks = trier.looks(chosen, rest, _share_of(progress, count))
-        trials = trier.finish(chosen, looks[:_POLISHED], _share_of(progress, count))
-        candidates = _narrowed(candidates, looks)
-        stages.append(trials)
-        better = [t for t in trials if accepted(base, chosen, t)]
+    chosen, stages, frontier = base, [], [base]
+    for count, (width, most) in enumerate(_STAGES):
+        looks = trier.looks_upon(frontier[:width], candidates, _share_of(progress, count))
+        tried = trier.finish(_likeliest(looks, most), _share_of(progress, count))
+        candidates = _narrowed(candidates, [look for _, look in looks])
+        stages.append([trial for _, trial in tried])
+        better = [t for upon, t in tried if accepted(base, upon, t) and _likelier(t, chosen)]
         if not better:
             break
-        chosen = better[0]
+        chosen, frontier = better[0], better
     progress(0.8, "whether another effect would do as well")
     chosen, places = _refined(trier, base, chosen, stages)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
@@ -132,7 +131,7 @@ def attribute(
 
 def _share_of(progress: Progress, count: int) -> Progress:
     """Progress of one of the stages as that of all."""
-    return lambda share, text: progress((count + share) / (MOST + 1.0), text)
+    return lambda share, text: progress((count + share) / (len(_STAGES) + 1.0), text)
 
 
 @dataclass(frozen=True)
@@ -147,6 +146,8 @@ class Trier:
         _, added, start = look or (0.0, None, ())
         wanted = [*candidates, *([added] if added else [])]
         done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
+        if added is not None and (moved := sought(done, added)) is not done:
+            done = self.steps.polished(moved)
         return Trial(done, cross_validated(done), added)
 
     def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
@@ -165,23 +166,50 @@ class Trier:
         found = [(table[c.label][0], c, tuple(table[c.label][1:])) for c in candidates if c.label in table]
         return sorted(found, key=lambda look: look[0])
 
+    def looks_upon(
+        self, frontier: Sequence[Trial], candidates: Sequence[Candidate], progress: Progress
+    ) -> list[tuple[Trial, Look]]:
+        """First looks at each upon each of several explanations, the best first; every set of effects once."""
+        found: list[tuple[Trial, Look]] = []
+        for i, current in enumerate(frontier):
+            rest = [c for c in candidates if c.effect not in current.fit.effects]
+            part = lambda share, text, i=i: progress((i + share) / len(frontier), text)  # noqa: E731
+            found += [(current, look) for look in self.looks(current, rest, part)]
+        best: dict[frozenset[str], tuple[Trial, Look]] = {}
+        for current, look in sorted(found, key=lambda pair: pair[1][0]):
+            labels = frozenset({look[1].label, *(c.label for c in current.fit.candidates)})
+            best.setdefault(labels, (current, look))
+        return list(best.values())
+
     def beside(self, chosen: Trial, rival: Candidate) -> Trial:
         """A rival added to what was chosen."""
-        return self.finish(chosen, self.looks(chosen, [rival], lambda s, t: None), lambda s, t: None)[0]
+        (look,) = self.looks(chosen, [rival], lambda s, t: None)
+        return self.trial(chosen.fit, chosen.fit.candidates, look)
 
-    def finish(self, current: Trial, looks: Sequence[Look], progress: Progress) -> list[Trial]:
-        """What was looked at upon what is known so far, fitted to the end; the most probable first."""
+    def finish(self, looks: Sequence[tuple[Trial, Look]], progress: Progress) -> list[tuple[Trial, Trial]]:
+        """What was looked at, fitted to the end, after what it was looked at upon; the most probable first."""
         trials = _spread(
-            lambda look: self.trial(current.fit, current.fit.candidates, look),
+            lambda pair: (pair[0], self.trial(pair[0].fit, pair[0].fit.candidates, pair[1])),
             looks,
             lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
         )
-        return sorted(trials, key=lambda t: -t.evidence.total)
+        return sorted(trials, key=lambda pair: -pair[1].evidence.total)
+
+
+def _likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Trial, Look]]:
+    """The best looks upon each explanation."""
+    seen: Counter[int] = Counter()
+    kept = []
+    for current, look in looks:
+        seen[id(current)] += 1
+        if seen[id(current)] <= most:
+            kept.append((current, look))
+    return kept
 
 
 def _narrowed(candidates: Sequence[Candidate], looks: Sequence[Look]) -> list[Candidate]:
     """The candidates with one start each where it is the onset that they differ in: looking at all again costs most."""
-    best = {candidate.label: start for _, candidate, start in looks}
+    best = {candidate.label: start for _, candidate, start in reversed(looks)}
     return [
         replace(c, starts=(best[c.label],)) if c.effect in PER_CONTROL and c.label in best else c for c in candidates
     ]
@@ -199,16 +227,20 @@ def _spread(
     return done
 
 
+def _likelier(trial: Trial, other: Trial) -> bool:
+    """Whether a trial predicts better than another, beyond doubt."""
+    return bool(probabilities([trial.evidence.scores, other.evidence.scores])[0] > _SURE)
+
+
 def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter."""
-    sure = probabilities([trial.evidence.scores, without.evidence.scores])[0] > _SURE
-    if _trifling(trial):
+    if _trifling(trial) or not _likelier(trial, without):
         return False
     left, now = power_left(without.evidence), power_left(trial.evidence)
     motion = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views)
     gone = left - now
     matters = (gone > MATERIAL * left) & (gone > NOTICED**2 * motion)
-    if not (sure and matters.any()):
+    if not matters.any():
         return False
     share = _power_lacking(base, without, trial) - now
     return bool(np.any(matters & (share > MATERIAL_OF_ALL * power_left(base.evidence))))
@@ -220,7 +252,7 @@ def _power_lacking(base: Trial, without: Trial, trial: Trial) -> Array:
     The others would bend to hold its share: a lag twice as long for an engine half as strong. Nuisances do their best.
     """
     kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
-    lacking = with_candidates(trial.fit, kept, base.fit.nuisances, ())
+    lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
     points = Projected(lacking).points(lacking.values)
     return np.asarray(sum(power_of(v.residual(p)) for v, p in zip(lacking.views, points, strict=True)))
 
@@ -296,8 +328,8 @@ def _place(
         return Place(candidate, base, tuple(first))
     without = trier.trial(chosen.fit, others)
     rest = [c for c in pool if c.effect not in without.fit.effects]
-    looks = trier.looks(without, rest, lambda s, t: None)
-    return Place(candidate, without, tuple(trier.finish(without, looks[:_RIVALS], lambda s, t: None)))
+    looks = trier.looks_upon([without], rest, lambda s, t: None)
+    return Place(candidate, without, tuple(t for _, t in trier.finish(looks[:_RIVALS], lambda s, t: None)))
 
 
 def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial | None:

@@ -1,0 +1,91 @@
+"""Whether the stated interval of the shrinkage covers: `python -m withheld.covering SET SEED FOLDER`.
+
+The shrinkage that the diagnosis states is measured on flights that it has not seen, flown by the plant in other gusts
+with other noise: as the file has it, as corrected, and as the truth would have it, which is what cannot be closed.
+Only for plants and effects that the simulator can fly as they are. Writes ``FOLDER/SEED/covered.json``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.bag_writer import write_streams
+from sysid_node.gap.flights import RATE as ANALYSIS_RATE
+from sysid_node.gap.flights import load_flight
+from sysid_node.gap.spectra import power_of
+from sysid_node.gap.view import CHANNELS, View, view_of
+from sysid_node.sim import Simulator
+
+from .closing import effects_of
+from .drawing import Case
+from .instruments import SUITES, readings, record
+from .plant import Plant
+
+Array = NDArray[np.float64]
+
+#: Numbers of the flights that are flown for this: after the one fitted and the one held out.
+_FLIGHTS = (2, 3, 4)
+
+
+def main(which: str, seed: int, folder: Path) -> None:
+    """Flies, compares and writes."""
+    case = folder / str(seed)
+    label = json.loads((folder / "labels" / f"{seed}.json").read_text(encoding="utf-8"))
+    said = json.loads((case / "out" / "gap.json").read_text(encoding="utf-8"))
+    plant = Plant(Case(**{k: v for k, v in label.items() if k in Case.__dataclass_fields__}), which)
+    aircraft = load_aircraft(str(case / "aircraft.yaml"))
+    simulator = Simulator(aircraft, ANALYSIS_RATE)
+    views = [_view(plant, simulator, flight, label["effects"]) for flight in _FLIGHTS]
+    corrected = load_aircraft(str(case / "out" / "corrected.yaml"))
+    found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
+    points = {
+        "before": simulator.neutral(),
+        "after": _vector(simulator, corrected, found),
+        "truth": _vector(simulator, plant.truth, label["effects"]),
+    }
+    counted = [CHANNELS.index(name) for name in said["gap"]["per_channel"]]
+    errors = {name: _error(views, point, counted) for name, point in points.items()}
+    before, after, truth = errors.values()
+    shrink = 100.0 * (before - after) / (before - truth) if before > truth else 0.0
+    (case / "covered.json").write_text(json.dumps({**errors, "shrink_percent": shrink}), encoding="utf-8")
+
+
+def _view(plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str, Mapping[str, float]]) -> View:
+    """Another flight of the plant, through its instruments and a bag, as the diagnosis sees flights."""
+    case, log = plant.case, plant.fly(effects, flight)
+    random = np.random.default_rng([case.seed, flight])
+    seen = readings(log, plant.truth, effects)
+    streams = record(log, seen, plant.truth, effects, SUITES[case.suite], case.noise, random)
+    with tempfile.TemporaryDirectory() as folder:
+        write_streams(Path(folder) / "flight", streams)
+        return view_of(simulator, load_flight(Path(folder) / "flight", simulator.aircraft, None, "flu"))
+
+
+def _vector(simulator: Simulator, aircraft: Aircraft, effects: Mapping[str, Mapping[str, float]]) -> Array:
+    """The parameters by which the believed aircraft becomes another, with these effects."""
+    theta = simulator.vector({n: v for n, v in effects.items() if n != "derivative_error"})
+    known = simulator.aircraft.derivatives
+    for name, derivative in aircraft.derivatives.items():
+        off = effects.get("derivative_error", {}).get(name, 0.0)
+        theta[simulator.names.index(f"derivative_error.{name}")] = derivative.value + off - known[name].value
+    return np.asarray(theta)
+
+
+def _error(views: Sequence[View], point: Array, counted: Sequence[int]) -> float:
+    """Root-mean-square error as a share of the motion, as the diagnosis measures it (``sysid_node.gap.close``)."""
+    left = sum(power_of(view.residual(point)) for view in views)
+    motion = sum((np.abs(view.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for view in views)
+    return float(np.sqrt(np.mean((left / motion)[list(counted)])))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))
