@@ -24,17 +24,24 @@ _MOVED = 4.0
 _DRAWS = 2000
 
 
+#: The errors of a gap, in order.
+STAGES = ("before", "tolerances", "after", "noise_floor")
+
+Interval = tuple[float, float]
+
+
 @dataclass(frozen=True)
 class Gap:
-    """Root-mean-square errors as shares of what was measured, overall and by channel."""
+    """Root-mean-square errors as shares of what was measured, overall and by channel, with 95 % intervals."""
 
     before: float
     tolerances: float  # with derivatives and biases fitted within their tolerances, no effect
     after: float
     noise_floor: float
     shrink_percent: float
-    ci95: tuple[float, float]
+    ci95: Interval  # of the shrinkage
     per_channel: dict[str, dict[str, float]]
+    intervals: dict[str, Interval]  # of the four errors, by name
 
 
 def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, after: Evidence, left: Structure) -> Gap:
@@ -54,30 +61,47 @@ def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, aft
 
     all_equal, structured = np.ones(len(groups)), np.clip(left.share, 0.0, 1.0)
     overall = errors(all_equal, structured)
-    shrinks = _shrinks(errors, left, len(groups))
+    drawn = _bootstrap(errors, left, len(groups))
     floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - structured)), np.minimum(stages[0], stages[1]))
     table = np.stack([*stages, floor])
     own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
-    names = ("before", "tolerances", "after", "noise_floor")
-    channels = {c: dict(zip(names, own[:, k].tolist(), strict=True)) for k, c in enumerate(CHANNELS) if counted[k]}
-    low, high = np.percentile(shrinks, [2.5, 97.5]).tolist()
-    before_, fitted, after_, floor_ = overall.tolist()
-    return Gap(before_, fitted, after_, floor_, _shrink(overall), (low, high), channels)
+    channels = {c: dict(zip(STAGES, own[:, k].tolist(), strict=True)) for k, c in enumerate(CHANNELS) if counted[k]}
+    return gap_from(overall, drawn, channels)
 
 
-def _shrinks(errors: Callable[[Array, Array], Array], left: Structure, groups: int) -> list[float]:
-    """Shrinkage in bootstraps of the groups, the structure left as uncertain as chance makes it."""
+def gap_from(overall: Array, drawn: Array, channels: dict[str, dict[str, float]]) -> Gap:
+    """Of the errors (4,), draws (D, 4) of these, and those of each channel."""
+    values = dict(zip(STAGES, overall.tolist(), strict=True))
+    intervals = {name: interval(drawn[:, k]) for k, name in enumerate(STAGES)}
+    shrink = float(shrinkage(overall))
+    return Gap(**values, shrink_percent=shrink, ci95=interval(shrinkage(drawn)), per_channel=channels,
+               intervals=intervals)  # fmt: skip
+
+
+def interval(drawn: Array) -> Interval:
+    """95 % of draws (D,)."""
+    low, high = np.percentile(drawn, [2.5, 97.5]).tolist()
+    return low, high
+
+
+def _bootstrap(errors: Callable[[Array, Array], Array], left: Structure, groups: int) -> Array:
+    """Errors (D, 4) in bootstraps of the groups, the structure left as uncertain as chance makes it."""
     random = np.random.default_rng(0)
     draws = random.multinomial(groups, np.ones(groups) / groups, _DRAWS)
     shares = (left.deviations + random.standard_normal((_DRAWS, left.chance.size))) * left.chance
     shares = np.clip(shares / np.maximum(left.total, 1e-300), 0.0, 1.0)
-    return [_shrink(errors(d.astype(float), share)) for d, share in zip(draws, shares, strict=True)]
+    return np.array([errors(d.astype(float), share) for d, share in zip(draws, shares, strict=True)])
 
 
-def _shrink(errors: Array) -> float:
-    """Percent of what could be closed that is; nothing could where the gap is not above the floor."""
-    before, _, after, floor = errors.tolist()
-    return 100.0 * (before - after) / (before - floor) if before > floor * (1.0 + 1e-9) else 0.0
+def shrinkage(errors: Array) -> Array:
+    """Percent (...,) of what could be closed that is, of errors (..., 4).
+
+    Nothing could where the gap is not above the floor.
+    """
+    before, _, after, floor = np.moveaxis(errors, -1, 0)
+    room = before - floor
+    open_ = room > 1e-9 * floor
+    return np.asarray(np.where(open_, 100.0 * (before - after) / np.where(open_, room, 1.0), 0.0))
 
 
 def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:

@@ -15,6 +15,7 @@ from sysid_node.gap.close import Gap
 from sysid_node.gap.confusion import Confusion, confusion_of
 from sysid_node.gap.evidence import Evidence, carried
 from sysid_node.gap.flights import RATE, Flight
+from sysid_node.gap.flown import flown
 from sysid_node.gap.holdout import check
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.next_flight import advice
@@ -31,7 +32,8 @@ class Diagnosis:
 
     aircraft: Aircraft
     verdict: str
-    gap: Gap
+    gap: Gap  # of forces, moments and kinematics by frequency
+    flown: Gap | None  # of short flights
     where: list[dict[str, Any]]
     attribution: Attribution
     shape: Shape | None
@@ -42,6 +44,11 @@ class Diagnosis:
     held_out: bool
     confusion: Confusion
     air_motion: float  # rms of the air's motion across the flight path, m/s
+
+    @property
+    def size(self) -> Gap:
+        """The gap as it is told: of short flights, of forces and kinematics where the flight shows none."""
+        return self.flown or self.gap
 
 
 def diagnose(
@@ -75,12 +82,13 @@ def diagnose(
         attribution = attribution.as_filed()
         checked = checked.as_filed(attribution.left)
     verdict = verdict_of(views, attribution, checked)
-    progress(0.95, "what to fly next")
+    progress(0.95, "short flights beside the flight, and what to fly next")
     found = localise.where(attribution, [v.residual(simulator.neutral()) for v in views])
     air = max(gusts_of(v, carried(attribution.corrected, v)) for v in checked.views)
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(
-        aircraft, verdict, checked.gap, found, attribution, localise.missing(attribution), checked.views, checked.base,
-        checked.final, flight, bool(holdouts), confusion_of(attribution.base, attribution.trials), air,
+        aircraft, verdict, checked.gap, flown(checked.base, checked.final), found, attribution,
+        localise.missing(attribution), checked.views, checked.base, checked.final, flight, bool(holdouts),
+        confusion_of(attribution.base, attribution.trials), air,
     )  # fmt: skip

@@ -7,29 +7,27 @@ from typing import Any
 import numpy as np
 
 from sysid_node.gap.attribute import Cause
+from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.fit import Fit
+from sysid_node.gap.flown import WINDOW
 from sysid_node.gap.verdict import explained, named, probability, structured
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
     """The content of gap.json."""
-    gap, attribution = found.gap, found.attribution
+    attribution = found.attribution
     left = attribution.left
     return {
         "verdict": found.verdict,
         "aircraft": found.aircraft.name,
         "gap": {
-            "before": gap.before,
-            "tolerances": gap.tolerances,
-            "after": gap.after,
-            "noise_floor": gap.noise_floor,
-            "shrink_percent": gap.shrink_percent,
-            "ci95": list(gap.ci95),
-            "per_channel": gap.per_channel,
-            "window_s": found.views[0].windows.length,
+            **_gap(found.size),
+            "measured_by": "short_flights" if found.flown else "forces_and_kinematics",
+            "window_s": WINDOW if found.flown else found.views[0].windows.length,
             "held_out": found.held_out,
+            "forces_and_kinematics": {**_gap(found.gap), "window_s": found.views[0].windows.length},
         },
         "air_motion": found.air_motion if found.views[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
@@ -44,6 +42,19 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }
 
 
+def _gap(gap: Gap) -> dict[str, Any]:
+    return {
+        "before": gap.before,
+        "tolerances": gap.tolerances,
+        "after": gap.after,
+        "noise_floor": gap.noise_floor,
+        "shrink_percent": gap.shrink_percent,
+        "ci95": list(gap.ci95),
+        "intervals": {name: list(ends) for name, ends in gap.intervals.items()},
+        "per_channel": gap.per_channel,
+    }
+
+
 def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
     return {
         "effect": cause.candidate.effect,
@@ -51,7 +62,7 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "station": cause.candidate.station,
         "parameters": parameters(found.attribution.corrected, cause),
         "probability": probability(found.attribution, cause),
-        "gap_after": found.gap.after,
+        "gap_after": found.size.after,
         "indistinguishable_from": named(cause),
     }
 

@@ -1,0 +1,158 @@
+"""How far off the simulator is when it is flown beside the flight, and how far that shrinks: errors of short flights.
+
+Error of a reading: root mean square of simulated minus measured, over the root mean square of the measured motion about
+its mean in each short flight. Overall: the root mean square over the readings that moved. The noise floor is what a
+simulator with nothing wrong would leave (``unavoidable``). Intervals: block bootstrap over the short flights (Kuensch
+(1989), Annals of Statistics 17(3)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.close import STAGES, Gap, gap_from
+from sysid_node.gap.evidence import Evidence, groups_of
+from sysid_node.gap.kinematics import motion_of
+from sysid_node.gap.short_flights import Course, beside, course_of, off
+from sysid_node.gap.unavoidable import unavoidable
+from sysid_node.gap.view import View
+from sysid_node.sim.layout import OUTPUTS
+
+#: Length of a short flight, s: a short period or two of a small aircraft, over before drift counts.
+WINDOW = 2.0
+
+#: Readings that are compared: heading only repeats the yaw rate.
+READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
+
+_COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
+
+#: What a flight without lateral measurements shows.
+_LONGITUDINAL = frozenset({"ax", "az", "q", "theta", "V", "alpha"})
+
+#: A reading counts where it moved by so many times the power of its noise.
+_MOVED = 4.0
+
+#: Bootstrap draws, and short flights in a row that are drawn together.
+_DRAWS, _BLOCK = 2000, 2
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A flight and the simulator beside it, N samples: readings (N, 12), columns ``layout.OUTPUTS``."""
+
+    time: Array  # s
+    measured: Array
+    before: Array
+    after: Array
+    begins: NDArray[np.bool_]
+
+
+def flown(base: Evidence, final: Evidence) -> Gap | None:
+    """The gap on the flights of some evidence.
+
+    None without attitude, where no flight is long enough, or where the simulator departs within a short flight.
+    """
+    found = zip(final.views, base.points, final.points, strict=True)
+    tables = [_table(*parts) for parts in found if shows(parts[0])]
+    if not tables or not all(np.isfinite(table).all() for table in tables):
+        return None
+    motion, noise, *errors = np.concatenate(tables, axis=1)
+    lateral = all(view.flight.lateral for view in final.views)
+    counted = np.array([lateral or name in _LONGITUDINAL for name in READINGS])
+    counted &= motion.mean(axis=0) > _MOVED * noise.mean(axis=0)
+    if not counted.any():
+        return None
+    return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
+
+
+def shows(view: View) -> bool:
+    """Whether a flight can be flown beside: its attitude was measured, and it is long enough."""
+    return motion_of(view.record) is not None and len(view.record) >= _size(view)
+
+
+def drawn(view: View, points: Sequence[Array]) -> Drawn:
+    """A flight with the file's simulator and the corrected one beside it; ``points`` by group of windows."""
+    course, neutral = course_of(view, _size(view)), view.simulator.neutral()
+    _, measured, _ = beside(view, neutral, course)
+    before, after = (measured - e for e in (off(view, neutral, course), _errors(view, points, course)))
+    return Drawn(view.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
+
+
+def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
+    """Of motion (S, R) and errors (4, S, R), mean squares by short flight and reading."""
+    whole = _shares(motion, errors)
+    draws = np.array([_overall(_shares(motion[d], errors[:, d])) for d in _blocks(len(motion))])
+    channels = {name: dict(zip(STAGES, whole[:, r].tolist(), strict=True)) for r, name in enumerate(names)}
+    return gap_from(_overall(whole), draws, channels)
+
+
+def _shares(motion: Array, errors: Array) -> Array:
+    """Errors (4, R) as shares of the motion; what a model leaves is no less than the floor, so the floor is no more."""
+    shares = np.sqrt(errors.mean(axis=1) / motion.mean(axis=0))
+    shares[3] = shares.min(axis=0)
+    return np.asarray(shares)
+
+
+def _overall(shares: Array) -> Array:
+    return np.asarray(np.sqrt((shares**2).mean(axis=-1)))
+
+
+def _blocks(count: int) -> NDArray[np.intp]:
+    """Draws (D, count) of short flights, a few in a row together; the last are followed by the first."""
+    size = min(_BLOCK, count)
+    starts = np.random.default_rng(0).integers(count, size=(_DRAWS, -(-count // size)))
+    return np.asarray((starts[..., None] + np.arange(size)).reshape(_DRAWS, -1)[:, :count] % count)
+
+
+def _table(view: View, base: Sequence[Array], final: Sequence[Array]) -> Array:
+    """Mean squares (6, S, R) by short flight: of the motion, of the sensors' noise, and of the four errors."""
+    course, neutral = course_of(view, _size(view)), view.simulator.neutral()
+    measured = _cut(view, beside(view, neutral, course)[1])
+    errors = [_squares(view, _errors(view, points, course)) for points in ([neutral] * len(base), base, final)]
+    own = unavoidable(view, final[len(final) // 2], course)
+    floor, noise = (np.mean([_squares(view, each) for each in kind], axis=0) for kind in zip(*own, strict=True))
+    motion = ((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
+    return np.stack([motion, noise, *errors, floor])
+
+
+def _errors(view: View, points: Sequence[Array], course: Course) -> Array:
+    """Measured minus simulated (N, 12), each short flight with the parameters that it was not fitted to."""
+    size, hop = _size(view), view.windows.size // 2
+    edges = [(int(group[0]) + 0.5) * hop for group in groups_of(view)][1:]
+    middles = np.arange(len(view.record)) // size * size + size // 2
+    owner = np.searchsorted(np.array(edges), middles, side="right")
+    error = np.empty((len(view.record), len(OUTPUTS)))
+    for mine, theta in _distinct(points):
+        chosen = np.isin(owner, mine)
+        error[chosen] = off(view, theta, course)[chosen]
+    return error
+
+
+def _distinct(points: Sequence[Array]) -> list[tuple[list[int], Array]]:
+    """Points that differ, each with the places where it stands."""
+    places: dict[bytes, list[int]] = {}
+    for place, point in enumerate(points):
+        places.setdefault(np.ascontiguousarray(point).tobytes(), []).append(place)
+    return [(own, points[own[0]]) for own in places.values()]
+
+
+def _size(view: View) -> int:
+    """Samples of a short flight."""
+    return round(WINDOW * view.simulator.rate)
+
+
+def _cut(view: View, series: Array) -> Array:
+    """A series (N, 12) by short flight (S, samples, R)."""
+    size = _size(view)
+    count = len(series) // size
+    return np.asarray(series[: count * size, _COLUMNS].reshape(count, size, len(_COLUMNS)))
+
+
+def _squares(view: View, series: Array) -> Array:
+    """Mean squares (S, R) of a series (N, 12) by short flight."""
+    return np.asarray((_cut(view, series) ** 2).mean(axis=1))

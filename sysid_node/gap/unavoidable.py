@@ -1,0 +1,83 @@
+"""What a simulator with nothing wrong would be off by: the noise floor of short flights.
+
+The simulator flies the flight itself, short flight by short flight, with the flight's commands, in air that moves as
+the air data show and turns as turbulence of that strength does (``sim.dryden``), and the sensors' noise is added to
+what it reads. Flown beside this record, the same simulator is off by what no model could avoid: noise in the readings,
+in the states that short flights begin with and in the motion of the air, and the air's rotation that no vane shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.flights import thinned
+from sysid_node.gap.kinematics import Motion
+from sysid_node.gap.short_flights import Course, beside, off
+from sysid_node.gap.view import View, noisier
+from sysid_node.sim.dryden import Dryden
+from sysid_node.sim.layout import OUTPUTS, Scalar
+
+#: Flights of the simulator itself.
+_REALISATIONS = 4
+
+#: Height over ground that the air's rotation is taken for, m: it matters little.
+_HEIGHT = 100.0
+
+#: Clocks of what ``side_by_side`` gives at the time of the motion anyway.
+_CLOCKS = ("imu_delay.delay", "air_data_delay.delay")
+
+
+def unavoidable(view: View, theta: Array, course: Course, seed: int = 0) -> Iterator[tuple[Array, Array]]:
+    """Errors (N, 12) of a few flights of parameters (P,), and the sensors' noise (N, 12) that was added."""
+    random, prompt = np.random.default_rng(seed), theta.copy()
+    prompt[[view.simulator.names.index(name) for name in _CLOCKS]] = 0.0
+    _, _, shown = beside(view, theta, course)
+    for _ in range(_REALISATIONS):
+        again = thinned(noisier(view, random), view.simulator.rate)
+        added = {n: values - view.record[n] for n, values in again.columns.items()}
+        noise = np.column_stack([added.get(name, np.zeros(len(view.record))) for name in OUTPUTS])
+        turning = course._replace(turning=_turning(view, course, shown, noise, random))
+        own, _, _ = beside(view, prompt, turning)
+        yield off(view, prompt, _recorded(view, course, own + noise, added)), noise
+
+
+def _turning(view: View, course: Course, shown: Array, noise: Array, random: np.random.Generator) -> Scalar:
+    """Rotation of the air (N, 3), rad/s, in turbulence that moves it as fast as the air data show (N, 3), m/s.
+
+    What counts is motion within a short flight: slower air does not turn. The vanes' noise moves no air.
+    """
+    model, speed = Dryden.at(_HEIGHT, view.simulator.aircraft.geometry.b), float(view.record["V"].mean())
+    gusts = model.realisation(course.altitude.size, view.simulator.rate, speed, random)
+    begins = np.asarray(course.begins)
+    origin = np.maximum.accumulate(np.where(begins, np.arange(begins.size), 0))
+    usual = _power(gusts[:, 1:3] - gusts[origin, 1:3])
+    vanes = speed * noise[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]]
+    moved = max(_power(shown[:, 1:3]) - _power(vanes - vanes[origin[: len(vanes)]]), 0.0)
+    return jnp.asarray(gusts[:, 3:] * np.sqrt(moved / usual))
+
+
+def _power(velocity: Array) -> float:
+    return float((velocity**2).sum(axis=1).mean())
+
+
+def _recorded(view: View, course: Course, readings: Array, noise: dict[str, Array]) -> Course:
+    """Readings (N, 12) as the instruments would have recorded them, with the commands as noisy as the flight's."""
+    turning = _rates_of_change(readings[:, 3:6], np.asarray(course.begins), view.simulator.step)
+    symbols = [*view.simulator.layout.symbols, *(["thrust"] if view.simulator.aircraft.throttle else [])]
+    commands = np.asarray(course.commands).copy()
+    commands[: len(readings), : len(symbols)] += np.column_stack([noise[s] for s in symbols])
+    short = course.altitude.size - len(readings)
+    parts = [*np.split(readings, (3, 6, 9), axis=1), turning]
+    force, rates, attitude, air, turned = (jnp.pad(jnp.asarray(p), ((0, short), (0, 0)), mode="edge") for p in parts)
+    return course._replace(motion=Motion(force, rates, turned, air, attitude), commands=jnp.asarray(commands))
+
+
+def _rates_of_change(rates: Array, begins: Array, step: float) -> Array:
+    """d/dt (N, 3) of rates (N, 3) that jump where short flights begin."""
+    starts = np.flatnonzero(begins[: len(rates)])
+    pieces = [p for p in np.split(rates, starts[1:]) if len(p)]
+    return np.concatenate([np.gradient(p, step, axis=0) if len(p) > 1 else np.zeros_like(p) for p in pieces])

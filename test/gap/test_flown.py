@@ -1,0 +1,64 @@
+"""Short flights beside a flight: with nothing wrong the noise floor is left, whatever the effect and the air."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.evidence import Evidence, groups_of
+from sysid_node.gap.flown import WINDOW, drawn, flown
+from sysid_node.gap.view import View, view_of
+from sysid_node.sim import Simulator
+
+#: Of each kind: in the actuators, in a sensor that sets the states anew, in a clock.
+EFFECTS: dict[str, dict[str, dict[str, float]]] = {
+    "still air": {"actuator_lag": {"time_constant": 0.12}},
+    "sensor": {"airspeed_scale": {"error": 0.1}},
+    "clock": {"air_data_delay": {"delay": 0.1}},
+}
+
+
+def evidence(view: View, theta) -> Evidence:
+    count = len(groups_of(view))
+    return Evidence(np.zeros(count), (), (view,), ((theta,) * count,))
+
+
+def gap_of(view: View, effects: Mapping[str, Mapping[str, float]]):
+    """Before: the file; after: with the effects."""
+    simulator = view.simulator
+    return flown(evidence(view, simulator.neutral()), evidence(view, simulator.vector(effects)))
+
+
+@pytest.mark.parametrize("kind", EFFECTS)
+def test_the_true_effect_leaves_the_noise_floor(aircraft, make_flight, kind) -> None:
+    view = view_of(Simulator(aircraft, 50.0), make_flight(EFFECTS[kind], seed=3))
+    gap = gap_of(view, EFFECTS[kind])
+    assert gap.before > 4.0 * gap.noise_floor
+    assert gap.after == pytest.approx(gap.noise_floor, rel=0.15) and gap.noise_floor < 0.15
+    assert gap.shrink_percent == pytest.approx(100.0, abs=3.0)
+
+
+def test_gusts_are_no_gap(aircraft, make_flight) -> None:
+    """Light turbulence, nothing wrong: what it leaves is foretold by how much the air moved."""
+    view = view_of(Simulator(aircraft, 50.0), make_flight({}, seed=4, turbulence="light"))
+    gap = gap_of(view, {})
+    assert gap.before == pytest.approx(gap.noise_floor, rel=0.3)
+    assert gap.intervals["before"][0] < gap.before < gap.intervals["before"][1]
+    assert gap.shrink_percent == 0.0
+
+
+def test_short_flights_begin_where_the_flight_is(plain_view) -> None:
+    """The simulator reads what was measured at the start of each, and departs from it later."""
+    beside = drawn(plain_view, [plain_view.simulator.vector({"mass_error": {"error": 0.3}})])
+    begins = np.flatnonzero(beside.begins)
+    assert np.diff(begins) == pytest.approx(WINDOW * plain_view.simulator.rate)
+    off = np.abs(beside.measured - beside.before)[:, 9]
+    np.testing.assert_allclose(off[begins], 0.0, atol=1e-9)
+    assert off.max() > 0.05
+
+
+def test_no_attitude_no_short_flights(plain_view) -> None:
+    columns = {n: v for n, v in plain_view.record.columns.items() if n not in ("phi", "theta")}
+    record = plain_view.record.__class__(plain_view.record.time, columns)
+    bare = plain_view.__class__(**{**plain_view.__dict__, "record": record})
+    assert gap_of(bare, {}) is None
