@@ -140,31 +140,39 @@ class Trier:
 
     nuisances: Nuisances
     steps: Steps
+    known: dict[frozenset[str], Trial] = field(default_factory=dict)  # by the labels of the set
+    seen: dict[frozenset[str], dict[str, Look]] = field(default_factory=dict)  # upon such a set, by label
 
     def trial(self, fit: Fit, candidates: Sequence[Candidate], look: Look | None = None) -> Trial:
         """A set of candidates fitted from where another fit stands; what is added to the set starts at its look."""
         _, added, start = look or (0.0, None, ())
         wanted = [*candidates, *([added] if added else [])]
-        done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
-        if added is not None and (moved := sought(done, added)) is not done:
-            done = self.steps.polished(moved)
-        return Trial(done, cross_validated(done), added)
+        labels = frozenset(c.label for c in wanted)
+        if labels not in self.known:
+            done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
+            if added is not None and (moved := sought(done, added)) is not done:
+                done = self.steps.polished(moved)
+            self.known[labels] = Trial(done, cross_validated(done))
+        return replace(self.known[labels], added=added)
 
     def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
         """A first look at each, the best first: what it takes away where the nuisances can do no more."""
+        seen = self.seen.setdefault(frozenset(c.label for c in current.fit.candidates), {})
+        fresh = [c for c in candidates if c.label not in seen]
 
         def work() -> dict[str, list[float]]:
             problem = Projected(current.fit)
             looks = _spread(
                 lambda candidate: _first_look(current.fit, problem, candidate),
-                candidates,
+                fresh,
                 lambda s: progress(0.5 * s, "a first look at every effect"),
             )
             return {candidate.label: [cost, *start] for cost, candidate, start in looks}
 
-        table = self.steps.table(current.fit, work)
-        found = [(table[c.label][0], c, tuple(table[c.label][1:])) for c in candidates if c.label in table]
-        return sorted(found, key=lambda look: look[0])
+        if fresh:
+            table = self.steps.table(current.fit, [c.label for c in fresh], work)
+            seen.update({c.label: (table[c.label][0], c, tuple(table[c.label][1:])) for c in fresh if c.label in table})
+        return sorted((seen[c.label] for c in candidates if c.label in seen), key=lambda look: look[0])
 
     def looks_upon(
         self, frontier: Sequence[Trial], candidates: Sequence[Candidate], progress: Progress
@@ -315,9 +323,9 @@ def _refined(
         places = tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
         better = _replacement(base, chosen, places)
         if better is None:
-            break
+            return chosen, places
         chosen = better
-    return chosen, tuple(p for p in places if p.candidate in chosen.fit.candidates)
+    return chosen, tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
 
 
 def _place(

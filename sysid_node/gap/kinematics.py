@@ -126,9 +126,7 @@ def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str
     return imu_misalignment.undo(effects["imu_misalignment"], true)
 
 
-def _advance(
-    chain: Chain, fading: Scalar | float, state: _State, before: Sample, now: Sample
-) -> tuple[_State, Scalar]:
+def _advance(chain: Chain, fading: Scalar | float, state: _State, before: Sample, now: Sample) -> tuple[_State, Scalar]:
     """Predicts the readings (6,) of now, then corrects."""
     h = chain.step
     k1 = rates_of_change(state.velocity, state.attitude, before)

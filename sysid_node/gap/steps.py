@@ -48,9 +48,11 @@ class Steps:
                     _store(path, self.done[key])
         return self.done[key]
 
-    def table(self, fit: Fit, work: Callable[[], dict[str, list[float]]]) -> dict[str, list[float]]:
-        """Numbers by name that were worked out about a fit, or as they were before."""
-        path = self._path(self._key("table", fit), "json")
+    def table(
+        self, fit: Fit, names: Sequence[str], work: Callable[[], dict[str, list[float]]]
+    ) -> dict[str, list[float]]:
+        """Numbers by these names that were worked out about a fit, or as they were before."""
+        path = self._path(self._key("+".join(["table", *names]), fit), "json")
         if path is None:
             return work()
         if path.exists():
