@@ -7,6 +7,7 @@ from pathlib import Path
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.report.page import render_page
 from sysid_node.report.sections import Section, gap
+from sysid_node.report.sections.gap_words import paragraph
 
 
 def write_gap_report(path: Path, found: Diagnosis) -> None:
@@ -17,7 +18,7 @@ def write_gap_report(path: Path, found: Diagnosis) -> None:
 
 def opening_text(found: Diagnosis) -> str:
     """The paragraph that a pilot reads first."""
-    return gap.paragraph(found)
+    return paragraph(found)
 
 
 SECTIONS: tuple[Section[Diagnosis], ...] = (

@@ -1,4 +1,5 @@
-"""The gap in words, by station and axis, against time, by candidate, and as the shape of what is missing."""
+"""The gap: how far off by reading, where by station and axis, against time, by candidate, and the shape of what is
+missing."""  # fmt: skip
 
 from __future__ import annotations
 
@@ -7,186 +8,171 @@ from typing import Any
 
 import numpy as np
 
+from sysid_node.flight.record import Array
+from sysid_node.gap.close import STAGES
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.evidence import carried
+from sysid_node.gap.flown import READINGS, WINDOW, drawn, shows
 from sysid_node.gap.verdict import structured
 from sysid_node.gap.view import CHANNELS
 from sysid_node.report import figures
-from sysid_node.report.figures import BLUE, GREEN, MUTED, PURPLE, VERMILION, Figure
+from sysid_node.report.figures import BLUE, GREEN, INK, MUTED, PURPLE, VERMILION, Figure
+from sysid_node.report.sections.gap_words import WORDS, paragraph, percent, units_of
 from sysid_node.report.thin import thin_curve
-from sysid_node.report.words import COEFFICIENT_WORDS, number, symbol, with_interval, words_of
-from sysid_node.sim import EFFECTS
-from sysid_node.sim.layout import Layout
+from sysid_node.report.words import number, symbol, with_interval, words_of
+from sysid_node.sim.layout import OUTPUTS
 from sysid_node.sim.prediction import COEFFICIENTS
 
-#: What is compared, in words.
-_WORDS = {
-    **COEFFICIENT_WORDS,
-    "V": "airspeed",
-    "alpha": "angle of attack",
-    "beta": "sideslip",
-    "phi": "roll angle",
-    "theta": "pitch angle",
-    "psi": "heading",
-}
+#: Flight that is drawn at most, s: where the simulator of the file is furthest off.
+_DRAWN = 24.0
 
-#: Motion of the air that is not worth a word, m/s rms.
-_STILL = 0.2
+#: Steps of the waterfall before the rest.
+_STEPS = 7
 
-#: How much smaller the error of a reading must have become for it to be drawn.
+#: How much smaller the error of a reading must have become for it to be drawn beside forces and moments.
 _MENDED = 1.3
 
-#: Of a channel's gap: as the file has it, with derivatives and biases fitted, with the causes, noise.
-_STAGES = ("before", "tolerances", "after", "noise_floor")
+#: Of a gap's errors.
+_STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
 
-_OTHERS = ("#E69F00", "#56B4E9", "#CC79A7", "#999999")
+_UNITS = {**dict.fromkeys(("ax", "ay", "az"), "m/s²"), **dict.fromkeys("pqr", "rad/s"), "V": "m/s"}
+_GREEK = {"phi": "φ", "theta": "θ", "psi": "ψ", "alpha": "α", "beta": "β"}
+_UNITS |= dict.fromkeys(("phi", "theta", "alpha", "beta"), "rad")
 
-
-def paragraph(found: Diagnosis) -> str:
-    """What was found, for a pilot."""
-    return _findings(found) + _weather(found)
-
-
-def _weather(found: Diagnosis) -> str:
-    """How much the air moved, where it did."""
-    if found.air_motion < _STILL:
-        return ""
-    return (
-        f" The air was not still: across the flight path it moved by {number(found.air_motion, 2)} m/s (root mean "
-        "square), which is taken as weather, not as the aircraft's doing."
-    )
-
-
-def _findings(found: Diagnosis) -> str:
-    gap = found.gap
-    worst = max(gap.per_channel, key=lambda c: gap.per_channel[c]["before"], default="")
-    off = f"The simulator's {_WORDS.get(worst, 'response')} is {_percent(gap, worst)} off"
-    whose = "flight held out" if found.held_out else "parts of the flight that were not fitted"
-    falls = (
-        f"on {whose} the error over all channels falls from {number(gap.before, 2)} to {number(gap.after, 2)} of the "
-        f"motion, {number(gap.shrink_percent, 3)} % of what could be closed; noise alone would leave "
-        f"{number(gap.noise_floor, 2)}"
-        if gap.after < 0.95 * gap.before
-        else f"on {whose} the error over all channels is {number(gap.before, 2)} of the motion"
-    )
-    if found.verdict == "no_gap":
-        return (
-            f"{off}, no more than noise and the aircraft file's tolerances allow: with the derivatives fitted within "
-            f"these, {falls}. No other effect is needed."
-        )
-    if found.verdict == "unsupported":
-        return f"{off}, but the flight moves too little to say why: fly a larger manoeuvre."
-    if not found.attribution.causes:
-        return (
-            f"{off}, by more than noise and tolerances allow, and none of the effects known here predicts it: {falls}."
-        )
-    causes = " and ".join(_cause_words(cause) for cause in document(found)["causes"])
-    doubt = {
-        "ambiguous": " This flight does not settle which.",
-        "unknown_effect": " Much remains that no effect known here predicts.",
-    }.get(found.verdict, "")
-    return f"{off}. The flight says: {causes}. With that added, {falls}.{doubt}"
-
-
-def _percent(gap: Any, channel: str) -> str:
-    share = gap.per_channel[channel]["before"] if channel else gap.before
-    return f"{number(100 * share, 2)} %"
-
-
-def _cause_words(cause: Mapping[str, Any]) -> str:
-    """``actuator lag (time constant 0.110 ± 0.006 s, probability 0.98)``."""
-    units = _units(cause["effect"])
-    shown = [
-        f"{words_of(name)} {with_interval(value, 1.96 * error)} {units.get(name, '')}".strip()
-        for name, (value, error) in cause["parameters"].items()
-        if abs(value) > 2.0 * error
-    ]
-    rivals = cause["indistinguishable_from"]
-    beside = f"; or {', '.join(words_of(r) for r in rivals)}" if rivals else ""
-    sure = f"probability {number(cause['probability'], 2)}"
-    return f"{words_of(cause['label'])} ({'; '.join([*shown[:4], sure])}{beside})"
-
-
-def _units(effect: str) -> dict[str, str]:
-    """Units of the parameters of an effect, where they do not depend on the aircraft."""
-    layout = Layout(("elevator", "aileron", "rudder"), ("de", "da", "dr"), ())
-    return {p.name: "" if p.unit == "1" else p.unit for p in EFFECTS[effect].parameters(layout)}
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, "#E69F00", "#56B4E9", "#CC79A7", "#999999")
 
 
 def opening(found: Diagnosis) -> Mapping[str, Any]:
     """The paragraph and the figures beside it."""
-    gap = found.gap
+    gap = found.size
     low, high = gap.ci95
     facts = [
         ("Verdict", words_of(found.verdict)),
-        ("Gap before", number(gap.before, 3)),
-        ("within tolerances", number(gap.tolerances, 3)),
-        ("Gap after", number(gap.after, 3)),
-        ("Noise floor", number(gap.noise_floor, 3)),
+        *((words, percent(getattr(gap, stage))) for words, stage in zip(_STAGE_WORDS, STAGES, strict=True)),
         ("Closed", f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)})"),
-        ("Windows", f"{number(found.views[0].windows.length, 2)} s"),
     ]
-    return {"text": paragraph(found), "facts": facts, "next_flight": found.next_flight}
+    return {
+        "text": paragraph(found),
+        "facts": facts,
+        "next_flight": found.next_flight,
+        "short": bool(found.flown),
+        "window": f"{WINDOW:g} s" if found.flown else f"{found.views[0].windows.length:.2g} s",
+    }
 
 
 def where(found: Diagnosis) -> Mapping[str, Any]:
-    """Shares by station, stacked by axis; and a table of the largest."""
-    stations = list(dict.fromkeys(w["station"] for w in found.where))
-    colours = (BLUE, VERMILION, GREEN, PURPLE, *_OTHERS)
-    traces = []
-    for station, colour in zip(stations, colours, strict=False):
-        shares = {w["axis"]: 100.0 * w["share"] for w in found.where if w["station"] == station}
-        traces.append(
-            {
-                "type": "bar",
-                "name": station,
-                "x": list(CHANNELS),
-                "y": [shares.get(c, 0.0) for c in CHANNELS],
-                "marker": {"color": MUTED if station == "noise" else colour},
-            }
-        )
-    layout = {
-        "barmode": "stack",
-        "showlegend": True,
-        "xaxis": figures.axis("channel", dtick=1),
-        "yaxis": figures.axis("share of the gap, %", rangemode="tozero"),
-    }
+    """The waterfall by station and axis, and a table of the largest steps."""
     rows = [
-        (w["station"], symbol(w["axis"]), f"{number(100 * w['share'], 2)} %",
+        (w["station"], WORDS[w["axis"]], percent(w["share"]),
          "{} to {} Hz".format(*(number(x, 2) for x in w["band_hz"])),
          "{} to {} s".format(*(number(x, 3) for x in w["window_s"])),
          ", ".join(f"{n} {number(a, 2)} to {number(b, 2)}" for n, (a, b) in w["regime"].items()))
         for w in found.where[:8]
     ]  # fmt: skip
-    return {"figure": Figure("Shares of the gap by station and coefficient", traces, layout, 320), "rows": rows}
+    return {"figure": _waterfall(found), "rows": rows}
+
+
+def _waterfall(found: Diagnosis) -> Figure:
+    """From all of the gap down to what noise leaves."""
+    steps = _steps_down(found)
+    stations = list(dict.fromkeys(station for station, _, _ in steps))
+    colours = dict(zip(stations, _COLOURS, strict=False)) | {"noise": MUTED, "unexplained": INK}
+    traces, left = [], 100.0
+    for station, words, share in steps:
+        left -= share
+        traces.append(
+            {
+                "type": "bar",
+                "x": [words],
+                "y": [share],
+                "base": [max(left, 0.0)],
+                "text": [percent(share / 100.0)],
+                "textposition": "outside",
+                "cliponaxis": False,
+                "marker": {"color": colours.get(station, MUTED)},
+                "hovertemplate": f"{station}, %{{x}}: %{{y:.1f}} %<extra></extra>",
+            }
+        )
+    layout = {
+        "barmode": "overlay",
+        "xaxis": figures.axis("", type="category", tickangle=0, nticks=0),
+        "yaxis": figures.axis("of the gap's power, %", range=[0, 112]),
+    }
+    return Figure("The gap by station and axis, down to what noise leaves", traces, layout, 340)
+
+
+def _steps_down(found: Diagnosis) -> list[tuple[str, str, float]]:
+    """Station, label and percentage of each step: the largest by axis, the rest of all, then noise."""
+    caused = [w for w in found.where if w["station"] != "noise"]
+    steps = [(w["station"], f"{w['station']}<br>{WORDS[w['axis']]}", 100.0 * w["share"]) for w in caused[:_STEPS]]
+    rest = 100.0 * sum(w["share"] for w in caused[_STEPS:])
+    noise = 100.0 * sum(w["share"] for w in found.where if w["station"] == "noise")
+    return [*steps, *([("the rest", "the rest", rest)] if rest > 0.0 else []), ("noise", "noise", noise)]
 
 
 def flight(found: Diagnosis) -> Mapping[str, Any]:
-    """The coefficients, and readings that the causes mend, as measured, as the file has them, and as corrected."""
-    view = found.views[0]
-    fit = found.attribution.corrected
-    neutral = view.simulator.neutral()
-    point = carried(fit, view)
-    before, after = view.predicted_series(neutral), view.predicted_series(point)
+    """Measured, as the file has it, and as corrected: short flights where there are any, else forces and moments."""
+    panels = _short_flights(found) if found.flown else _coefficients(found)
+    return {"panels": panels, "held_out": found.held_out, "short": bool(found.flown), "window": f"{WINDOW:g} s"}
+
+
+Panel = tuple[Any, str, Figure]
+
+
+def _short_flights(found: Diagnosis) -> list[Panel]:
+    """The readings that moved, each short flight a line of its own."""
+    place = next(k for k, view in enumerate(found.views) if shows(view))
+    record = drawn(found.views[place], found.final.points[place])
+    span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
+    begins = record.begins[span].copy()
     panels = []
-    gaps = found.gap.per_channel
+    for name in found.size.per_channel:
+        k = OUTPUTS.index(name)
+        before, after = (series[span, k].copy() for series in (record.before, record.after))
+        before[begins], after[begins] = np.nan, np.nan  # a line ends where the simulator begins anew
+        panels.append(_panel(name, record.time[span], record.measured[span, k], before, after, _UNITS.get(name, "")))
+    return panels
+
+
+def _worst(time: Array, error: Array) -> slice:
+    """The part of the flight that is drawn: where errors (N, R), over their size in the whole flight, are largest."""
+    size = int(np.searchsorted(time - time[0], _DRAWN))
+    if size >= time.size:
+        return slice(None)
+    power = np.cumsum((error**2 / np.maximum((error**2).mean(axis=0), 1e-300)).sum(axis=1))
+    first = int(np.argmax(power[size:] - power[:-size]))
+    return slice(first, first + size)
+
+
+def _coefficients(found: Diagnosis) -> list[Panel]:
+    """Coefficients, constant offsets removed, and readings that the causes mend."""
+    view, gaps = found.views[0], found.gap.per_channel
+    point = carried(found.attribution.corrected, view)
+    before, after = view.predicted_series(view.simulator.neutral()), view.predicted_series(point)
     mended = [name in gaps and gaps[name]["before"] > _MENDED * gaps[name]["after"] for name in CHANNELS]
     force = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
+    panels = []
     for k in np.flatnonzero(view.axes & (force | mended)):
-        offset = [float(x[:, k].mean() - view.series[:, k].mean()) if force[k] else 0.0 for x in (before, after)]
-        time, *curves = thin_curve(
-            view.record.time, view.series[:, k], before[:, k] - offset[0], after[:, k] - offset[1]
-        )
-        styles = (("measured", MUTED, "solid"), ("file", VERMILION, "dot"), ("corrected", BLUE, "solid"))
-        traces = [
-            figures.line(time, c, n, colour=colour, dash=dash, width=1.3)
-            for c, (n, colour, dash) in zip(curves, styles, strict=True)
-        ]
-        layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(CHANNELS[k])}
-        words = _WORDS[CHANNELS[k]]
-        panels.append((symbol(CHANNELS[k]), words, Figure(f"{words}: measured and simulated", traces, layout)))
-    return {"panels": panels, "held_out": found.held_out}
+        shown = [x[:, k] - force[k] * (x[:, k].mean() - view.series[:, k].mean()) for x in (before, after)]
+        panels.append(_panel(CHANNELS[k], view.record.time, view.series[:, k], *shown))
+    return panels
+
+
+def _panel(name: str, time: Array, measured: Array, before: Array, after: Array, unit: str = "") -> Panel:
+    time, *curves = thin_curve(time, measured, before, after)
+    styles = (("measured", MUTED, "solid", 2.2), ("file", VERMILION, "solid", 1.2), ("corrected", BLUE, "solid", 1.4))
+    traces = [
+        figures.line(time, c, n, colour=colour, dash=dash, width=width)
+        for c, (n, colour, dash, width) in zip(curves, styles, strict=True)
+    ]
+    sign = _GREEK.get(name, name)
+    layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(f"{sign}, {unit}" if unit else sign)}
+    return (
+        symbol(name) if name in COEFFICIENTS else sign,
+        WORDS[name],
+        Figure(f"{WORDS[name]}: measured and simulated", traces, layout),
+    )
 
 
 def candidates(found: Diagnosis) -> Mapping[str, Any]:
@@ -198,7 +184,7 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
             "station": c["station"],
             "probability": number(c["probability"], 2),
             "parameters": [
-                (words_of(n), with_interval(v, 1.96 * e), _units(c["effect"]).get(n, ""))
+                (words_of(n), with_interval(v, 1.96 * e), units_of(c["effect"]).get(n, ""))
                 for n, (v, e) in c["parameters"].items()
             ],
             "rivals": ", ".join(words_of(r) for r in c["indistinguishable_from"]),
@@ -221,12 +207,23 @@ def _confusion(found: Diagnosis) -> Mapping[str, Any]:
 
 
 def channels(found: Diagnosis) -> Mapping[str, Any]:
-    """The gap of each channel before and after, beside its noise floor."""
-    rows = [
-        (_WORDS[name], *(f"{number(100.0 * c[stage], 2)} %" for stage in _STAGES))
-        for name, c in found.gap.per_channel.items()
-    ]
-    return {"rows": rows, "held_out": found.held_out}
+    """The gap of each channel before and after, beside its noise floor, and of all together with its intervals."""
+    gap = found.size
+    rows = [(WORDS[name], *(percent(c[stage]) for stage in STAGES)) for name, c in gap.per_channel.items()]
+    whole = ("all together", *(percent(getattr(gap, stage)) for stage in STAGES))
+    ends = ("95 % interval", *(_between(gap.intervals[stage]) for stage in STAGES))
+    return {
+        "rows": rows,
+        "whole": [whole, ends],
+        "held_out": found.held_out,
+        "short": bool(found.flown),
+        "window": f"{WINDOW:g} s",
+    }
+
+
+def _between(ends: tuple[float, float]) -> str:
+    """``12 to 15 %``."""
+    return f"{number(100.0 * ends[0], 2)} to {percent(ends[1])}"
 
 
 def shape(found: Diagnosis) -> Mapping[str, Any]:
@@ -240,7 +237,7 @@ def shape(found: Diagnosis) -> Mapping[str, Any]:
         "xaxis": figures.axis(f"{missing.signal}, {missing.unit}"),
         "yaxis": figures.axis(f"missing {missing.axis}"),
     }
-    words = f"The missing {_WORDS[missing.axis]} against {missing.signal}"
+    words = f"The missing {WORDS[missing.axis]} against {missing.signal}"
     return {
         "figure": Figure(words, [trace], layout, 300),
         "words": f"{words}; the bins explain {number(100 * missing.explained, 2)} % of it",

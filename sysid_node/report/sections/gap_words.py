@@ -1,0 +1,150 @@
+"""What a diagnosis found, in one paragraph for a pilot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sysid_node.gap.close import Gap
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.document import document
+from sysid_node.gap.flown import WINDOW
+from sysid_node.report.words import COEFFICIENT_WORDS, REGRESSOR_WORDS, number, with_interval, words_of
+from sysid_node.sim import EFFECTS
+from sysid_node.sim.layout import Layout
+
+#: What is compared, in words.
+WORDS = {
+    **COEFFICIENT_WORDS,
+    "V": "airspeed",
+    "alpha": "angle of attack",
+    "beta": "sideslip",
+    "phi": "roll angle",
+    "theta": "pitch angle",
+    "psi": "heading",
+    "ax": "forward specific force",
+    "ay": "sideways specific force",
+    "az": "downward specific force",
+    **{name: REGRESSOR_WORDS[name] for name in "pqr"},
+}
+
+#: Readings that together are an aircraft's response about an axis.
+_RESPONSES = {
+    "pitch response": ("q", "theta", "alpha", "az"),
+    "roll response": ("p", "phi"),
+    "yaw response": ("r", "beta", "ay"),
+    "speed": ("V", "ax"),
+}
+
+#: Motion of the air that is not worth a word, m/s rms.
+_STILL = 0.2
+
+
+def paragraph(found: Diagnosis) -> str:
+    """What was found."""
+    return f"{_off(found)}{_findings(found)}{_weather(found)}"
+
+
+def _off(found: Diagnosis) -> str:
+    """How far off the simulator is, and where most."""
+    gap = found.size
+    if found.flown:
+        sizes = {words: _together(gap, names) for words, names in _RESPONSES.items()}
+        worst = max(sizes, key=lambda words: sizes[words])
+        return (
+            f"Begun anew every {WINDOW:g} s in the flight's own state, the simulator's {worst} is "
+            f"{percent(sizes[worst])} off, {percent(gap.before)} over all readings"
+        )
+    worst = max(gap.per_channel, key=lambda c: gap.per_channel[c]["before"], default="")
+    size = gap.per_channel[worst]["before"] if worst else gap.before
+    return f"The simulator's {WORDS.get(worst, 'response')} is {percent(size)} off"
+
+
+def _together(gap: Gap, names: tuple[str, ...]) -> float:
+    """Error before of some readings together; 0 where none of them moved."""
+    own = [gap.per_channel[name]["before"] for name in names if name in gap.per_channel]
+    return float(np.sqrt(np.mean(np.square(own)))) if own else 0.0
+
+
+def _findings(found: Diagnosis) -> str:
+    """What is to blame, and what it would mend."""
+    if found.verdict == "no_gap":
+        return (
+            ", no more than noise and the aircraft file's tolerances allow: noise alone would leave "
+            f"{percent(found.size.noise_floor)}. No other effect is needed."
+        )
+    if found.verdict == "unsupported":
+        return ", but the flight moves too little to say why: fly a larger manoeuvre."
+    if not found.attribution.causes:
+        return (
+            ", by more than noise and tolerances allow, and none of the effects known here predicts it: "
+            f"{_falls(found, 'with the derivatives within their tolerances')}."
+        )
+    causes = document(found)["causes"]
+    said = " and ".join(_cause(cause) for cause in causes)
+    doubt = {
+        "ambiguous": " This flight does not settle which.",
+        "unknown_effect": " Much remains that no effect known here predicts.",
+    }.get(found.verdict, "")
+    return f". {_share(found)} {said}. With that added, {_falls(found, 'all in all')}.{doubt}"
+
+
+def _share(found: Diagnosis) -> str:
+    """How much of what is above the noise lies at the causes' stations."""
+    stations = {cause.candidate.station for cause in found.attribution.causes}
+    above = [w for w in found.where if w["station"] != "noise"]
+    own = sum(w["share"] for w in above if w["station"] in stations) / max(sum(w["share"] for w in above), 1e-300)
+    return f"Noise aside, {percent(own)} of that comes from" if own > 0.5 else "The flight says:"
+
+
+def _falls(found: Diagnosis, otherwise: str) -> str:
+    """The error on flight not fitted, before and after."""
+    gap, (low, high) = found.size, found.size.ci95
+    whose = "the flight held out" if found.held_out else "parts of the flight that were not fitted"
+    if gap.after > 0.95 * gap.before:
+        return (
+            f"{otherwise}, the error on {whose} is {percent(gap.after)} of the motion; noise alone would leave "
+            f"{percent(gap.noise_floor)}"
+        )
+    return (
+        f"the error on {whose} falls from {percent(gap.before)} to {percent(gap.after)} of the motion, "
+        f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)}) of what could be closed; noise "
+        f"alone would leave {percent(gap.noise_floor)}"
+    )
+
+
+def _weather(found: Diagnosis) -> str:
+    """How much the air moved, where it did."""
+    if found.air_motion < _STILL:
+        return ""
+    return (
+        f" The air was not still: across the flight path it moved by {number(found.air_motion, 2)} m/s within "
+        "seconds (root mean square), which is taken as weather, not as the aircraft's doing."
+    )
+
+
+def _cause(cause: Mapping[str, Any]) -> str:
+    """``actuator lag (time constant 0.110 ± 0.006 s, probability 0.98)``."""
+    units = units_of(cause["effect"])
+    shown = [
+        f"{words_of(name)} {with_interval(value, 1.96 * error)} {units.get(name, '')}".strip()
+        for name, (value, error) in cause["parameters"].items()
+        if abs(value) > 2.0 * error
+    ]
+    rivals = cause["indistinguishable_from"]
+    beside = f"; or {', '.join(words_of(r) for r in rivals)}" if rivals else ""
+    sure = f"probability {number(cause['probability'], 2)}"
+    return f"{words_of(cause['label'])} ({'; '.join([*shown[:4], sure])}{beside})"
+
+
+def units_of(effect: str) -> dict[str, str]:
+    """Units of the parameters of an effect, where they do not depend on the aircraft."""
+    layout = Layout(("elevator", "aileron", "rudder"), ("de", "da", "dr"), ())
+    return {p.name: "" if p.unit == "1" else p.unit for p in EFFECTS[effect].parameters(layout)}
+
+
+def percent(share: float) -> str:
+    """``38 %``."""
+    return f"{number(100.0 * share, 2)} %"
