@@ -88,6 +88,32 @@ def add(state: Blocks, time: float, sample: Sequence[float]) -> Block | None:
     return _complete(state, time) if time - state.begin >= PERIOD - 1e-6 else None
 
 
+def of_record(aircraft: Aircraft, time: Array, samples: Array) -> list[Block]:
+    """The blocks that ``add`` makes of all samples (N, M) at times (N,) s, but for rounding; much faster."""
+    values = np.array(samples, dtype=np.float64)
+    values[np.isnan(values[:, _THRUST]), _THRUST] = 0.0
+    usable = np.isfinite(values.sum(axis=1))
+    time, values = time[usable], values[usable]
+    rows, angles = signals.array_signals(aircraft)(list(values.T))
+    rows.insert(_DRIFT, np.zeros_like(time))
+    row, motion = np.stack(rows, axis=1), [*values.T[3:6], *angles]
+    steps = np.diff(time)
+    area = 0.5 * steps[:, None] * (row[1:] + row[:-1])
+    area[:, :OUTPUTS] += np.stack(signals.momentum_gain(aircraft)([m[:-1] for m in motion], [m[1:] for m in motion]), 1)
+    whole = np.vstack([np.zeros(row.shape[1]), np.cumsum(area, axis=0)])
+    air = np.vstack([np.zeros(3), np.cumsum(steps[:, None] * values[1:, _AIR], axis=0)])
+    found, first, unbroken = [], 0, False
+    for last in range(1, time.size):
+        if steps[last - 1] > MOST_GAP:
+            first, unbroken = last, False
+        elif time[last] - time[first] >= PERIOD - 1e-6:
+            duration = time[last] - time[first]
+            means, seen = (whole[last] - whole[first]) / duration, (air[last] - air[first]) / duration
+            found.append(Block(float(time[last]), means[:OUTPUTS], means, seen, last - first, unbroken))
+            first, unbroken = last, True
+    return found
+
+
 def _complete(state: Blocks, time: float) -> Block:
     duration = time - state.begin
     means = state.area / duration

@@ -1,7 +1,7 @@
 """How strongly a stretch of flight speaks for a change of the aircraft or its sensors: Bayes factors.
 
 The stretch's whitened residuals against the model that is held are summed up by an information matrix J (D, D) and a
-score v (D,) over the derivatives. The held ones are known with a covariance P: what that allows for is taken out,
+score v (D,) over the derivatives. The held ones are known with a covariance P; what that allows for is taken out,
 
     J' = J - J (J + P^-1)^-1 J,    v' = v - J (J + P^-1)^-1 v.
 
@@ -44,8 +44,8 @@ class Weighed:
 
 
 def marginal(J: Array, v: Array, precision: Array) -> tuple[Array, Array]:
-    """J' and v' of the module's text; ``precision`` (D,) is the diagonal of P^-1."""
-    solved = cho_solve(cho_factor(J + np.diag(precision)), np.column_stack([J, v]))
+    """J' and v' of the module's text; ``precision`` (D, D) is P^-1."""
+    solved = cho_solve(cho_factor(J + precision), np.column_stack([J, v]))
     return J - J @ solved[:, :-1], v - J @ solved[:, -1]
 
 
@@ -69,12 +69,13 @@ def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness:
     A fault is hardly ever as simple as its hypothesis: without this, one with more freedom would explain the rest.
     """
     s, m = shift.fixed, shift.spread.size
-    kept = np.diag(precision)
-    none = _evidence(J / excess, v / excess, kept)
-    prior = np.concatenate([shift.spread**-2, 1.0 / (1.0 / precision + looseness**2)])
+    none = _evidence(J / excess, v / excess, precision)
+    prior = np.zeros((m + len(v), m + len(v)))
+    prior[:m, :m] = np.diag(shift.spread**-2)
+    prior[m:, m:] = np.linalg.inv(np.linalg.inv(precision) + np.diag(looseness**2))
     B = np.hstack([shift.free, np.eye(len(v))])
     left = (v - J @ s) / excess
-    factor, size, covariance = _evidence(B.T @ J @ B / excess, B.T @ left, np.diag(prior))
+    factor, size, covariance = _evidence(B.T @ J @ B / excess, B.T @ left, prior)
     factor += float(s @ v - 0.5 * s @ J @ s) / excess - none[0]
     return Weighed(factor, size[:m], covariance[:m, :m])
 

@@ -1,8 +1,10 @@
 """The model that is held: the last good derivatives, and how well they are known.
 
-They are the aircraft file's within its tolerances until the identifier's take their place; those count when they were
-valid and have grown old enough to hold nothing of a fault that is only now found (modified sequential least squares
-holds its estimates the same way: Ward, Monaco & Bodson, J. Guidance 21(6), 1998).
+They begin as the aircraft file's, within its tolerances; the identifier's take their place where they are valid and
+have grown old enough to hold nothing of a fault that is only now found. On top comes what sound flight has shown since:
+least squares of the whitened blocks, constrained to these values (modified sequential least squares: Ward, Monaco &
+Bodson, J. Guidance 21(6), 1998), less what the vanes' noise adds to their motion's energy (bias-compensated least
+squares: Soderstrom, Automatica 43, 2007, sec. 5).
 """
 
 from __future__ import annotations
@@ -16,11 +18,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.faults.colour import Colour
 from sysid_node.faults.terms import Terms
 
 Array = NDArray[np.float64]
 
 RIPE = 10.0  # s
+KEPT = 0.9995  # share of what a block has shown that the next one leaves: 200 s
 
 
 class Known(NamedTuple):
@@ -33,55 +37,102 @@ class Known(NamedTuple):
 
 @dataclass
 class Held:
-    """Values (D,) and standard errors (D,), what of them is to come, and the means that go with them."""
+    """Values (D,) and standard errors (D,), what flight has shown on top, and the offsets that go with them."""
 
     terms: Terms
     values: Array
     errors: Array
     regressors: Array  # (D,) mean of each term's regressor of late
+    J: Array  # (D, D) information of sound flight
+    v: Array  # (D,) its score about the values
+    blocks: float = 0.0  # that the information is made of
     offsets: Array = field(default_factory=lambda: np.zeros(6))  # k times these belong to the model, too
     coming: deque[tuple[float, Mapping[str, Known]]] = field(default_factory=deque)
 
 
+class Belief(NamedTuple):
+    """What the blocks are weighed against: the mean's distance from the held values (D,), and its precision (D, D)."""
+
+    shift: Array
+    precision: Array
+
+
 def init(terms: Terms) -> Held:
     """The aircraft file's."""
-    return Held(terms, terms.values.copy(), terms.tolerance.copy(), np.zeros(len(terms.names)))
+    count = len(terms.names)
+    nothing = np.zeros(count)
+    return Held(terms, terms.values.copy(), terms.tolerance.copy(), nothing, np.zeros((count, count)), nothing.copy())
 
 
 def hear(held: Held, time: float, known: Mapping[str, Known]) -> None:
-    """Estimates of a time (s); one a second is enough."""
+    """Estimates of a time (s); some of them are kept until they are ripe."""
     if held.coming and time < held.coming[-1][0]:
         held.coming.clear()  # the clock has stepped back
-    if not held.coming or time - held.coming[-1][0] >= 1.0:
+    if not held.coming or time - held.coming[-1][0] >= RIPE:
         held.coming.append((time, known))
 
 
-def ripen(held: Held, now: float) -> None:
-    """Take up what is old enough, where nothing has failed by a time (s)."""
+def ripen(held: Held, now: float) -> bool:
+    """Take up what is old enough, where nothing has failed by a time (s); whether anything was."""
+    taken = False
     while held.coming and now - held.coming[0][0] >= RIPE:
         _, known = held.coming.popleft()
         for d, name in enumerate(held.terms.names):
             one = known.get(name)
             if one is not None and one.valid and math.isfinite(one.value + one.standard_error):
-                held.offsets[held.terms.output[d]] -= (one.value - held.values[d]) * held.regressors[d]
+                change = one.value - held.values[d]
+                held.offsets[held.terms.output[d]] -= change * held.regressors[d]
+                held.v -= change * held.J[:, d]
                 held.values[d], held.errors[d] = one.value, one.standard_error
+                taken = True
+    return taken
 
 
-def whole(held: Held) -> Array:
-    """(D,) the values, with what the offsets have been found to be."""
-    values = held.values.copy()
-    for output in set(held.terms.output.tolist()):
-        values[held.terms.offset_of(output)] += held.offsets[output]
-    return values
+def learn(held: Held, J: Array, v: Array) -> None:
+    """From a block of sound flight."""
+    held.blocks = KEPT * held.blocks + 1.0
+    held.J = KEPT * held.J + J
+    held.v = KEPT * held.v + v
 
 
-def precision(held: Held, slack: float) -> Array:
-    """(D,) 1 / variance of the held values; a share ``slack`` of each counts as no change."""
-    terms = held.terms
-    errors = np.hypot(held.errors, slack * np.abs(held.values))
+def noise_of(terms: Terms, colour: Colour, variances: Mapping[str, float]) -> Array:
+    """(D, D) what noise of these ``variances`` on regressors, by name, adds to the information of a block."""
+    total = np.zeros((len(terms.names), len(terms.names)))
+    for name, variance in variances.items():
+        noisy = np.flatnonzero(terms.of(name))
+        design = np.zeros((6, total.shape[0]))
+        design[terms.output[noisy], noisy] = 1.0
+        for taps in (np.ones(6), *colour.filter):
+            part = colour.unmix @ (taps[:, None] * design)
+            total += variance * part.T @ part
+    return total
+
+
+def belief(held: Held, noise: Array, slack: float) -> Belief:
+    """What is held, with what sound flight has shown; a share ``slack`` of each derivative counts as no change.
+
+    ``noise`` (D, D) is the part of the information that is the regressors' noise.
+    """
+    terms, values = held.terms, held.values
+    errors = np.maximum(held.errors, 1e-9)
+    size, axes = np.linalg.eigh((held.J - noise) * np.outer(errors, errors))
+    covariance = (axes / (1.0 + np.maximum(size, 0.0))) @ axes.T * np.outer(errors, errors)
+    shift = covariance @ (held.v + noise @ values)
+    loose = (slack * values) ** 2
     for output in set(terms.output.tolist()):
         mine = terms.output == output
         d = terms.offset_of(output)
-        # offsets are learned in flight: they are off by what the other terms' slack makes of the motion
-        errors[d] = math.sqrt(float(((slack * held.values * terms.signal)[mine] ** 2).sum())) + 1e-6
-    return np.asarray(1.0 / np.maximum(errors, 1e-9) ** 2)
+        # offsets are learned by themselves, for the held values: what is shifted leaves the mean as it is
+        mine[d] = False
+        shift[d] = -float(shift[mine] @ held.regressors[mine])
+        # and they are off by what the other terms' slack makes of the motion
+        loose[d] = float(((slack * values * terms.signal)[mine] ** 2).sum()) + (slack * values[d]) ** 2 + 1e-12
+    return Belief(shift, np.asarray(np.linalg.inv(covariance + np.diag(loose)), dtype=np.float64))
+
+
+def whole(held: Held, shift: Array) -> Array:
+    """(D,) the values with a ``shift``, and with what the offsets have been found to be."""
+    values = np.asarray(held.values + shift)
+    for output in set(held.terms.output.tolist()):
+        values[held.terms.offset_of(output)] += held.offsets[output]
+    return values

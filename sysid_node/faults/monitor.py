@@ -29,6 +29,7 @@ from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
 from sysid_node.faults.terms import terms
 from sysid_node.faults.types import VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
+    VANES,
     Stretch,
     excess,
     explained,
@@ -45,6 +46,7 @@ Array = NDArray[np.float64]
 EVERY = 5  # a span of n times so many blocks is looked at with every n-th block
 LEAST = 3  # blocks that a fault must have lasted
 RENEWED = 10  # blocks after which hypotheses and whitening are made anew
+SETTLED = 0.5  # share of the learning, after which the residuals' colour is known well enough to learn by
 OFFSETS = 30.0  # s over which offsets are learned
 USUAL = 60.0  # s over which the usual size of a statistic is
 DATED = 5.0  # s after an alarm in which its onset is sought
@@ -78,15 +80,27 @@ def take(state: State, block: Block) -> None:
     if not block.follows:
         state.raw.clear()
         state.pieces.clear()
+    design, residual = _against_held(state, block)
+    state.count += 1
+    learning = state.count * PERIOD <= state.settings.learning
+    if learning:
+        _learn(state, block, residual)
+        if state.count % RENEWED == 0:
+            colour.settle(state.colour)
+    if len(state.raw) == ORDER:
+        piece = _piece(state, block, design, residual)
+        if not learning:
+            _judge(state, piece)
+        elif state.count * PERIOD > SETTLED * state.settings.learning:
+            held.learn(state.held, piece.J, piece.v)
+    state.raw.append((design, residual))
+
+
+def _against_held(state: State, block: Block) -> tuple[Array, Array]:
+    """A block's regressors by term (6, D), and its residual (6,) against the held values."""
     design = np.zeros((6, len(state.terms.names)))
     design[state.terms.output, np.arange(design.shape[1])] = block.regressors[state.terms.column]
-    residual = block.outputs - design @ state.held.values
-    state.count += 1
-    if state.count * PERIOD <= state.settings.learning:
-        _learn(state, block, residual)
-    elif len(state.raw) == ORDER:
-        _judge(state, _piece(state, block, design, residual))
-    state.raw.append((design, residual))
+    return design, block.outputs - design @ state.held.values
 
 
 def _piece(state: State, block: Block, design: Array, residual: Array) -> Piece:
@@ -112,6 +126,7 @@ def _judge(state: State, piece: Piece) -> None:
     if state.alarm is None and len(state.pieces) > LAG:
         old = state.pieces[-LAG - 1]
         _learn(state, old.block, old.residual)
+        held.learn(state.held, old.J, old.v)
 
 
 def _learn(state: State, block: Block, residual: Array) -> None:
@@ -125,11 +140,25 @@ def _learn(state: State, block: Block, residual: Array) -> None:
 
 def _renew(state: State) -> None:
     """What is held, and how it could fail, from what has been learned."""
-    last = state.pieces[-1].block.time
-    held.ripen(state.held, last)
     colour.settle(state.colour)
-    state.precision = held.precision(state.held, state.settings.slack)
-    state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held))
+    if held.ripen(state.held, state.pieces[-1].block.time):
+        _rebuild(state)
+    noise = {vane: state.aircraft.noise[vane] ** 2 / state.pieces[-1].block.samples for vane in VANES}
+    share = held.noise_of(state.terms, state.colour, noise) * state.held.blocks
+    state.belief = held.belief(state.held, share, state.settings.slack)
+    state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held, state.belief.shift))
+
+
+def _rebuild(state: State) -> None:
+    """Make the last pieces anew: against other values."""
+    blocks_of = [piece.block for piece in state.pieces]
+    state.pieces.clear()
+    state.raw.clear()
+    for block in blocks_of:
+        design, residual = _against_held(state, block)
+        if len(state.raw) == ORDER:
+            state.pieces.append(_piece(state, block, design, residual))
+        state.raw.append((design, residual))
 
 
 def _watch(state: State) -> None:

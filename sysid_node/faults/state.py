@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.blocks import Block, Blocks
 from sysid_node.faults.colour import ORDER, Colour
-from sysid_node.faults.held import Held
+from sysid_node.faults.held import Belief, Held
 from sysid_node.faults.hypotheses import Hypothesis
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.terms import Terms
@@ -29,7 +29,7 @@ class Piece(NamedTuple):
     """A block against the held model."""
 
     block: Block
-    residual: Array  # (6,) without the learned offsets
+    residual: Array  # (6,) without the learned offsets; raw
     design: Array  # (6, D) whitened
     whitened: Array  # (6,) residual
     J: Array  # (D, D)
@@ -57,9 +57,9 @@ class State:
     held: Held
     colour: Colour
     pieces: deque[Piece] = field(default_factory=lambda: deque(maxlen=LONGEST))
-    raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual
+    raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
     hypotheses: list[Hypothesis] = field(default_factory=list)
-    precision: Array = field(default_factory=lambda: np.empty(0))  # (D,)
+    belief: Belief | None = None  # what the blocks are weighed against
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block
     count: int = 0
     alarm: Alarm | None = None

@@ -39,29 +39,34 @@ def stretch(state: State, count: int) -> Stretch:
     pieces = list(islice(state.pieces, len(state.pieces) - count, None))
     J = np.sum([piece.J for piece in pieces], axis=0)
     v = np.sum([piece.v for piece in pieces], axis=0)
-    return Stretch(pieces, (J, v), *marginal(J, v, state.precision))
+    return _against(state, pieces, J, v)
+
+
+def _against(state: State, pieces: Sequence[Piece], J: Array, v: Array) -> Stretch:
+    """Of what is believed by now."""
+    assert state.belief is not None
+    v = v - J @ state.belief.shift
+    return Stretch(pieces, (J, v), *marginal(J, v, state.belief.precision))
 
 
 def stretches(state: State, counts: Sequence[int]) -> list[Stretch]:
     """As many as there are counts, which rise by one."""
-    first = stretch(state, counts[0])
-    found, (J, v) = [first], first.whole
-    for count in counts[1:]:
-        piece = state.pieces[-count]
-        J, v = J + piece.J, v + piece.v
-        found.append(Stretch([piece, *found[-1].pieces], (J, v), *marginal(J, v, state.precision)))
-    return found
+    pieces = list(islice(state.pieces, len(state.pieces) - counts[-1], None))
+    J = np.cumsum([piece.J for piece in reversed(pieces)], axis=0)
+    v = np.cumsum([piece.v for piece in reversed(pieces)], axis=0)
+    return [_against(state, pieces[-count:], J[count - 1], v[count - 1]) for count in counts]
 
 
 def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     """Each hypothesis with what it leaves out (``evidence.weigh_loosely``), by the variance that the best leaves."""
+    assert state.belief is not None
     first = weights(state, over, usual)
     best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
     scale = max(float(usual.max()), best, 1.0)
     found = []
     for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
-        found.append(weigh_loosely(*over.whole, hypothesis.shift, state.precision, LOOSE * moved, scale))
+        found.append(weigh_loosely(*over.whole, hypothesis.shift, state.belief.precision, LOOSE * moved, scale))
     return found
 
 
@@ -84,7 +89,8 @@ def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
     The largest of the six coefficients'.
     """
     shift = state.hypotheses[place].shift
-    moved = shift.fixed + shift.free @ weighed.size
+    assert state.belief is not None
+    moved = shift.fixed + shift.free @ weighed.size + state.belief.shift
     left = np.array([piece.whitened - piece.design @ moved for piece in over.pieces])
     return float((left**2).mean(axis=0).max())
 
@@ -97,7 +103,7 @@ def stuck_vanes(state: State, over: Stretch) -> dict[str, float]:
         if not terms.size:
             found[vane] = 0.0
             continue
-        slope = float(state.held.values[terms[0]])
+        slope = float(state.held.values[terms[0]])  # what flight has shown on top is too little to matter here
         read = np.array([piece.block.air[column] for piece in over.pieces])
         off = [(p.residual[output] / p.block.regressors[OFFSET] - state.held.offsets[output]) for p in over.pieces]
         asked = read + np.array(off) / slope

@@ -1,0 +1,272 @@
+"""Which faults are found, how soon, and what is taken for one. `python bench/faults.py --page docs/faults.md`
+
+`cdrw` under an autopilot that holds attitude and airspeed, with 3-2-1-1s every six seconds; something fails at 40 s.
+The monitor knows the aircraft from a file whose derivatives are off by draws from their tolerances; `--identified` has
+it know them to 2 %, as from an identifier. Surfaces are commands (`actuators` echoes them): no servo tells its
+position. Missed is what raises no alarm within 20 s, wrongly isolated what 5 s after its alarm is given another name.
+`--hours 4` flies hours in which nothing fails, half of them with 3-2-1-1s, half with a doublet a minute on each
+surface, and counts alarms; results are kept in a file as they come.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from evaluation.flying import Effects, Setting, fly
+from evaluation.pages import publish, table
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.faults import monitor
+from sysid_node.faults.blocks import of_record
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.state import State
+from sysid_node.faults.types import (
+    AIRSPEED,
+    DAMAGE,
+    HARD_OVER,
+    LOSS,
+    STUCK,
+    VANE_OFFSET,
+    VANE_STUCK,
+    Fault,
+)
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+Array = NDArray[np.float64]
+Break = Callable[[Array, Array, np.random.Generator], None]  # samples (N, M) from the onset on, the last one before
+
+NAME = "cdrw"
+AIRCRAFT = load_aircraft(NAME)
+KNOWN = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
+WEATHERS = ("none", "light", "moderate")
+ONSET, END, JUDGED = 40.0, 60.0, 5.0  # s: failure, end of a flight, from an alarm until the isolation is judged
+HOUR, PART = 3600.0, 600.0  # s
+IDENTIFIED = 0.02  # share to which an identifier knows the derivatives
+DOUBLETS = tuple(
+    f"doublet:{surface}:amplitude={amplitude}:width=0.35:start={start}:every=60:repeat={int(PART / 60) - 1}"
+    for surface, amplitude, start in (("elevator", 0.06, 10), ("aileron", 0.06, 25), ("rudder", 0.12, 40))
+)
+SYMBOLS = {"elevator": "de", "aileron": "da", "rudder": "dr"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault: what it does to the aircraft or to the samples, and what it should be called."""
+
+    name: str
+    kinds: Sequence[str]
+    part: str
+    size: float = math.nan
+    effects: Effects = field(default_factory=dict)
+    broken: Break | None = None
+
+
+def _lost(surface: str, share: float) -> Case:
+    effects = {"control_effectiveness_loss": {surface: share}}
+    return Case(f"{surface}, {100 * share:.0f} % of its effect lost", (LOSS,), surface, share, effects)
+
+
+def _stuck(surface: str, angle: float) -> Case:
+    """All effect lost, and the moments of the angle as a constant: the same forces, while commands go on."""
+    symbol = SYMBOLS[surface]
+    moments = {c: KNOWN.get(f"{c}_{symbol}", 0.0) * angle for c in ("CL", "CD", "Cm", "CY", "Cl", "Cn")}
+    effects: dict[str, Mapping[str, float]] = {"control_effectiveness_loss": {surface: 1.0}}
+    if symbol == "de":
+        effects["derivative_error"] = {f"{c}_0": moments[c] for c in ("CL", "CD", "Cm")}
+    else:
+        effects["lateral_asymmetry"] = {f"{c}_0": moments[c] for c in ("CY", "Cl", "Cn")}
+    return Case(f"{surface} stuck at {math.degrees(angle):+.0f} deg", (STUCK, HARD_OVER), surface, angle, effects)
+
+
+def _jammed(column: str, noise: float) -> Break:
+    """From the onset on a sensor reads what it read last, with its noise."""
+    at = SAMPLE_COLUMNS.index(column)
+
+    def broken(after: Array, last: Array, random: np.random.Generator) -> None:
+        after[:, at] = last[at] + noise * random.standard_normal(len(after))
+
+    return broken
+
+
+def _changed(**factors: float) -> Effects:
+    return {"derivative_error": {name: KNOWN[name] * (factor - 1.0) for name, factor in factors.items()}}
+
+
+def _vane(angle: str, degrees: float) -> Case:
+    size = math.radians(degrees)
+    return Case(f"{angle} vane off by {degrees:g} deg", (VANE_OFFSET,), angle, size, {"vane_bias": {angle: size}})
+
+
+def _airspeed(error: float) -> Case:
+    effects = {"airspeed_scale": {"error": error}}
+    return Case(f"airspeed reads {100 * error:+.0f} %", (AIRSPEED,), "airspeed", error, effects)
+
+
+FIN = dict.fromkeys(("CY_beta", "Cn_beta", "Cn_r", "CY_r", "Cn_dr", "CY_dr"), 0.5)
+CASES = (
+    *(_lost("elevator", share) for share in (0.1, 0.2, 0.4, 0.6)),
+    *(_lost("aileron", share) for share in (0.2, 0.5)),
+    *(_lost("rudder", share) for share in (0.2, 0.5)),
+    *(_stuck("elevator", 0.05), _stuck("aileron", 0.05), _stuck("rudder", 0.1)),
+    *(_airspeed(error) for error in (-0.05, -0.1, -0.3)),
+    Case("pitot blocked: airspeed stays", (AIRSPEED,), "airspeed", broken=_jammed("V", AIRCRAFT.noise["airspeed"])),
+    *(_vane("alpha", degrees) for degrees in (1.0, 2.0, 4.0)),
+    *(_vane("beta", degrees) for degrees in (1.0, 4.0)),
+    Case("alpha vane stuck", (VANE_STUCK,), "alpha", broken=_jammed("alpha", AIRCRAFT.noise["alpha"])),
+    Case("beta vane stuck", (VANE_STUCK,), "beta", broken=_jammed("beta", AIRCRAFT.noise["beta"])),
+    Case("CG 20 mm aft", (DAMAGE,), "longitudinal", effects={"cg_shift": {"x": -0.02}}),
+    Case("pitch damping halved", (DAMAGE,), "longitudinal", effects=_changed(Cm_q=0.5)),
+    Case("half the fin lost", (DAMAGE,), "lateral", effects=_changed(**FIN)),
+)
+
+
+def believed(seed: int) -> Aircraft:
+    """The aircraft file, off by draws from its tolerances."""
+    random = np.random.default_rng(1000 + seed)
+    drawn = {
+        name: replace(d, value=d.value + (d.tolerance or 0.0) * float(random.standard_normal()))
+        for name, d in AIRCRAFT.derivatives.items()
+    }
+    return replace(AIRCRAFT, derivatives=drawn)
+
+
+def monitored(seed: int, identified: bool) -> State:
+    """A monitor that has seen nothing."""
+    if not identified:
+        return monitor.init(believed(seed), Settings())
+    state = monitor.init(AIRCRAFT, Settings())
+    off = np.random.default_rng(2000 + seed).standard_normal(len(state.held.values))
+    state.held.errors = IDENTIFIED * np.abs(state.held.values) + 1e-5
+    state.held.values = state.held.values + state.held.errors * off
+    return state
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Of one flight: alarms before the onset, when the first one after it came, what it was called at last."""
+
+    early: int
+    after: float  # s, inf = never
+    fault: Fault | None
+
+
+def watch(state: State, time: Array, samples: Array, onset: float) -> Seen:
+    """Let the monitor judge a flight."""
+    early, found, named = 0, math.inf, None
+    for block in of_record(state.aircraft, time, samples):
+        before = state.alarm
+        monitor.take(state, block)
+        if state.alarm is not None and before is None:
+            if block.time < onset:
+                early += 1
+            elif not math.isfinite(found):
+                found = block.time
+        if state.fault is not None and block.time >= onset and block.time <= found + JUDGED:
+            named = state.fault
+    return Seen(early, found - onset, named)
+
+
+def row(case: Case, turbulence: str, flights: int, identified: bool) -> list[str]:
+    """One line of the table."""
+    setting = Setting("", turbulence, seconds=END, later=case.effects, onset=ONSET)
+    if not case.effects:
+        setting = replace(setting, onset=math.inf)
+    seeds = range(1, flights + 1)
+    batch = fly(NAME, setting, list(seeds))
+    seen = []
+    for seed, samples in zip(seeds, batch.samples, strict=True):
+        if case.broken is not None:
+            first = int(np.searchsorted(batch.time, ONSET))
+            case.broken(samples[first:], samples[first - 1], np.random.default_rng(seed))
+        seen.append(watch(monitored(seed, identified), batch.time, samples, ONSET))
+    found = [one for one in seen if math.isfinite(one.after)]
+    right = [one.fault for one in found if one.fault and one.fault.kind in case.kinds and one.fault.part == case.part]
+    after = sorted(one.after for one in found)
+    times = [f"{np.median(after):.1f}", f"{after[-1]:.1f}"] if after else ["-", "-"]
+    return [
+        f"{case.name}; {turbulence}",
+        *times,
+        str(flights - len(found)),
+        str(len(found) - len(right)),
+        *_sizes(case, [fault for fault in right if fault is not None]),
+        str(sum(one.early for one in seen)),
+    ]
+
+
+def _sizes(case: Case, found: Sequence[Fault]) -> list[str]:
+    """Median size, and how many intervals hold the true one."""
+    if math.isnan(case.size) or not found:
+        return ["-", "-"]
+    middle = float(np.median([fault.size for fault in found]))
+    inside = sum(fault.lower <= case.size <= fault.upper for fault in found)
+    degrees = found[0].unit == "rad"
+    said = f"{math.degrees(middle):+.1f} deg" if degrees else f"{100 * middle:.0f} %"
+    return [said, f"{inside} of {len(found)}"]
+
+
+def faults(flights: int, identified: bool) -> str:
+    """The table of faults."""
+    rows = [row(case, turbulence, flights, identified) for case in CASES for turbulence in WEATHERS]
+    heads = ("fault; turbulence", "found after s: median", "longest", "missed", "wrongly isolated")
+    return table((*heads, "size, median", "true size in the interval", "alarms before"), rows)
+
+
+def hours(count: float, results: Path) -> str:
+    """Fly hours in which nothing fails, those that are not yet in the file of results, and count alarms."""
+    known = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
+    done = {(one["turbulence"], one["seed"]) for one in known}
+    for seed in range(1, round(count * HOUR / PART) + 1):
+        for turbulence in WEATHERS:
+            if (turbulence, seed) in done:
+                continue
+            setting = Setting("", turbulence, seconds=PART, manoeuvre=DOUBLETS if seed % 2 else ())
+            batch = fly(NAME, setting, [seed])
+            seen = watch(monitored(seed, seed % 4 < 2), batch.time, batch.samples[0], math.inf)
+            known.append({"turbulence": turbulence, "seed": seed, "alarms": seen.early})
+            with results.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(known[-1]) + "\n")
+    rows = []
+    for turbulence in WEATHERS:
+        mine = [one["alarms"] for one in known if one["turbulence"] == turbulence]
+        flown = len(mine) * PART / HOUR
+        rows.append([turbulence, f"{flown:.1f}", str(sum(mine)), f"{_most(sum(mine)) / flown:.2f}"])
+    flown, alarms = sum(float(r[1]) for r in rows), sum(int(r[2]) for r in rows)
+    rows.append(["all", f"{flown:.1f}", str(alarms), f"{_most(alarms) / flown:.2f}"])
+    return table(("turbulence", "hours", "false alarms", "an hour, 95 % sure: less than"), rows)
+
+
+def _most(count: int) -> float:
+    """The rate that so many events or fewer have a chance of 5 % with (Poisson)."""
+    from scipy.stats import chi2  # noqa: PLC0415  # only here
+
+    return 0.5 * float(chi2.ppf(0.95, 2 * count + 2))
+
+
+def main() -> None:
+    """Print the table, or put it in the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flights", type=int, default=10, help="of each fault and turbulence (default: 10)")
+    parser.add_argument("--identified", action="store_true", help="derivatives known to 2 %% instead")
+    parser.add_argument("--hours", type=float, default=0.0, help="fly so many in each turbulence without a fault")
+    parser.add_argument("--results", type=Path, default=Path("out/faults_hours.jsonl"), help="of the hours")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    if args.hours:
+        args.results.parent.mkdir(parents=True, exist_ok=True)
+        publish("bench/faults.py --hours", hours(args.hours, args.results), args.page)
+    elif args.identified:
+        publish("bench/faults.py --identified", faults(args.flights, True), args.page)
+    else:
+        publish("bench/faults.py", faults(args.flights, False), args.page)
+
+
+if __name__ == "__main__":
+    main()
