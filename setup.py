@@ -30,6 +30,7 @@ setup(
             "adapter = sysid_node.ros.adapters.node:main",
             "adaptive_controller = sysid_node.ros.adaptive_controller:main",
             "exciter = sysid_node.ros.exciter:main",
+            "fault_monitor = sysid_node.ros.fault_monitor:main",
             "flight_simulator = sysid_node.ros.flight_simulator:main",
             "identifier = sysid_node.ros.identifier:main",
             "player = sysid_node.ros.player:main",

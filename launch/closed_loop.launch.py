@@ -1,6 +1,6 @@
 """Flies in closed loop: `ros2 launch sysid_node closed_loop.launch.py aircraft:=cdrw`.
 
-Simulator, identifier, exciter and controller; `bag:=NAME` records what they say. Then
+Simulator, identifier, exciter, fault monitor and controller; `bag:=NAME` records what they say. Then
 `ros2 service call /exciter/start std_srvs/srv/Trigger`, and let something fail:
 `ros2 param set /flight_simulator effects control_effectiveness_loss:elevator=0.6`.
 """
@@ -18,12 +18,12 @@ CONFIG = Path(get_package_share_directory("sysid_node"), "config")
 FAILING = {"method": "sls_rft"}  # instruments are made of the aircraft file, which a failed aircraft is not
 RECORDED = (
     *("imu/data", "air_data", "actuators", "actuators/command", "actuators/excitation", "set_points"),
-    *("identifier/derivatives", "adaptive_controller/tracking", "pose", "/diagnostics"),
+    *("identifier/derivatives", "adaptive_controller/tracking", "fault_monitor/faults", "pose", "/diagnostics"),
 )
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Four nodes, each with its file of parameters, and a recorder where a bag is named."""
+    """Five nodes, each with its file of parameters, and a recorder where a bag is named."""
     aircraft = {"aircraft": LaunchConfiguration("aircraft")}
 
     def described(name: str, **own: object) -> dict[str, object]:
@@ -40,6 +40,7 @@ def generate_launch_description() -> LaunchDescription:
             Node(**described("flight_simulator", turbulence=LaunchConfiguration("turbulence"))),
             LifecycleNode(namespace="", **described("identifier", **FAILING)),
             Node(**described("exciter", watch=True, accuracy=0.15)),
+            Node(**described("fault_monitor")),
             Node(**described("adaptive_controller", adapt=LaunchConfiguration("adapt"))),
             ExecuteProcess(
                 cmd=["ros2", "bag", "record", "-o", bag, *RECORDED],

@@ -40,7 +40,7 @@ def test_executables_exist_and_have_a_file_of_parameters() -> None:
     assert set(text) == {"identify.launch.py", "closed_loop.launch.py"}
     assert 'executable="identifier"' in text["identify.launch.py"]
     named = set(re.findall(r'described\("(\w+)"', text["closed_loop.launch.py"]))
-    assert named == {"flight_simulator", "identifier", "exciter", "adaptive_controller"}
+    assert named == {"flight_simulator", "identifier", "exciter", "fault_monitor", "adaptive_controller"}
     for name in named:
         assert name in PROGRAMS
         assert (ROOT / "config" / f"{name}.yaml").is_file()

@@ -43,6 +43,7 @@ NODES: Mapping[str, tuple[str, ...]] = {
     "flight_simulator": (f"effects:='{ACTUATORS}'",),
     "identifier": ("method:=sls_rft",),
     "exciter": ("watch:=true", "accuracy:=0.15"),
+    "fault_monitor": (),
     "adaptive_controller": (),
 }
 

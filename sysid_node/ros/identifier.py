@@ -14,7 +14,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
@@ -28,14 +27,12 @@ from sysid_node.ros.conversion import stamp_ns
 from sysid_node.ros.declaring import declare, refusal, values_of
 from sysid_node.ros.diagnostics import Source
 from sysid_node.ros.lifecycle import CarefulNode
+from sysid_node.ros.loop_node import SENSOR_QOS
 from sysid_node.ros.monitor import Durations, TopicMonitor
 from sysid_node.ros.parameters import estimation_settings
 from sysid_node.ros.save import save_estimates
 from sysid_node.ros.session import Due, Session
 from sysid_node.ros.spin import run_program, serve
-
-#: As sensor data are published, but deep enough that a burst after a pause of the process is not lost.
-SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class Identifier(CarefulNode):

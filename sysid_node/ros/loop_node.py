@@ -29,6 +29,9 @@ DERIVATIVES = "identifier/derivatives"
 #: The newest counts: what is late is of no use to a controller.
 LATEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 
+#: As sensor data are published, but deep enough that a burst after a pause of the process is not lost.
+SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+
 #: The parameter that all of them have.
 AIRCRAFT = Parameter(
     "aircraft",

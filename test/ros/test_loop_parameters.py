@@ -9,11 +9,12 @@ from harness import ROOT
 
 from sysid_node.control.settings import Settings as Control
 from sysid_node.excite.inflight import Settings as Excitation
-from sysid_node.ros import adaptive_controller, exciter, flight_simulator
+from sysid_node.faults.settings import Settings as Faults
+from sysid_node.ros import adaptive_controller, exciter, fault_monitor, flight_simulator
 from sysid_node.ros.loop_node import EFFECT
 from sysid_node.ros.parameters import annotated_yaml, check_each
 
-NODES = [adaptive_controller, exciter, flight_simulator]
+NODES = [adaptive_controller, exciter, fault_monitor, flight_simulator]
 
 
 @pytest.mark.parametrize("node", NODES, ids=lambda node: node.__name__)
@@ -39,3 +40,4 @@ def test_every_setting_is_a_parameter_with_the_same_default() -> None:
     assert Control.from_mapping(values) == Control()
     names = {parameter.name for parameter in exciter.PARAMETERS}
     assert {field.name for field in fields(Excitation)} <= names
+    assert {field.name for field in fields(Faults)} <= {parameter.name for parameter in fault_monitor.PARAMETERS}

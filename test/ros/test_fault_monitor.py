@@ -1,0 +1,78 @@
+"""The fault monitor over DDS: in the loop with the simulator, from the forces and from the servos' positions."""
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from harness import ended, start
+from rclpy.executors import SingleThreadedExecutor
+
+from sysid_node.ros.loop_watch import LoopWatch
+
+LAG = "actuator_lag:time_constant=0.05"
+
+
+class Listener:
+    """What `fault_monitor/faults` said last, by part."""
+
+    def __init__(self) -> None:
+        self.node = rclpy.create_node("fault_listener")
+        self.faults: dict[str, dict[str, str]] = {}
+        self.node.create_subscription(DiagnosticArray, "/fault_monitor/faults", self.take, 10)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+
+    def take(self, message: Any) -> None:
+        self.faults = {
+            status.name.partition(": ")[2]: {pair.key: pair.value for pair in status.values}
+            for status in message.status
+        }
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def heard(ros: None) -> Iterator[tuple[LoopWatch, Listener]]:
+    watch, listener = LoopWatch(), Listener()
+    yield watch, listener
+    watch.close()
+    listener.close()
+
+
+def until(watch: LoopWatch, listener: Listener, condition: Callable[[], bool], patience: float = 60.0) -> None:
+    """Listen until the condition holds, asking for roll and pitch all the while."""
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end, (listener.faults, watch.words)
+        phase = int(watch.time / 1.5) % 4
+        watch.ask_for({"roll": (0.3, 0.0, -0.3, 0.0)[phase], "pitch": (0.13, 0.08, 0.04, 0.08)[phase]})
+        watch.listen(0.1)
+        listener.executor.spin_once(timeout_sec=0.02)
+
+
+def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> None:
+    """A jammed servo shows in its position; a lost effect only in the forces; a dead sensor in its silence."""
+    watch, listener = heard
+    own = {"fault_monitor": ("learning:=15.0",)}
+    with contextlib.ExitStack() as stack:
+        nodes = {}
+        for name in ("flight_simulator", "adaptive_controller", "fault_monitor"):
+            words = [word for pair in ("aircraft:=cdrw", *own.get(name, ())) for word in ("-p", pair)]
+            nodes[name] = stack.enter_context(ended(start(name, "--ros-args", *words)))
+        until(watch, listener, lambda: watch.said("fault_monitor") == "nothing has failed")
+        assert watch.set_effects(f"{LAG} control_effectiveness_loss:aileron=0.7") == ""
+        until(watch, listener, lambda: listener.faults.get("aileron", {}).get("kind") == "loss of effectiveness")
+        assert float(listener.faults["aileron"]["size"]) == pytest.approx(0.7, abs=0.2)
+        assert watch.set_effects(f"{LAG} stuck_surface:rudder=1:rudder_position=0.1") == ""
+        until(watch, listener, lambda: listener.faults.get("rudder", {}).get("kind") == "stuck surface")
+        assert float(listener.faults["rudder"]["size"]) == pytest.approx(0.1, abs=0.01)
+        nodes["flight_simulator"].kill()
+        until(watch, listener, lambda: listener.faults.get("imu/data", {}).get("kind") == "sensor silent")
+        nodes["flight_simulator"].wait()
+        nodes["flight_simulator"].returncode = 0
