@@ -100,7 +100,8 @@ def thinned(flight: Flight, rate: float = RATE) -> FlightRecord:
     columns = {}
     for name, values in record.columns.items():
         if np.isfinite(values).all():
-            columns[name] = _on_grid(record.time, values, fine, smooth=name in _SMOOTH)
+            whole = np.unwrap(values) if name in _TURNING else values
+            columns[name] = _on_grid(record.time, whole, fine, smooth=name in _SMOOTH)
     for name in ("p", "q", "r"):
         columns[f"{name}_rate"] = _slope(columns[name], rate * factor)
     taps = _low_pass(rate * factor)
@@ -110,6 +111,9 @@ def thinned(flight: Flight, rate: float = RATE) -> FlightRecord:
 
 #: Columns of motion; the others (commands) are straight between samples.
 _SMOOTH = frozenset({"ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "phi", "theta"})
+
+#: Angles that jump by a full turn, which no low-pass should see.
+_TURNING = frozenset({"phi", "psi"})
 
 
 def _on_grid(time: Array, values: Array, grid: Array, *, smooth: bool) -> Array:
