@@ -17,13 +17,13 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import PER_CONTROL, TIMES, Candidate, bounds, candidates_of
-from sysid_node.gap.evidence import Evidence, cross_validated, probabilities
+from sysid_node.gap.evidence import Evidence, judged, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, with_candidates
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.onset import sought
 from sysid_node.gap.spectra import power_of
 from sysid_node.gap.steps import Steps
-from sysid_node.gap.structure import Structure, instrumented, structure_of
+from sysid_node.gap.structure import Structure, structure_of, unbiased
 from sysid_node.gap.view import View
 
 #: For the first, second and third effect: explanations that it is tried upon (the best single one need not belong to
@@ -100,15 +100,20 @@ class Attribution:
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
-        corrected = instrumented(instrumented(self.base.fit))
+        corrected = unbiased(self.base.fit)
         return replace(self, chosen=self.base, corrected=corrected, left=structure_of(self.base.fit), causes=())
 
 
 def attribute(
-    views: Sequence[View], nuisances: Nuisances, progress: Progress, steps: Steps | None = None
+    views: Sequence[View],
+    nuisances: Nuisances,
+    progress: Progress,
+    steps: Steps | None = None,
+    unseen: Sequence[View] = (),
+    own: Sequence[Nuisances] = (),
 ) -> Attribution:
-    """Fits everything that has to be, and chooses."""
-    candidates, trier = candidates_of(views[0].simulator, views), Trier(nuisances, steps or Steps())
+    """Fits everything that has to be, and chooses; flights held out, with ``own`` nuisances, have a say but no fit."""
+    candidates, trier = candidates_of(views[0].simulator, views), Trier(nuisances, steps or Steps(), unseen, own)
     progress(0.0, "derivatives within their tolerances")
     base = trier.trial(blank(views, nuisances), [])
     chosen, stages, frontier = base, [], [base]
@@ -125,7 +130,7 @@ def attribute(
     chosen, places = _refined(trier, base, chosen, stages)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
     causes = tuple(sorted((_cause(trier, chosen, place) for place in places), key=lambda cause: -cause.probability))
-    corrected = instrumented(instrumented(chosen.fit))
+    corrected = unbiased(chosen.fit)
     return Attribution(base, chosen, corrected, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
 
 
@@ -140,6 +145,8 @@ class Trier:
 
     nuisances: Nuisances
     steps: Steps
+    unseen: Sequence[View] = ()  # flights held out, and what is allowed for in each
+    own: Sequence[Nuisances] = ()
     known: dict[frozenset[str], Trial] = field(default_factory=dict)  # by the labels of the set
     seen: dict[frozenset[str], dict[str, Look]] = field(default_factory=dict)  # upon such a set, by label
 
@@ -152,7 +159,7 @@ class Trier:
             done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
             if added is not None and (moved := sought(done, added)) is not done:
                 done = self.steps.polished(moved)
-            self.known[labels] = Trial(done, cross_validated(done))
+            self.known[labels] = Trial(done, judged(done, self.unseen, self.own))
         return replace(self.known[labels], added=added)
 
     def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
@@ -250,19 +257,24 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     matters = (gone > MATERIAL * left) & (gone > NOTICED**2 * motion)
     if not matters.any():
         return False
-    share = _power_lacking(base, without, trial) - now
-    return bool(np.any(matters & (share > MATERIAL_OF_ALL * power_left(base.evidence))))
+    return bool(np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)))
 
 
-def _power_lacking(base: Trial, without: Trial, trial: Trial) -> Array:
-    """Power (12,) that is left of a trial when what it has more than another is taken away, the others as they are.
+def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
+    """Power (12,) that comes back when what a trial has more than another is taken away, the others as they are.
 
-    The others would bend to hold its share: a lag twice as long for an engine half as strong. Nuisances do their best.
+    As a share of what nuisances alone leave, which do their best. The others would bend to hold what is gone: a lag
+    twice as long for an engine half as strong.
     """
     kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
     lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
     points = Projected(lacking).points(lacking.values)
-    return np.asarray(sum(power_of(v.residual(p)) for v, p in zip(lacking.views, points, strict=True)))
+    views = trial.fit.views
+    back, now, whole = (
+        sum(power_of(v.residual(p)) for v, p in zip(views, some, strict=True))
+        for some in (points, trial.fit.points, base.fit.points)
+    )
+    return np.asarray((back - now) / np.maximum(whole, 1e-300))
 
 
 def _trifling(trial: Trial) -> bool:

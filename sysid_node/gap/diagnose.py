@@ -70,10 +70,10 @@ def diagnose(
     views = [admitted(view_of(simulator, flight)) for flight in flights]
     nuisances = nuisances_of(aircraft, views[0])
     steps = Steps.of(keep, views)
-    attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps)
-    progress(0.92, "the gap on flight not fitted")
     unseen = [admitted(view_of(simulator, flight)) for flight in holdouts]
     own = [nuisances_of(aircraft, view) for view in unseen]
+    attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
+    progress(0.92, "the gap on flight not fitted")
     checked = check(attribution, unseen, own)
     if attribution.causes and checked.gap.after >= min(checked.gap.before, checked.gap.tolerances):
         attribution = attribution.without_causes()

@@ -82,6 +82,23 @@ def cross_validated(fit: Fit) -> Evidence:
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views, tuple(points))
 
 
+def judged(fit: Fit, unseen: Sequence[View], nuisances: Sequence[Nuisances]) -> Evidence:
+    """Evidence by which explanations compete: parts of the flights fitted, each predicted from the rest, and flights
+    held out. Nothing is fitted to the latter, but they have a say in what is blamed."""
+    own = cross_validated(fit)
+    if not unseen:
+        return own
+    theirs = held_out(fit, unseen, nuisances)
+    scores = [part.scores - fit.prior_score / part.scores.size for part in (own, theirs)]
+    both = np.concatenate(scores)
+    return Evidence(
+        both + fit.prior_score / both.size,
+        own.residuals + theirs.residuals,
+        own.views + theirs.views,
+        own.points + theirs.points,
+    )
+
+
 def _without_shapes(fit: Fit) -> Array:
     """The information with what only shapes an effect (an onset, an angle) held where the fit put it.
 
@@ -110,7 +127,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
         order = [*fit.indices, *_ordered(kept)]
         rows = real_rows(view.residual(point), weight)
         slopes = real_rows(view.slopes(point, order), weight)
-        slopes[..., :chosen] *= fit.loose[:chosen]
+        slopes[..., : chosen + shared] *= fit.loose[: chosen + shared]
         sigma = np.concatenate([kept.sigma[~kept.shared]])
         information = np.zeros((len(order), len(order)))
         information[: chosen + shared, : chosen + shared] = np.linalg.inv(known)

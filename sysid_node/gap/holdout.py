@@ -10,7 +10,7 @@ from sysid_node.gap.attribute import Attribution
 from sysid_node.gap.close import Gap
 from sysid_node.gap.evidence import Evidence, groups_of, held_out
 from sysid_node.gap.nuisance import Nuisances
-from sysid_node.gap.structure import Structure, instrumented
+from sysid_node.gap.structure import Structure, unbiased
 from sysid_node.gap.view import View
 
 
@@ -34,7 +34,7 @@ class Check:
 def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> Check:
     """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
     if unseen:
-        base, final = (held_out(f, unseen, own) for f in (instrumented(attribution.base.fit), attribution.corrected))
+        base, final = (held_out(f, unseen, own) for f in (unbiased(attribution.base.fit), attribution.corrected))
     else:
         base, final = attribution.base.evidence, attribution.chosen.evidence
     views = base.views

@@ -86,12 +86,17 @@ def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
 
 
+def gusty(view: View) -> bool:
+    """Whether the air moves across the flight path by enough to count."""
+    return bool(view.gusts >= _GUSTY * view.record["V"].mean())
+
+
 def _turning_air(aircraft: Aircraft, view: View) -> dict[str, float]:
     """In gusts: the air that rises also turns, which works like a derivative with the rate of alpha, up to -C_q.
 
     The pitching gust of a wing as long as the gusts are short: q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2).
     """
-    if view.gusts < _GUSTY * view.record["V"].mean():
+    if not gusty(view):
         return {}
     damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
     return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}

@@ -18,6 +18,7 @@ from scipy.signal import lfilter
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import prior
 from sysid_node.gap.fit import Fit, linearised, moved, real_rows, solve, weights
+from sysid_node.gap.nuisance import gusty
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
@@ -63,6 +64,11 @@ def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
     beyond = coherent - size
     chance = np.sqrt(2.0 * np.maximum(size, 1.0))
     return Structure(np.maximum(beyond, 0.0), total, beyond / chance, chance)
+
+
+def unbiased(fit: Fit) -> Fit:
+    """The fit as the instruments have it where the air moves; in still air least squares has no bias, and errs less."""
+    return instrumented(instrumented(fit)) if any(gusty(view) for view in fit.views) else fit
 
 
 def instrumented(fit: Fit) -> Fit:

@@ -16,8 +16,8 @@ from sysid_node.gap.view import View
 #: Probability from which an effect counts as told apart from its rivals.
 _TOLD_APART = 0.8
 
-#: Share of the remainder on some axis that must be structure to matter, and its standard deviations above chance.
-_STRUCTURED, _DEVIATIONS = 0.12, 6.0
+#: Standard deviations above chance from which what is left on some axis is structure, of twelve axes.
+_DEVIATIONS = 4.5
 
 #: Standard deviations above chance below which coherence is taken as chance.
 _CHANCE = 4.0
@@ -50,7 +50,7 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
 def structured(attribution: Attribution) -> bool:
     """Whether what is left holds structure that matters."""
     left, size = attribution.left, np.sqrt(_structure_left(attribution))
-    return bool(np.any((left.share > _STRUCTURED) & (left.deviations > _DEVIATIONS) & (size > NOTICED)))
+    return bool(np.any((left.deviations > _DEVIATIONS) & (size > NOTICED)))
 
 
 def explained(attribution: Attribution) -> float:
