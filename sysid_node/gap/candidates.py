@@ -31,8 +31,8 @@ TIMES = frozenset(
     {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
 )
 
-#: Of these, stamps that may also be early.
-_EITHER_WAY = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
+#: Of these, stamps that may also be early; early stamps of commands are what a command's delay does.
+_EITHER_WAY = frozenset({"air_data_delay", "imu_delay"})
 
 #: Onsets that are tried, as shares of the flight.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
@@ -91,6 +91,7 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     jams = [e == "stuck_surface" and p.switch for e, p in table]
     lower = [_JAMMED if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
     lower = [_STIFFEST if (e, p.name) == _RINGING else low for low, (e, p) in zip(lower, table, strict=True)]
+    lower = [0.0 if e == "actuator_stamp_delay" else low for low, (e, _) in zip(lower, table, strict=True)]
     return np.array(lower), np.array([p.upper for _, p in table])
 
 

@@ -84,7 +84,7 @@ def diagnose(
     verdict = verdict_of(views, attribution, checked)
     progress(0.95, "short flights beside the flight, and what to fly next")
     found = localise.where(attribution, [v.residual(simulator.neutral()) for v in views])
-    air = max(gusts_of(v, carried(attribution.corrected, v)) for v in checked.views)
+    air = max(gusts_of(v, carried(attribution.corrected, v)) for v in (*views, *unseen))
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(

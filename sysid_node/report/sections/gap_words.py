@@ -88,7 +88,8 @@ def _findings(found: Diagnosis) -> str:
         "ambiguous": " This flight does not settle which.",
         "unknown_effect": " Much remains that no effect known here predicts.",
     }.get(found.verdict, "")
-    return f". {_share(found)} {said}. With that added, {_falls(found, 'all in all')}.{doubt}"
+    most = " Most of what the simulator is off by remains." if not doubt and found.size.shrink_percent < 50.0 else ""
+    return f". {_share(found)} {said}. With that added, {_falls(found, 'all in all')}.{doubt}{most}"
 
 
 def _share(found: Diagnosis) -> str:
