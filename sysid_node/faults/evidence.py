@@ -16,6 +16,7 @@ the generalised likelihood ratio of Willsky & Jones (IEEE Trans. Automatic Contr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +64,22 @@ def weigh(J: Array, v: Array, shift: Shift, excess: float = 1.0) -> Weighed:
     return Weighed(factor, size, covariance)
 
 
+def weigh_each(J: Array, v: Array, shifts: Sequence[Shift], excess: Array) -> list[Weighed]:
+    """``weigh`` for many shifts, each by its own ``excess`` (H,); those with one free direction all at once."""
+    single = [i for i, shift in enumerate(shifts) if shift.spread.size == 1]
+    S = np.column_stack([shifts[i].fixed for i in single])
+    B = np.column_stack([shifts[i].free[:, 0] for i in single])
+    prior = np.array([shifts[i].spread[0] for i in single]) ** -2
+    share = 1.0 / excess[single]
+    JS = J @ S
+    G = (B * (J @ B)).sum(axis=0) * share + prior
+    g = (B * (v[:, None] - JS)).sum(axis=0) * share
+    factor = (S * (v[:, None] - 0.5 * JS)).sum(axis=0) * share + 0.5 * g * g / G - 0.5 * np.log(G / prior)
+    rows = zip(single, factor.tolist(), (g / G)[:, None], (1.0 / G)[:, None, None], strict=True)
+    found = {i: Weighed(f, size, covariance) for i, f, size, covariance in rows}
+    return [found[i] if i in found else weigh(J, v, shift, float(excess[i])) for i, shift in enumerate(shifts)]
+
+
 def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness: Array, excess: float) -> Weighed:
     """As ``weigh``, of J and v that are not marginal, where a fault may differ from its shift by ``looseness`` (D,).
 
@@ -88,11 +105,17 @@ def _evidence(G: Array, g: Array, prior: Array) -> tuple[float, Array, Array]:
     return 0.5 * float(g @ mean) - 0.5 * float(freedom), mean, covariance
 
 
-def statistic(J: Array, v: Array, shift: Shift) -> float:
-    """Mean square of the score along the free directions: 1 where nothing has failed and the whitening holds."""
-    B = shift.free
-    G, g = B.T @ J @ B, B.T @ v
-    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    G = G / np.outer(scale, scale) + 1e-6 * np.eye(len(g))
-    g = g / scale
-    return float(g @ np.linalg.solve(G, g)) / len(g)
+def score_squares(J: Array, v: Array, shifts: Sequence[Shift]) -> Array:
+    """(H,) mean square of the score along each shift: 1 where nothing has failed and the whitening holds."""
+    found = np.empty(len(shifts))
+    for i, shift in enumerate(shifts):
+        B = shift.free
+        g = v @ B
+        if g.size == 1:
+            found[i] = g[0] ** 2 / max(float(B[:, 0] @ J @ B[:, 0]), 1e-300)
+            continue
+        G = B.T @ J @ B
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+        g = g * scale
+        found[i] = float(g @ np.linalg.solve(G * np.outer(scale, scale) + 1e-6 * np.eye(g.size), g)) / g.size
+    return found

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import colour
-from sysid_node.faults.evidence import Weighed, marginal, statistic, weigh, weigh_loosely
+from sysid_node.faults.evidence import Weighed, marginal, score_squares, weigh_each, weigh_loosely
 from sysid_node.faults.state import Piece, State
 from sysid_node.faults.vanes import stuck_factor
 from sysid_node.online.signals import OFFSET
@@ -71,16 +71,13 @@ def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
 
 
 def statistics(state: State, over: Stretch) -> Array:
-    """(H,) of each hypothesis; see ``evidence.statistic``."""
-    return np.array([statistic(over.J, over.v, h.shift) for h in state.hypotheses])
+    """(H,) of each hypothesis; see ``evidence.score_squares``."""
+    return score_squares(over.J, over.v, [h.shift for h in state.hypotheses])
 
 
 def weights(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     """Each hypothesis; ``usual`` (H,) is the size of its statistic where nothing has failed."""
-    return [
-        weigh(over.J, over.v, h.shift, max(float(u), 1.0))
-        for h, u in zip(state.hypotheses, usual.tolist(), strict=True)
-    ]
+    return weigh_each(over.J, over.v, [h.shift for h in state.hypotheses], np.maximum(usual, 1.0))
 
 
 def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
