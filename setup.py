@@ -34,6 +34,7 @@ setup(
             "flight_simulator = sysid_node.ros.flight_simulator:main",
             "identifier = sysid_node.ros.identifier:main",
             "player = sysid_node.ros.player:main",
+            "recorder = sysid_node.ros.recorder:main",
             "sysid = sysid_node.cli.main:main",
         ],
     },

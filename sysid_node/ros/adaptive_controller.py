@@ -20,6 +20,7 @@ from sysid_node.control.settings import RANGES, Settings
 from sysid_node.control.types import Command, Sensed, SetPoints
 from sysid_node.flight.topics import AIR_DATA, IMU
 from sysid_node.ros import conversion
+from sysid_node.ros.arrivals import Arrivals
 from sysid_node.ros.beliefs import beliefs_of
 from sysid_node.ros.conversion import NANOSECONDS, stamp_ns
 from sysid_node.ros.loop_node import (
@@ -85,6 +86,7 @@ PARAMETERS = (
 SENSOR_AGE = 0.5  # s, of air data beyond which they are taken as not measured
 IMU_AGE = 0.1  # s of silence, after which the surfaces go back to level flight's
 EXCITATION_AGE = 0.1  # s, after which excitation is taken to have ended
+AGES = {AIR_DATA: SENSOR_AGE, DERIVATIVES: 1.0, EXCITATION: 0.5}  # s of silence that are told
 
 
 class AdaptiveController(LoopNode):
@@ -97,7 +99,9 @@ class AdaptiveController(LoopNode):
         self._points = SetPoints()
         self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
         self._extra: tuple[float, list[float]] = (-math.inf, [0.0] * len(CONTROLS))
-        self._now, self._heard_imu, self._imu_count, self._blind = math.nan, time.monotonic(), 0, 0
+        self._now, self._imu_count, self._blind = math.nan, 0, 0
+        self._imu = Arrivals(IMU, IMU_AGE)
+        self._others = {topic: Arrivals(topic, age) for topic, age in AGES.items()}
         self._start_ns = 0
         self._work = Durations()
         self._command = self.create_publisher(JointState, COMMAND, 10)
@@ -114,16 +118,19 @@ class AdaptiveController(LoopNode):
         p50, p99 = self._work.percentiles()
         values: dict[str, object] = {"step p50 (us)": 1e6 * p50, "step p99 (us)": 1e6 * p99}
         values |= {"commands without an IMU": self._blind, "IMU messages": self._imu_count}
+        arrivals = (self._imu, *self._others.values())
+        values |= {f"{one.topic}: troubles so far": one.count for one in arrivals}
+        troubles = [words for one in arrivals for words in one.troubles()]
         for axis in self._state.axes:
             values[f"{axis.axis.name}: gains"] = axis.verdict
             values[f"{axis.axis.name}: estimates used"] = " ".join(axis.used)
             values[f"{axis.axis.name}: checks passed"] = axis.accepted
             values[f"{axis.axis.name}: checks failed"] = axis.refused
         line = "; ".join(f"{axis.axis.name}: {axis.verdict}" for axis in self._state.axes)
-        silent = time.monotonic() - self._heard_imu > IMU_AGE
-        if silent:
+        if self._imu.silent() or not self._imu_count:
             return DiagnosticStatus.ERROR, f"{IMU} silent: surfaces at level flight's; {line}", values
-        return DiagnosticStatus.WARN if self._state.stale else DiagnosticStatus.OK, line, values
+        line = "; ".join([line, *troubles])
+        return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
 
     def _seconds(self, stamp: Any) -> float:
         """A stamp in s from the first IMU message's."""
@@ -132,9 +139,9 @@ class AdaptiveController(LoopNode):
     def _on_imu(self, message: Any) -> None:
         self._start_ns = self._start_ns or stamp_ns(message.header.stamp)
         now = self._seconds(message.header.stamp)
-        if now <= self._now and now > self._now - 1.0:
+        if not self._imu.arrived(now):
             return  # out of order
-        self._now, self._heard_imu = now, time.monotonic()
+        self._now = now
         self._imu_count += 1
         *_, p, q, r = conversion.imu_values(message, -1.0)
         phi, theta = attitude_of(message)
@@ -143,13 +150,16 @@ class AdaptiveController(LoopNode):
         self._fly(Sensed(now, p, q, r, phi, theta, V, alpha, beta, density))
 
     def _on_air_data(self, message: Any) -> None:
+        self._others[AIR_DATA].arrived(self._seconds(message.header.stamp))
         self._air = self._seconds(message.header.stamp), conversion.air_data_values(message)
 
     def _on_estimates(self, message: Any) -> None:
         estimates = conversion.estimates_from_message(message, self._start_ns)
+        self._others[DERIVATIVES].arrived(estimates.time)
         controller.hear(self._state, estimates.time, beliefs_of(estimates))
 
     def _on_excitation(self, message: Any) -> None:
+        self._others[EXCITATION].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
         values = values_by_name(message)
         found = [values.get(name, 0.0) for name in CONTROLS]
         self._extra = time.monotonic(), found if all(map(math.isfinite, found)) else [0.0] * len(found)
@@ -160,8 +170,8 @@ class AdaptiveController(LoopNode):
 
     def _watch(self) -> None:
         """Without an IMU: no feedback, the surfaces back to level flight's."""
-        silence = time.monotonic() - self._heard_imu
-        if silence > IMU_AGE and self._imu_count:
+        if self._imu.silent():
+            silence = time.monotonic() - self._imu.heard
             self._blind += 1
             self._fly(Sensed(self._now + silence, *(math.nan,) * (len(Sensed._fields) - 1)))
 

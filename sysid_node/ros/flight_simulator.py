@@ -67,6 +67,7 @@ PARAMETERS = (
     Parameter("noise", 1.0, "", "Sensor noise, in that of the aircraft file.", "0 for ideal sensors.", 0.0, 20.0),
     Parameter("seed", 0.0, "", "Of noise and turbulence.", "For another flight.", 0.0, 1e9),
 )
+COMMAND_AGE = 0.2  # s without a command that are told
 LIVE = frozenset({"effects"})
 MOST_BEHIND = 0.5  # s of flight; what is late beyond it is not flown
 POSE_EVERY = 10  # samples
@@ -87,6 +88,7 @@ class FlightSimulator(LoopNode):
         self._command: list[float] = self._trim.command.tolist()
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
         self._steps, self._skipped, self._commands, self._refused = Durations(), 0.0, 0, 0
+        self._commanded = -math.inf  # s, monotonic, when the last command came
         self._open_topics()
         live.step(self._simulator, self._flight, self._command)  # compiles
         self._start_ns = self.get_clock().now().nanoseconds if values["speed"] == 1.0 else time.time_ns()
@@ -122,8 +124,12 @@ class FlightSimulator(LoopNode):
             "commands refused": self._refused,
             "not flown (s)": self._skipped,
         }
-        late = f"; {self._skipped:.1f} s were not flown, the machine is too slow" if self._skipped else ""
-        return DiagnosticStatus.WARN if late else DiagnosticStatus.OK, f"{flown:.0f} s flown{late}", values
+        troubles = [f"{self._skipped:.1f} s were not flown, the machine is too slow"] if self._skipped else []
+        silence = time.monotonic() - self._commanded
+        if self._commands and silence > COMMAND_AGE:
+            troubles.append(f"no commands for {silence:.1f} s: the last one is held")
+        line = "; ".join([f"{flown:.0f} s flown", *troubles])
+        return DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK, line, values
 
     def _on_command(self, message: Any) -> None:
         found = self._actuation.of_message(self._actuation.places(message.name), message.position)
@@ -132,7 +138,7 @@ class FlightSimulator(LoopNode):
             return
         thrust, *controls = found
         self._command = [*controls, thrust]
-        self._commands += 1
+        self._commands, self._commanded = self._commands + 1, time.monotonic()
 
     def _on_time(self) -> None:
         """Fly what is due."""

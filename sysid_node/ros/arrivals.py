@@ -1,0 +1,89 @@
+"""How a topic's messages arrive: lost, late, out of order, silent, their clock set. What happened is kept until told.
+
+Once a second is too seldom to see what lasts for a tenth of it: every trouble is counted as it happens, and told by the
+next ``/diagnostics``.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+STEP_BACK, STEP_AHEAD = 1.0, 5.0  # s of the stamps that are a clock that was set
+SEVERAL = 1.6  # usual intervals between two stamps: at least one message is missing
+LEARNED = 0.02  # weight of an interval in what is usual
+SHARE = 0.05  # of messages lost, beyond which it is told
+LATE = 0.03  # s later than the promptest, beyond which it is told
+DRIFT = 1e-3  # s/s by which the promptest may have become slower: clocks drift
+
+
+@dataclass
+class Arrivals:
+    """Of one topic; ``silent_after`` s without a message are told."""
+
+    topic: str
+    silent_after: float
+    heard: float = -math.inf  # s, monotonic
+    stamp: float = math.nan  # s, the newest
+    usual: float = math.nan  # s between stamps
+    prompt: float = math.inf  # s, the least of arrival less stamp
+    came: int = 0  # of late
+    missing: int = 0
+    latest: float = 0.0  # s
+    events: list[str] = field(default_factory=list)  # not told yet
+    count: int = 0  # of all troubles so far
+
+    def arrived(self, stamp: float) -> bool:
+        """A message with a stamp (s) has come; False where it is no newer than another."""
+        now = time.monotonic()
+        if self.silent():
+            self._tell(f"was silent for {now - self.heard:.1f} s")
+        self.heard = now
+        step = stamp - self.stamp
+        if -STEP_BACK < step <= 0.0:
+            self._tell("out of order")
+            return False
+        if step <= -STEP_BACK or step > STEP_AHEAD:
+            self._tell(f"clock set by {step:+.1f} s")
+            self.prompt = math.inf
+        elif step > 0.0:
+            self._count(step)
+        self.stamp, self.came = stamp, self.came + 1
+        self.prompt = min(self.prompt, now - stamp)
+        self.latest = max(self.latest, now - stamp - self.prompt)
+        return True
+
+    def silent(self) -> bool:
+        """Whether it is silent at present; never before the first message."""
+        return math.isfinite(self.heard) and time.monotonic() - self.heard > self.silent_after
+
+    def troubles(self) -> list[str]:
+        """What was wrong since this was last asked, in words."""
+        said, self.events = list(dict.fromkeys(self.events)), []
+        if self.silent():
+            said.append(f"silent for {time.monotonic() - self.heard:.1f} s")
+        share = self.missing / max(self.came + self.missing, 1)
+        if share > SHARE:
+            said.append(f"{100.0 * share:.0f} % lost")
+        if self.latest > LATE:
+            said.append(f"up to {1e3 * self.latest:.0f} ms late")
+        self.count += share > SHARE or self.latest > LATE
+        self.came, self.missing, self.latest = 0, 0, 0.0
+        return [f"{self.topic} {words}" for words in said]
+
+    def _tell(self, event: str) -> None:
+        self.events.append(event)
+        self.count += 1
+
+    def _count(self, step: float) -> None:
+        """How many are missing between two stamps."""
+        if math.isnan(self.usual):
+            self.usual = step
+        if step > SEVERAL * self.usual:
+            self.missing += round(step / self.usual) - 1
+        elif step < self.usual / SEVERAL:
+            self.usual = step  # what was taken for usual had gaps
+        else:
+            self.usual += LEARNED * (step - self.usual)
+        self.prompt += DRIFT * step

@@ -1,0 +1,90 @@
+"""The program `recorder`: what a flight says, into a bag, where no `ros2 bag` is at hand; ended by Ctrl-C.
+
+Messages are written as they came, byte for byte, with the time at which they came.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.utilities import remove_ros_args
+from rosbags.rosbag2 import Writer
+
+from sysid_node.flight.bag_writer import STORAGES, add_topic, new_bag
+from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE, INPUT_TOPICS
+from sysid_node.ros.spin import run_program, serve
+
+JOINTS = "sensor_msgs/msg/JointState"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+#: What is recorded: all that is needed to identify again, and what was made of it in flight.
+TOPICS: Mapping[str, str] = {
+    **INPUT_TOPICS,
+    "actuators/command": JOINTS,
+    "actuators/excitation": JOINTS,
+    "set_points": JOINTS,
+    "adaptive_controller/tracking": JOINTS,
+    DERIVATIVES.lstrip("/"): DERIVATIVES_TYPE,
+    "identifier/model_gap": "sysid_msgs/msg/ModelGap",
+    "fault_monitor/faults": DIAGNOSTICS,
+    "/diagnostics": DIAGNOSTICS,
+}
+#: Nothing is asked for again, so that no publisher waits for the recorder; deep, for a disk that stalls.
+QOS = QoSProfile(depth=5000, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class Recorder(Node):
+    """Writes every message of ``topics`` (name -> type) into a bag that is open."""
+
+    def __init__(self, writer: Writer, topics: Mapping[str, str]) -> None:
+        super().__init__("recorder")
+        self.count = 0
+        overrides = QoSOverridingOptions.with_default_policies()
+        for topic, type_name in topics.items():
+            package, _, name = type_name.partition("/msg/")
+            kind = getattr(importlib.import_module(f"{package}.msg"), name)
+            resolved = self.resolve_topic_name(topic)
+            take = self._writing(writer, add_topic(writer, resolved, type_name))
+            self.create_subscription(kind, topic, take, QOS, raw=True, qos_overriding_options=overrides)
+
+    def _writing(self, writer: Writer, connection: Any) -> Callable[[bytes], None]:
+        def take(message: bytes) -> None:
+            writer.write(connection, time.time_ns(), message)
+            self.count += 1
+
+        return take
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="recorder", description=__doc__, epilog="ROS arguments follow --ros-args.")
+    parser.add_argument("bag", type=Path, help="folder to make")
+    parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
+    return parser
+
+
+def main() -> None:
+    """Entry point of the program."""
+    options = _parser().parse_args(remove_ros_args(sys.argv)[1:])
+
+    def record() -> None:
+        with new_bag(options.bag, options.storage) as writer:
+            recorder = Recorder(writer, TOPICS)
+            recorder.get_logger().info(f"records into {options.bag}")
+            with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):  # the writer aborts on exceptions
+                serve(recorder)
+
+    sys.exit(run_program(record))
+
+
+if __name__ == "__main__":
+    main()

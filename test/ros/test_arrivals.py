@@ -1,0 +1,73 @@
+"""What is told of arrivals, on a clock that the tests move."""
+
+import random
+
+import pytest
+
+from sysid_node.ros import arrivals
+from sysid_node.ros.arrivals import Arrivals
+
+
+class Clock:
+    now = 100.0
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    one = Clock()
+    monkeypatch.setattr(arrivals.time, "monotonic", lambda: one.now)
+    return one
+
+
+def fed(clock: Clock, topic: Arrivals, seconds: float, *, drop: float = 0.0, jitter: float = 0.0) -> None:
+    """Messages at 100 Hz, of which some are lost and each is late by up to ``jitter`` s."""
+    draw = random.Random(1)
+    begin = clock.now
+    for k in range(round(seconds * 100)):
+        clock.now = max(clock.now, begin + 0.01 * k + draw.random() * jitter)
+        if draw.random() >= drop:
+            topic.arrived(1000.0 + begin + 0.01 * k)
+
+
+def test_all_is_well(clock: Clock) -> None:
+    topic = Arrivals("imu/data", 0.1)
+    fed(clock, topic, 3.0)
+    assert topic.troubles() == []
+    assert topic.count == 0
+
+
+def test_losses_are_told_once(clock: Clock) -> None:
+    topic = Arrivals("imu/data", 0.2)
+    fed(clock, topic, 20.0, drop=0.3)
+    (words,) = topic.troubles()
+    assert words.startswith("imu/data")
+    assert float(words.split()[1]) == pytest.approx(30.0, abs=4.0)
+    assert topic.troubles() == []
+
+
+def test_what_comes_late(clock: Clock) -> None:
+    topic = Arrivals("imu/data", 0.2)
+    fed(clock, topic, 2.0)
+    topic.troubles()
+    fed(clock, topic, 2.0, jitter=0.05)
+    assert any("ms late" in words for words in topic.troubles())
+
+
+def test_a_short_silence_is_told_after_it_has_ended(clock: Clock) -> None:
+    topic = Arrivals("air_data", 0.1)
+    assert not topic.silent()  # nothing was ever heard
+    fed(clock, topic, 1.0)
+    clock.now += 0.4
+    assert topic.silent()
+    assert topic.arrived(1000.0 + clock.now)
+    assert "air_data was silent for 0.4 s" in topic.troubles()
+
+
+def test_a_clock_that_steps_back(clock: Clock) -> None:
+    topic = Arrivals("imu/data", 0.1)
+    fed(clock, topic, 1.0)
+    newest = topic.stamp
+    assert not topic.arrived(newest - 0.2)
+    assert topic.arrived(newest - 5.0)
+    assert topic.troubles() == ["imu/data out of order", "imu/data clock set by -5.0 s"]
+    assert topic.count == 2
