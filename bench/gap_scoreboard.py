@@ -22,7 +22,7 @@ from pathlib import Path
 from evaluation.pages import publish
 from withheld import judging, scoreboard
 from withheld.closing import closed
-from withheld.drawing import SETS, draw
+from withheld.drawing import FOREIGN, SETS, draw
 
 
 def main() -> None:
@@ -77,6 +77,9 @@ def _finish(which: str, seed: int, folder: Path, *, fly_only: bool) -> None:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     (case / "seconds.txt").write_text(f"{seconds:.1f}\n", encoding="utf-8")
+    truth = draw(which, seed)
+    if truth.plant != FOREIGN and truth.kind != "unlisted":  # what the simulator can fly as it is
+        _run([sys.executable, "-m", "withheld.covering", which, str(seed), str(folder)], folder, seed, "covering")
     for judged in _judged(which, folder, seed):
         print(seed, judging.line(judged), flush=True)
 
@@ -101,7 +104,10 @@ def _judged(which: str, folder: Path, seed: int) -> Iterator[judging.Judged]:
         truth = json.loads(label.read_text(encoding="utf-8"))
         judged = judging.judge(truth, json.loads(found.read_text(encoding="utf-8")))
         named = judged.right and judged.kind in ("one", "two")
-        yield replace(judged, flown=closed(truth, which, folder / str(seed)) if named else None)
+        flown = closed(truth, which, folder / str(seed)) if named else None
+        kept = folder / str(seed) / "covered.json"
+        further = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else None
+        yield replace(judged, flown=flown, further=further)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from .instruments import SUITES
 
 SETS = {"development": 20260101, "final": 20260401}
 PLANTS = {"cdfp": 0.25, "cdrw": 0.25, "kestrel": 0.25, "c172p": 0.25}  # the last flies in JSBSim
+FOREIGN = "c172p"  # whose tables no aircraft file holds
 KINDS = {"none": 0.2, "one": 0.5, "two": 0.15, "unlisted": 0.15}
 TURBULENCE = {"none": 0.4, "light": 0.4, "moderate": 0.2}
 

@@ -38,6 +38,7 @@ class Judged:
     onset: float | None  # s off
     gap: Mapping[str, Any]
     flown: Mapping[str, float] | None = None  # errors in the plant: before, after, true_effect
+    further: Mapping[str, float] | None = None  # errors on further flights: before, after, truth; shrink_percent
 
     @property
     def kind(self) -> str:
@@ -61,6 +62,14 @@ class Judged:
             return None
         before, after, best = (self.flown[name] for name in ("before", "after", "true_effect"))
         return (before - after) / (before - best) if best < 0.95 * before else None
+
+    @property
+    def covers(self) -> bool | None:
+        """Whether the stated interval holds the shrinkage on further flights; None where there is next to no gap."""
+        if self.further is None or self.further["truth"] > 0.95 * self.further["before"]:
+            return None
+        low, high = self.gap["ci95"]
+        return bool(low <= self.further["shrink_percent"] <= high)
 
 
 def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:
@@ -125,7 +134,7 @@ def _onset(label: Mapping[str, Any], said: Mapping[str, Any]) -> float | None:
     for cause in said["causes"]:
         true = label["effects"].get(cause["effect"], {}).get("onset", -1.0)
         if true > 0.0 and "onset" in cause["parameters"]:
-            return abs(float(cause["parameters"]["onset"][0]) - true)
+            return abs(float(cause["parameters"]["onset"][0]) - float(true))
     return None
 
 

@@ -9,11 +9,11 @@ from itertools import pairwise
 from evaluation.pages import table
 from scipy.stats import beta
 
+from .drawing import FOREIGN
 from .judging import BLAMED, Judged
 
 _ALPHA = 0.05
 _EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.99, 1.01)  # of the bins of stated probability
-_FOREIGN = "c172p"  # the plant whose tables no aircraft file holds
 
 
 def interval(right: int, of: int) -> tuple[float, float]:
@@ -27,12 +27,12 @@ def page(cases: Sequence[Judged], failed: Sequence[str] = ()) -> str:
     """The section of the documentation: cases that were judged, and what was said of those that failed."""
     if not cases:
         return "No case was diagnosed."
-    own = [c for c in cases if c.label["plant"] != _FOREIGN]
-    foreign = [c for c in cases if c.label["plant"] == _FOREIGN]
-    columns = {"all": cases, "own plants": own, _FOREIGN: foreign}
+    own = [c for c in cases if c.label["plant"] != FOREIGN]
+    foreign = [c for c in cases if c.label["plant"] == FOREIGN]
+    columns = {"all": cases, "own plants": own, FOREIGN: foreign}
     rows = [[what, *(_share(flags(c)) for c in columns.values()), wanted] for what, flags, wanted in _SCORES]
     parts = [
-        f"{len(cases)} cases, {len(own)} of the own plants, {len(foreign)} of {_FOREIGN}; in brackets 95 % intervals.",
+        f"{len(cases)} cases, {len(own)} of the own plants, {len(foreign)} of {FOREIGN}; in brackets 95 % intervals.",
         table(("", *columns, "wanted"), rows),
         "Probabilities as stated, and the share of them that is right:",
         table(("stated", "mean stated", "right", "causes"), calibration([s for c in cases for s in c.stated])),
@@ -85,6 +85,8 @@ _SCORES = (
      lambda c: [x.closed >= 0.9 for x in _named(c)], "90 %"),
     ("of those named: 90 % of what the true effect closes, flown in the plant",
      lambda c: [x.closed_in_plant >= 0.9 for x in _named(c) if x.closed_in_plant is not None], "90 %"),
+    ("the stated interval of the shrinkage holds that of further flights",
+     lambda c: [x.covers for x in c if x.covers is not None], "90 %"),
 )  # fmt: skip
 
 
@@ -97,14 +99,14 @@ def calibration(stated: Sequence[tuple[float, bool]]) -> list[list[str]]:
             said, right = (sum(column) / len(own) for column in zip(*own, strict=True))
             error += abs(said - right) * len(own) / len(stated)
             rows.append([f"{low:g} to {min(high, 1.0):g}", f"{said:.2f}", f"{right:.2f}", str(len(own))])
-    return [*rows, ["expected calibration error", "", f"{error:.2f}", str(len(stated))]]
+    return [*rows, ["expected calibration error (wanted: under 0.08)", "", f"{error:.2f}", str(len(stated))]]
 
 
 def _confusion(cases: _Cases) -> list[list[str]]:
     rows = []
     for effect in sorted({e for c in cases for e in _effects(c)}):
-        for plant in ("own", _FOREIGN):
-            own = [c for c in cases if effect in _effects(c) and (c.label["plant"] == _FOREIGN) == (plant == _FOREIGN)]
+        for plant in ("own", FOREIGN):
+            own = [c for c in cases if effect in _effects(c) and (c.label["plant"] == FOREIGN) == (plant == FOREIGN)]
             if own:
                 missed = Counter(c.first for c in own if not _found(effect, c))
                 others = ", ".join(f"{name} {count}" for name, count in missed.most_common())

@@ -28,14 +28,14 @@ from sysid_node.gap.view import View
 
 #: For the first, second and third effect: explanations that it is tried upon (the best single one need not belong to
 #: the best pair), and candidates that are fitted to the end upon each after a first look at all.
-_STAGES = ((1, 6), (3, 4), (1, 4))
+_STAGES = ((1, 6), (3, 4), (2, 3))
 
 #: Probability, against doing without, from which an effect is accepted.
 _SURE = 0.95
 
-#: Share of the power left over, and of that which derivatives and biases leave, that an effect must take away on flight
-#: not fitted, on the axis where it does most.
-MATERIAL, MATERIAL_OF_ALL = 0.25, 0.08
+#: Share of the power left over that an effect must take away on the axis where it does most, and share of what
+#: derivatives and biases leave there that comes back without it: a fifth of the gap's size.
+MATERIAL, MATERIAL_OF_ALL = 0.25, 0.04
 
 #: Error, as a share of the motion, that nobody would look for.
 NOTICED = 0.05
@@ -269,12 +269,15 @@ def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
     kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
     lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
     points = Projected(lacking).points(lacking.values)
-    views = trial.fit.views
-    back, now, whole = (
-        sum(power_of(v.residual(p)) for v, p in zip(views, some, strict=True))
-        for some in (points, trial.fit.points, base.fit.points)
-    )
-    return np.asarray((back - now) / np.maximum(whole, 1e-300))
+    back, now, whole = (_powers(trial.fit, some) for some in (points, trial.fit.points, base.fit.points))
+    return np.asarray(np.max((back - now) / np.maximum(whole, 1e-300), axis=0))
+
+
+def _powers(fit: Fit, points: Sequence[Array]) -> Array:
+    """Power (2, 12) that parameters leave of the flights, and without the means, beside which all else may be small."""
+    residuals = [view.residual(point) for view, point in zip(fit.views, points, strict=True)]
+    swinging = [np.concatenate([0.0 * r[:, :1], r[:, 1:]], axis=1) for r in residuals]
+    return np.array([sum(power_of(r) for r in some) for some in (residuals, swinging)])
 
 
 def _trifling(trial: Trial) -> bool:

@@ -23,7 +23,7 @@ _DEVIATIONS = 4.5
 _CHANCE = 4.0
 
 #: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
-_EXPLAINED = 0.5
+_EXPLAINED = 0.8
 
 #: Probability, with what is left over counted against it, below which no cause is said to explain.
 _LIKELY = 0.5
@@ -39,6 +39,8 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
     """One of gap.json's five words."""
     if max(excitation(view).max() for view in views) < _TELLING:
         return "unsupported"
+    if check.foreseen:
+        return "no_gap"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) else "no_gap"
     if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
