@@ -15,8 +15,7 @@ from sysid_node.gap.close import Gap
 from sysid_node.gap.confusion import Confusion, confusion_of
 from sysid_node.gap.evidence import Evidence, carried
 from sysid_node.gap.flights import RATE, Flight
-from sysid_node.gap.flown import flown
-from sysid_node.gap.holdout import check
+from sysid_node.gap.holdout import settled
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.next_flight import advice
 from sysid_node.gap.nuisance import nuisances_of
@@ -74,13 +73,7 @@ def diagnose(
     own = [nuisances_of(aircraft, view) for view in unseen]
     attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
     progress(0.92, "the gap on flight not fitted")
-    checked = check(attribution, unseen, own)
-    if attribution.causes and checked.gap.after >= min(checked.gap.before, checked.gap.tolerances):
-        attribution = attribution.without_causes()
-        checked = check(attribution, unseen, own)
-    if not attribution.causes and checked.gap.tolerances > checked.gap.before:
-        attribution = attribution.as_filed()
-        checked = checked.as_filed(attribution.left)
+    attribution, checked = settled(attribution, views, unseen, own)
     verdict = verdict_of(views, attribution, checked)
     progress(0.95, "short flights beside the flight, and what to fly next")
     found = localise.where(attribution, [v.residual(simulator.neutral()) for v in views])
@@ -88,7 +81,7 @@ def diagnose(
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(
-        aircraft, verdict, checked.gap, flown(checked.base, checked.final), found, attribution,
+        aircraft, verdict, checked.gap, checked.flown, found, attribution,
         localise.missing(attribution), checked.views, checked.base, checked.final, flight, bool(holdouts),
         confusion_of(attribution.base, attribution.trials), air,
     )  # fmt: skip

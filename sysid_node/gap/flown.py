@@ -37,6 +37,9 @@ _LONGITUDINAL = frozenset({"ax", "az", "q", "theta", "V", "alpha"})
 #: A reading counts where it moved by so many times the power of its noise.
 _MOVED = 4.0
 
+#: How much larger than foreseen an error may be by chance: the scatter of half a minute of turbulence is a quarter.
+_BY_CHANCE = 1.5
+
 #: Bootstrap draws, and short flights in a row that are drawn together.
 _DRAWS, _BLOCK = 2000, 2
 
@@ -68,6 +71,18 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
     if not counted.any():
         return None
     return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
+
+
+def foreseen(views: Sequence[View]) -> bool:
+    """Whether the file's own simulator, in such air and with such sensors, would be off as far in every reading.
+
+    Then there is nothing to blame, however well an effect would mimic the weather.
+    """
+    tables = [_table(v, *[[v.simulator.neutral()] * len(groups_of(v))] * 2) for v in views if shows(v)]
+    if not tables or not all(np.isfinite(table).all() for table in tables):
+        return False
+    before, floor = np.concatenate(tables, axis=1)[[2, 5]].mean(axis=1)
+    return bool((before <= _BY_CHANCE**2 * floor).all())
 
 
 def shows(view: View) -> bool:

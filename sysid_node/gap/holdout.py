@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from sysid_node.gap import close
 from sysid_node.gap.attribute import Attribution
 from sysid_node.gap.close import Gap
 from sysid_node.gap.evidence import Evidence, groups_of, held_out
+from sysid_node.gap.flown import flown, foreseen
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.structure import Structure, unbiased
 from sysid_node.gap.view import View
@@ -21,7 +23,18 @@ class Check:
     views: tuple[View, ...]
     base: Evidence
     final: Evidence
-    gap: Gap
+    gap: Gap  # of forces, moments and kinematics by frequency
+    foreseen: bool = False  # whether weather and sensors' noise are all of it
+
+    @cached_property
+    def flown(self) -> Gap | None:
+        """The gap of short flights."""
+        return flown(self.base, self.final)
+
+    @property
+    def gaps(self) -> list[Gap]:
+        """By either measure."""
+        return [self.gap, *([self.flown] if self.flown else [])]
 
     def as_filed(self, left: Structure) -> Check:
         """The same of the aircraft file as it is."""
@@ -40,3 +53,26 @@ def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisan
     views = base.views
     before = [v.residual(v.simulator.neutral()) for v in views]
     return Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))
+
+
+def settled(
+    attribution: Attribution, views: Sequence[View], unseen: Sequence[View], own: Sequence[Nuisances]
+) -> tuple[Attribution, Check]:
+    """What flight not fitted leaves of an explanation.
+
+    Nothing is blamed where weather and noise are all of the gap, nor what predicts flight no better than the
+    derivatives within their tolerances or simulates it no better than the file; and derivatives that do worse than the
+    file leave the file as it is.
+    """
+    checked = check(attribution, unseen, own)
+    if foreseen([*views, *unseen]):
+        attribution = attribution.without_causes().as_filed()
+        return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
+    worse = checked.gap.after >= checked.gap.tolerances or any(g.after >= g.before for g in checked.gaps)
+    if attribution.causes and worse:
+        attribution = attribution.without_causes()
+        checked = check(attribution, unseen, own)
+    if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
+        attribution = attribution.as_filed()
+        checked = checked.as_filed(attribution.left)
+    return attribution, checked

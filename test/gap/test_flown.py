@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_node.gap.evidence import Evidence, groups_of
-from sysid_node.gap.flown import WINDOW, drawn, flown
+from sysid_node.gap.flown import WINDOW, drawn, flown, foreseen
 from sysid_node.gap.view import View, view_of
 from sysid_node.sim import Simulator
 
@@ -62,3 +62,12 @@ def test_no_attitude_no_short_flights(plain_view) -> None:
     record = plain_view.record.__class__(plain_view.record.time, columns)
     bare = plain_view.__class__(**{**plain_view.__dict__, "record": record})
     assert gap_of(bare, {}) is None
+
+
+def test_weather_is_foreseen_and_effects_are_not(aircraft, make_flight) -> None:
+    """Turbulence in which nothing but the autopilot moves the surfaces, and a wing that rings in still air."""
+    simulator = Simulator(aircraft, 50.0)
+    weather = make_flight({}, seed=5, turbulence="light", manoeuvre=[])
+    assert foreseen([view_of(simulator, weather)])
+    slow = make_flight({"structural_mode": {"gain": 0.3}}, seed=6)
+    assert not foreseen([view_of(simulator, slow)])
