@@ -23,6 +23,7 @@ def main() -> None:
     parser.add_argument("--only", choices=("published", "coverage"), help="one section")
     parser.add_argument("--flights", type=int, default=200, help="simulated ones for the coverage (default: 200)")
     parser.add_argument("--method", help="coverage of this method only")
+    parser.add_argument("--air", help="coverage in this air only, as the table calls it")
     parser.add_argument("--results", type=Path, help="CSV file that keeps the coverage's lines as they come")
     parser.add_argument("--records", type=Path, default=Path(os.environ.get("SYSID_FLIGHTS", beside)))
     parser.add_argument("--page", type=Path, help="Markdown file whose sections to fill")
@@ -36,7 +37,8 @@ def main() -> None:
         else:
             print(f"flight records not found at {args.records}: nothing to compare; give their folder as --records")
     if args.only in (None, "coverage"):
-        trials = [trial for trial in intervals.TRIALS if args.method in (None, trial.method)]
+        chosen = ((trial, {args.method, args.air} - {None}) for trial in intervals.TRIALS)
+        trials = [trial for trial, wanted in chosen if wanted <= {trial.method, trial.air}]
         publish("bench/batch.py coverage", intervals.section(trials, args.flights, args.results), args.page)
 
 

@@ -31,8 +31,9 @@ from sysid_node.flight.record import Array
 #: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
 _NOISE_RANGE = 1e3
 
-#: The noises' own small likelihood makes the last digits dear; a hundredth of a standard error is enough.
-FILTER_SEARCH = Search(tolerance=1e-2)
+#: The noises' own small likelihood makes the last digits dear; a hundredth of a standard error is enough. A round that
+#: goes all the way to the best gain for the first, wrong, noise may end where the likelihood is highest only locally.
+FILTER_SEARCH = Search(tolerance=1e-2, early=3)
 
 #: 1-sigma of the logarithm of a noise about its start value: a factor of twenty either way is no surprise.
 _NOISE_PRIOR = 3.0

@@ -25,12 +25,14 @@ from sysid_node.flight.record import Array
 class Search:
     """How long to look: rounds of noise relaxation, and model evaluations within each.
 
-    Converged once a whole round moves no unknown by more than ``tolerance`` of its standard error.
+    Converged once a whole round moves no unknown by more than ``tolerance`` of its standard error. ``early``
+    evaluations are enough for a round that another will follow; the last has ``evaluations``.
     """
 
     rounds: int = 60
     evaluations: int = 50
     tolerance: float = 1e-3
+    early: int = 50
 
 
 DEFAULT_SEARCH = Search()
@@ -134,14 +136,16 @@ def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
     """The unknowns of maximum likelihood, the rounds it took, and a complaint where it did not converge."""
     z = problem.start()
     problem.check(z)
-    moved = np.inf
+    moved, evaluations = np.inf, search.early
     for iteration in range(1, search.rounds + 1):
         previous, noise = z, problem.noise(z)
-        z = weighted_least_squares(problem, z, np.arange(z.size), noise, search.evaluations)
+        z = weighted_least_squares(problem, z, np.arange(z.size), noise, evaluations)
         # |J dz| bounds every |dz_i| over its standard error
         moved = float(np.linalg.norm(problem.jacobian(z, noise) @ (z - previous)))
-        if moved < search.tolerance:
+        if moved < search.tolerance and evaluations == search.evaluations:
             return z, iteration, ""
+        # so few evaluations may also have found no step at all
+        evaluations = search.evaluations if moved < search.tolerance else search.early
     return (
         z,
         search.rounds,

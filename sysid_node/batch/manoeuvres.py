@@ -53,17 +53,18 @@ def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
 
 
 def segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:
-    """The record in pieces of about equal length, none longer than ``seconds``; 0 leaves it whole.
+    """The record in pieces of equal length, none longer than ``seconds``; 0 leaves it whole.
 
     A long open-loop rollout drifts away on small errors of trim and wind; pieces with an initial state each do not.
+    Fewer samples than there are pieces are left over at the end: equal pieces run through the same compiled program.
     """
     if len(record) < _FEWEST:
         raise InputError(f"flight {record.name!r}: {len(record)} samples; give at least {_FEWEST}, better some seconds")
     if not seconds > 0.0:
         return [record]
     pieces = max(1, int(np.ceil(record.duration / seconds - 1e-9)))
-    edges = np.linspace(0, len(record), pieces + 1).round().astype(int)
-    if np.diff(edges).min() < _FEWEST:
+    edges = len(record) // pieces * np.arange(pieces + 1)
+    if edges[1] < _FEWEST:
         raise InputError(
             f"flight {record.name!r}: {len(record)} samples in {record.duration:.1f} s cannot be cut into segments of "
             f"{seconds:g} s; give longer segments"
