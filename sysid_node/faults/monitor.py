@@ -50,7 +50,8 @@ SETTLED = 0.5  # share of the learning, after which the residuals' colour is kno
 OFFSETS = 30.0  # s over which offsets are learned
 USUAL = 60.0  # s over which the usual size of a statistic is
 DATED = 5.0  # s after an alarm in which its onset is sought
-MUCH, LITTLE = 0.2, 1.5  # share of the largest Bayes factor's logarithm; times the least variance left
+MUCH, LITTLE = 0.2, 1.5  # share of the largest Bayes factor's logarithm; times the least energy left
+CHANCE = 10.0  # energy, in that of a block's noise, that chance may leave more or less
 OUTLIER = 10.0  # a statistic beyond this is no usual one
 
 
@@ -243,8 +244,10 @@ def _onset(state: State, alarm: Alarm) -> float:
 
 
 def _left(state: State, over: Stretch, usual: Array) -> float:
-    """The least of the variance that a hypothesis leaves."""
-    return min(excess(state, over, place, weighed) for place, weighed in enumerate(weights(state, over, usual)))
+    """The least energy beyond the noise's that a hypothesis leaves in a stretch, and what chance may make of it."""
+    found = enumerate(weights(state, over, usual))
+    share = min(excess(state, over, place, weighed) for place, weighed in found)
+    return max(share - 1.0, 0.0) * len(over.pieces) + CHANCE
 
 
 def _over(state: State, place: int, alarm: Alarm) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import colour
 from sysid_node.faults.evidence import Weighed, marginal, score_squares, weigh_each, weigh_loosely
 from sysid_node.faults.state import Piece, State
+from sysid_node.faults.types import DAMAGE
 from sysid_node.faults.vanes import stuck_factor
 from sysid_node.online.signals import OFFSET
 
@@ -23,6 +25,7 @@ VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index(
 
 
 LOOSE = 0.1  # share by which a fault may differ from its hypothesis
+LAST_RESORT = 0.1  # share by which damage, which can explain all, must explain more than what is simple
 
 
 class Stretch(NamedTuple):
@@ -66,7 +69,10 @@ def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     found = []
     for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
-        found.append(weigh_loosely(*over.whole, hypothesis.shift, state.belief.precision, LOOSE * moved, scale))
+        one = weigh_loosely(*over.whole, hypothesis.shift, state.belief.precision, LOOSE * moved, scale)
+        if hypothesis.kind == DAMAGE:
+            one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
+        found.append(one)
     return found
 
 
