@@ -94,7 +94,7 @@ def take(state: State, block: Block) -> None:
             _judge(state, piece)
         elif state.count * PERIOD > SETTLED * state.settings.learning:
             held.learn(state.held, piece.J, piece.v)
-    state.raw.append((design, residual))
+    state.raw.append(_against_held(state, block))
 
 
 def _against_held(state: State, block: Block) -> tuple[Array, Array]:
@@ -122,7 +122,7 @@ def _judge(state: State, piece: Piece) -> None:
             _follow(state, state.alarm)
         return
     if state.count % RENEWED == 0 or not state.hypotheses:
-        _renew(state)
+        _renew(state, piece.block)
     _watch(state)
     if state.alarm is None and len(state.pieces) > LAG:
         old = state.pieces[-LAG - 1]
@@ -139,27 +139,28 @@ def _learn(state: State, block: Block, residual: Array) -> None:
     known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
 
 
-def _renew(state: State) -> None:
+def _renew(state: State, now: Block) -> None:
     """What is held, and how it could fail, from what has been learned."""
     colour.settle(state.colour)
-    if held.ripen(state.held, state.pieces[-1].block.time):
+    if held.ripen(state.held, now.time):
         _rebuild(state)
-    noise = {vane: state.aircraft.noise[vane] ** 2 / state.pieces[-1].block.samples for vane in VANES}
+    noise = {vane: state.aircraft.noise[vane] ** 2 / now.samples for vane in VANES}
     share = held.noise_of(state.terms, state.colour, noise) * state.held.blocks
     state.belief = held.belief(state.held, share, state.settings.slack)
     state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held, state.belief.shift))
 
 
 def _rebuild(state: State) -> None:
-    """Make the last pieces anew: against other values."""
-    blocks_of = [piece.block for piece in state.pieces]
+    """Make the last pieces anew, against other values; the first ones go, whose past is not known any more."""
+    last = [piece.block for piece in state.pieces]
     state.pieces.clear()
     state.raw.clear()
-    for block in blocks_of:
+    for block in last:
         design, residual = _against_held(state, block)
         if len(state.raw) == ORDER:
             state.pieces.append(_piece(state, block, design, residual))
         state.raw.append((design, residual))
+    state.raw.pop()  # ``take`` adds the newest
 
 
 def _watch(state: State) -> None:

@@ -152,6 +152,14 @@ def test_the_last_good_derivatives_are_held() -> None:
     assert state.held.values[place] == -0.47
 
 
+def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
+    """Their values differ from the file's as a sound aircraft's may: nothing is found, early or late."""
+    state, maker = monitored(seed=10)
+    monitor.hear(state, 1.0, {"Cm_de": Known(-0.4606 * 1.01, 0.01, True), "CL_alpha": Known(3.02, 0.05, True)})
+    assert fly(state, maker, 60.0) is None
+    assert state.held.values[state.terms.names.index("CL_alpha")] == 3.02
+
+
 def test_samples_of_another_rate_or_with_holes_are_averaged_alike() -> None:
     """A steady turn: the means are the samples' values, whatever the rate; what lacks a value is left out."""
     for rate in (50, 200):
