@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import judgement, signals, transform
+from sysid_node.online import interval, judgement, signals, transform
 from sysid_node.online.present import Present, count_beliefs, offsets, present_at
 from sysid_node.online.rows import DerivativeRows, FitRows
 from sysid_node.online.state import Grounds, State
@@ -40,9 +40,10 @@ def estimates_at(
     values = np.concatenate([current.solution.theta.reshape(K, -1), constants], axis=1).take(table.place, axis=1)
     errors = np.concatenate([current.variance.reshape(K, -1), constant_variances], axis=1).take(table.place, axis=1)
     errors = np.sqrt(np.maximum(errors, 0.0))
-    statuses = judgement.judge(state, renewed, grounds, current, values, errors, nows)
-    halves = grounds.quantiles * errors
-    numbers = np.stack([values, errors, values - halves, values + halves], axis=1)
+    below, above = interval.reach(grounds.quantiles * errors, grounds.counted, renewed.bend)
+    unbounded = np.isinf(below) | np.isinf(above)
+    statuses = judgement.judge(state, renewed, grounds, current, values, np.where(unbounded, np.inf, errors), nows)
+    numbers = np.stack([values, errors, values - below, values + above], axis=1)
     names = table.names
     if table.unformed:
         missing = [_unknown(state, name) for name in table.unformed]

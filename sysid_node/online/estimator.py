@@ -60,7 +60,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         lowest=_lowest(len(aircraft.controls)),
         signals=signals.scalar_signals(aircraft),
         momentum=signals.momentum_gain(aircraft),
-        believed=beliefs(aircraft, plan)[0],
+        believed=beliefs(aircraft, plan),
         auxiliary=auxiliary_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,

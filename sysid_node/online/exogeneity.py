@@ -24,10 +24,14 @@ Array = NDArray[np.float64]
 ALLOWED = 0.05  # correlation between instruments and gusts
 
 
-def inflation(spread: Uncertainty, sensed: Array) -> Array:
-    """(C,) factors of the covariance, where ``sensed`` (C,) of the residual's density is the sensors' noise."""
-    share = np.clip(1.0 - DOUBT * sensed / np.maximum(spread.density, 1e-300), 0.0, 1.0)
-    return np.asarray(1.0 + ALLOWED**2 * spread.freedom * share)
+def share_of_gusts(spread: Uncertainty, sensed: Array) -> Array:
+    """(C,) share of each residual that is not the sensors' noise, of which ``sensed`` (C,) is the density."""
+    return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(spread.density, 1e-300), 0.0, 1.0))
+
+
+def inflation(spread: Uncertainty, gusts: Array) -> Array:
+    """(C,) factors of the covariance; ``gusts`` (C,): see ``share_of_gusts``."""
+    return np.asarray(1.0 + ALLOWED**2 * spread.freedom * gusts)
 
 
 def sensed(

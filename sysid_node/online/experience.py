@@ -81,7 +81,7 @@ def recall(experience: Experience, full: Plan, since: float, before: float) -> R
     for segment in chosen[1:]:
         said = said + segment.said
     gram = said.grams.sum(axis=0)
-    strength = regression.strength(full, regression.solve(full, gram), said)
-    plan = regression.trusting(full, strength)
+    hold = regression.hold(full, regression.solve(full, gram), said)
+    plan = regression.trusting(full, hold.strength)
     solution = regression.solve(plan, gram)
     return Reference(chosen[-1].end, plan, solution, regression.uncertainty(plan, solution, said))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import reconstruction, regression
+from sysid_node.online import interval, reconstruction, regression
 from sysid_node.online.present import Present
 from sysid_node.online.regression import student_95
 from sysid_node.online.state import Grounds, Renewed, State
@@ -28,9 +28,10 @@ BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 def grounds(state: State, renewed: Renewed) -> Grounds:
     """What the judgement of all estimates rests on until the next renewal."""
     table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
+    c = table.coefficient
     start, _, stop = state.model.settings.frequencies
     # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
-    firm = (np.where(plan.mine > 0.0, renewed.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
+    firm = (np.where(plan.mine > 0.0, renewed.hold.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
     sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost & ~renewed.doubted)[table.coefficient]
     spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
     flaws = np.full(len(table.names), "", dtype=object)
@@ -41,7 +42,9 @@ def grounds(state: State, renewed: Renewed) -> Grounds:
         sound=sound & ~spoilt & (flaws == ""),
         spoilt=spoilt,
         flaws=flaws,
-        quantiles=student_95(freedom)[table.coefficient],
+        quantiles=student_95(freedom)[c],
+        counted=interval.counted(freedom, student_95(freedom), renewed.gusts)[c],
+        prudence=np.sqrt(np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])),
         fits=list(
             zip(
                 np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density).tolist(),
@@ -66,7 +69,7 @@ def judge(
     table = state.model.table
     motion = current.gram.reshape(len(values), -1).take(table.motion, axis=1)
     inflation = current.diagonal.take(table.unknown, axis=1) * motion
-    good = (errors <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
+    good = (errors * grounds.prudence <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
     good &= errors > NARROWEST * np.abs(values)
     slope = ~table.offset
     buried = slope & (motion < np.maximum(BURIED * renewed.total.bias.take(table.motion), regression.TINY))

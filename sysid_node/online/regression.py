@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,28 +218,41 @@ def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertaint
     return Uncertainty(covariance, density, bands, freedom)
 
 
-def strength(plan: Plan, solution: Solution, info: Information) -> Array:
-    """(P,) the F statistic of each instrumented regressor: what instruments explain of it over what they do not.
+class Hold(NamedTuple):
+    """How firmly instruments hold on to the regressors. Of each of the P unknowns."""
 
-    Under about 10 the estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
+    strength: Array  # F statistic: what instruments explain of a regressor over what they do not
+    luck: Array  # by how much variances would be larger without chance; at least 1
+
+
+def hold(plan: Plan, solution: Solution, info: Information) -> Hold:
+    """The instruments' strength, and the luck that is in the solution.
+
+    Under an F of about 10 estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
     instruments in linear IV regression", 2005). Infinite where every regressor is its own instrument.
+
+    Instruments are what the aircraft file's model makes of the deflections, so Z'A is Z'Z and chance. Where chance adds
+    to it instruments seem strong, the standard error is small and the estimate is off, all in one. So the strength is
+    that of Z'Z where this is less, and ``luck`` says what it makes of the variance.
     """
+    P = plan.columns.size
     if plan.least_squares:
-        return np.full(plan.columns.size, np.inf)
+        return Hold(np.full(P, np.inf), np.ones(P))
     if not solution.usable or info.trace_square <= 0.0:
-        return np.zeros(plan.columns.size)
+        return Hold(np.zeros(P), np.ones(P))
     gram = info.grams.sum(axis=0)
     outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
     plain = solve(without(plan, tuple(range(int(plan.group.max()) + 1))), gram)
     if not plain.usable:
-        return np.zeros(plan.columns.size)
-    best = plain.inverse.diagonal()
-    achieved = (solution.inverse @ outer @ solution.inverse.T).diagonal()
-    efficiency = np.clip(best / np.maximum(achieved, TINY), 0.0, 1.0 - 1e-9)
+        return Hold(np.zeros(P), np.ones(P))
+    achieved = np.maximum((solution.inverse @ outer @ solution.inverse.T).diagonal(), TINY)
+    ridged = outer + plan.unit * (RIDGE * outer.diagonal() + TINY)
+    expected = np.maximum(np.linalg.inv(ridged).diagonal(), achieved)
+    efficiency = np.clip(plain.inverse.diagonal() / expected, 0.0, 1.0 - 1e-9)
     freedom = float(info.traces.sum()) ** 2 / info.trace_square
     statistic: Array = freedom * efficiency / (1.0 - efficiency)
     statistic[outer.diagonal() <= TINY] = 0.0  # no instrument at all
-    return statistic
+    return Hold(statistic, expected / achieved)
 
 
 def student_95(freedom: Array) -> Array:

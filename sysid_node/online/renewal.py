@@ -14,6 +14,7 @@ from sysid_node.online import (
     change,
     exogeneity,
     information,
+    interval,
     noise,
     reconstruction,
     regression,
@@ -25,7 +26,9 @@ from sysid_node.online.change import PIECE, Looking, Watch
 from sysid_node.online.contradiction import Reference
 from sysid_node.online.experience import experiences, learn
 from sysid_node.online.information import Information
+from sysid_node.online.prudence import prudence
 from sysid_node.online.regression import Plan, Solution, Uncertainty
+from sysid_node.online.signals import OFFSET
 from sysid_node.online.state import Renewed, State
 from sysid_node.online.unevenness import Unevenness
 
@@ -97,7 +100,7 @@ def _weigh_recent(state: State) -> None:
     model, rows = state.model, np.array(state.recent)
     boxes = max(round(2.0 * model.settings.frequencies[2] * duration), 1)
     found = unevenness.measure(
-        model.aircraft, model.layout, model.plan, model.believed, rows, mean, duration, every, boxes
+        model.aircraft, model.layout, model.plan, model.believed[0], rows, mean, duration, every, boxes
     )
     state.uneven = state.uneven + found
     state.weighed_until = now
@@ -145,8 +148,8 @@ def _solve_all(state: State, segment: Information) -> None:
     total = past + segment
     gram = total.grams.sum(axis=0)
     full = state.model.plan
-    strength = regression.strength(full, regression.solve(full, gram), total)
-    plan = state.plan = regression.trusting(full, strength)
+    hold = regression.hold(full, regression.solve(full, gram), total)
+    plan = state.plan = regression.trusting(full, hold.strength)
     compensation = None
     if last is not None and last.solution.usable:
         share = noise.allowed(plan, last.solution, last.uncertainty.density, total.bias / _line_seconds(state, total))
@@ -161,7 +164,8 @@ def _solve_all(state: State, segment: Information) -> None:
             state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, plan, solution, total
         )
     scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
-    variance = _variances(state, total, plan, solution, spread)
+    gusts = _gusts(state, total, plan, solution, spread)
+    variance = exogeneity.inflation(spread, gusts) * spread.covariance.diagonal(axis1=1, axis2=2).T
     factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
     none = np.zeros(len(plan.coefficients), dtype=bool)
     if last is None or state.pieces % TIMING_EVERY == 0:
@@ -169,18 +173,35 @@ def _solve_all(state: State, segment: Information) -> None:
     else:
         lags = last.timing
     base = past.grams.sum(axis=0)
+    mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
+    bend = interval.bend(plan, state.model.table, solution, gram, spread.covariance, mean)
+    caution = prudence(plan, solution, spread, hold, gram, *state.model.believed)
     now = state.transform.last
-    state.renewed = Renewed(now, total, solution, spread, compensation, base, factors, lags, strength, none, none)
+    state.renewed = Renewed(
+        time=now,
+        total=total,
+        solution=solution,
+        uncertainty=spread,
+        compensation=compensation,
+        base=base,
+        factors=factors,
+        timing=lags,
+        hold=hold,
+        prudence=caution,
+        bend=bend,
+        gusts=gusts,
+        lost=none,
+        doubted=none,
+    )
     state.watch.references.append(Reference(now, plan, solution, spread))
 
 
-def _variances(state: State, total: Information, plan: Plan, solution: Solution, spread: Uncertainty) -> Array:
-    """(P, C) squared standard errors, gusts that the deflections may know of allowed for."""
+def _gusts(state: State, total: Information, plan: Plan, solution: Solution, spread: Uncertainty) -> Array:
+    """(C,) share of the residuals that are gusts."""
     aircraft, omega = state.model.aircraft, state.model.spectrum.omega
     per_line, step = total.bias / _line_seconds(state, total), total.energy / max(total.samples, 1.0)
     sensed = exogeneity.sensed(aircraft, plan, solution, per_line, total.uneven, step, omega)
-    variances: Array = exogeneity.inflation(spread, sensed) * spread.covariance.diagonal(axis1=1, axis2=2).T
-    return variances
+    return exogeneity.share_of_gusts(spread, sensed)
 
 
 def _look_for_changes(state: State, lines: Array) -> None:

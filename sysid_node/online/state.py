@@ -14,8 +14,9 @@ from sysid_node.online.auxiliary import Auxiliary
 from sysid_node.online.change import Watch
 from sysid_node.online.experience import Experience
 from sysid_node.online.information import Information, Spectrum
+from sysid_node.online.interval import Bend
 from sysid_node.online.reconstruction import Reconstruction
-from sysid_node.online.regression import Plan, Solution, Uncertainty
+from sysid_node.online.regression import Hold, Plan, Solution, Uncertainty
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import Layout, MomentumGain, ScalarSignals
 from sysid_node.online.table import Table
@@ -39,7 +40,7 @@ class Model:
     lowest: tuple[float, ...]  # what each value of a sample must lie above
     signals: ScalarSignals
     momentum: MomentumGain
-    believed: Array  # (P, C) the aircraft file's derivatives
+    believed: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
     auxiliary: Auxiliary | None  # what makes instruments, where the method wants them
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
@@ -53,6 +54,8 @@ class Grounds:
     spoilt: NDArray[np.bool_]  # (D,) by a control that is not on time
     flaws: NDArray[np.object_]  # (D,) what the lack of a flow angle's sensor takes away, "" for nothing
     quantiles: Array  # (D,) half an interval over a standard error
+    counted: Array  # (D,) see ``interval.counted``
+    prudence: Array  # (D,) what standard errors are multiplied by before they are called small
     fits: list[tuple[float, float, int]]  # by coefficient: what ``FitQuality`` says besides R squared
 
 
@@ -68,7 +71,10 @@ class Renewed:
     base: Array  # (W, W) Gram matrix of the finished segments
     factors: Array  # (P, C) squared standard error over (P_jj residual)
     timing: Timing  # whether the controls are felt when they are measured
-    strength: Array  # (P,) of the instruments
+    hold: Hold  # of the instruments on the regressors
+    prudence: Array  # (P, C) see ``prudence``
+    bend: Bend  # of the intervals
+    gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
     doubted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
     grounds: Grounds | None = None  # made when first wanted

@@ -20,9 +20,13 @@ def spread(density: Array, freedom: float) -> Uncertainty:
     return Uncertainty(np.zeros((density.size, 1, 1)), density, density[:, None], np.full(density.size, freedom))
 
 
+def inflation(of: Uncertainty, sensed: Array) -> Array:
+    return exogeneity.inflation(of, exogeneity.share_of_gusts(of, sensed))
+
+
 def test_sensor_noise_alone_is_no_reason_for_doubt() -> None:
     noise = np.array([1.0, 2.0])
-    np.testing.assert_allclose(exogeneity.inflation(spread(DOUBT * noise, 1e4), noise), 1.0)
+    np.testing.assert_allclose(inflation(spread(DOUBT * noise, 1e4), noise), 1.0)
 
 
 def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -> None:
@@ -32,7 +36,7 @@ def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -
         u = rng.normal(size=(4000, length)).astype(np.float32)
         means = np.einsum("ij,ij->i", u, rng.normal(size=u.shape).astype(np.float32)) / length
         errors = means + ALLOWED  # n = ALLOWED u + an independent part
-        factor = exogeneity.inflation(spread(np.ones(1), float(length)), np.zeros(1))[0]
+        factor = inflation(spread(np.ones(1), float(length)), np.zeros(1))[0]
         inside = np.abs(errors) < 1.96 * np.sqrt(factor / length)
         assert inside.mean() > least
         if length == 10000:

@@ -4,56 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from made_lines import INSTRUMENTAL, PLAIN, ROWS, STRUCTURE, information, layout, made
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from sysid_node.online import regression
-from sysid_node.online.information import BANDS, Information, nothing
+from sysid_node.online.information import BANDS
 from sysid_node.online.regression import Plan
-from sysid_node.online.signals import Layout
 
 Array = NDArray[np.float64]
-STRUCTURE = {
-    "CL": ("0", "alpha", "q", "de"),
-    "CD": ("0", "alpha", "de"),
-    "Cm": ("0", "alpha", "q", "de"),
-    "CY": ("beta", "p", "dr"),
-    "Cn": ("beta", "p", "dr"),
-    "Cl": ("p",),
-}
-INSTRUMENTED = ("alpha", "q", "beta", "p")
-ROWS = 120  # 20 in each band
-
-
-def layout(instrumented: tuple[str, ...] = ()) -> Layout:
-    return Layout(("alpha", "q", "beta", "p", "de", "dr"), ("de", "dr"), instrumented)
-
-
-def made(plan: Plan, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:
-    """Lines (ROWS, W) of regressors, their instruments, and outputs of a known model with white noise."""
-    rng = np.random.default_rng(seed)
-    lines = rng.normal(size=(ROWS, plan.width))
-    truth = {}
-    for c, coefficient in enumerate(plan.coefficients):
-        mine = plan.unknowns(c)
-        truth[coefficient] = rng.normal(size=mine.size)
-        lines[:, plan.outputs[c]] = lines[:, plan.columns[mine]] @ truth[coefficient] + noise * rng.normal(size=ROWS)
-    return lines, truth
-
-
-def information(lines: Array, density: float) -> Information:
-    """Information of lines that are independent, of variance ``density`` each for noise of unit density."""
-    info = nothing(layout(("alpha", "q", "beta", "p")))
-    parts = np.split(lines, BANDS)
-    info.grams = np.stack([part.T @ part for part in parts])
-    info.scores = density * info.grams
-    info.traces = np.full(BANDS, density * ROWS / BANDS)
-    info.trace_square = density**2 * ROWS
-    return info
-
-
-PLAIN = regression.plan(STRUCTURE, layout())
-INSTRUMENTAL = regression.plan(STRUCTURE, layout(INSTRUMENTED))
 
 
 def test_plan_shares_blocks_and_knows_its_unknowns() -> None:
@@ -204,10 +163,23 @@ def test_strength_is_that_of_the_first_stage() -> None:
     info = information(np.pad(lines, ((0, 0), (0, 19 - plan.width))), 1.0)
     info.grams = info.grams[:, : plan.width, : plan.width]
     R2 = np.corrcoef(lines[:, plan.instruments[0]], lines[:, plan.columns[0]])[0, 1] ** 2
-    found = regression.strength(plan, regression.solve(plan, info.grams.sum(axis=0)), info)
-    assert found[0] == pytest.approx(ROWS * R2 / (1.0 - R2), rel=0.05)
+    found = regression.hold(plan, regression.solve(plan, info.grams.sum(axis=0)), info)
+    assert found.strength[0] == pytest.approx(ROWS * R2 / (1.0 - R2), rel=0.05)
     assert regression.trusting(plan, np.array([100.0])) is plan
     assert regression.trusting(plan, np.array([3.0])).least_squares
+
+
+@pytest.mark.parametrize("hold", [0.8, 1.25])
+def test_a_regressor_that_follows_its_instrument_more_than_expected_is_luck(hold: float) -> None:
+    """x = hold z: the variance is that of 1 / hold^2; what is less than that of z itself is luck."""
+    lines, _ = made(INSTRUMENTAL, 4)
+    columns, instruments = INSTRUMENTAL.columns, INSTRUMENTAL.instruments
+    lines[:, columns] = hold * lines[:, instruments]
+    info = information(lines, 1.0)
+    found = regression.hold(INSTRUMENTAL, regression.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info)
+    free = columns != instruments
+    np.testing.assert_allclose(found.luck[free & (INSTRUMENTAL.group == INSTRUMENTAL.block[5])], max(hold, 1.0) ** 2)
+    assert (found.luck >= 1.0).all()
 
 
 def test_an_instrument_that_does_not_move_is_none() -> None:
@@ -215,9 +187,9 @@ def test_an_instrument_that_does_not_move_is_none() -> None:
     lines, _ = made(INSTRUMENTAL, 2)
     lines[:, INSTRUMENTAL.instruments[0]] = 0.0
     info = information(lines, 1.0)
-    found = regression.strength(INSTRUMENTAL, regression.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info)
-    assert found[0] == 0.0
-    assert regression.trusting(INSTRUMENTAL, found).instruments[0] == INSTRUMENTAL.columns[0]
+    found = regression.hold(INSTRUMENTAL, regression.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info)
+    assert found.strength[0] == 0.0
+    assert regression.trusting(INSTRUMENTAL, found.strength).instruments[0] == INSTRUMENTAL.columns[0]
 
 
 def test_weak_instruments_cost_their_block_alone() -> None:

@@ -1,0 +1,70 @@
+"""Intervals of instrumental-variable estimates, which reach further where instruments are weak.
+
+The residual's density at the estimate is too small where the estimate lies, by chance, towards that of least squares,
+which leaves the least residual. Anderson & Rubin (Annals of Mathematical Statistics 20, 1949) take the density at the
+value that is tested instead. So the interval is all values at a distance delta from the estimate with
+
+    delta^2 <= h^2 (1 + slope delta + curve delta^2),        h^2 = t^2 se^2 nu / (nu + t^2)
+
+where the bracket is the residual's sum of squares over that at the estimate, nu degrees of freedom are in it, and the
+other unknowns move along as their covariance with this one says. In least squares, where slope = 0 and curve = 1 / (nu
+se^2), this is Student's interval; with instruments it leans away from least squares, and has no end where h^2 curve >=
+1. Gusts are a few large eddies rather than as many independent numbers as there are lines: for their share of the
+residual h = t se.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online.regression import TINY, Plan, Solution, misfits
+from sysid_node.online.table import Table
+
+Array = NDArray[np.float64]
+
+
+class Bend(NamedTuple):
+    """How the residual's sum of squares, relative to what it is, changes with each of D derivatives."""
+
+    slope: Array  # (D,) per unit of the derivative
+    curve: Array  # (D,) per unit squared
+
+
+def bend(plan: Plan, table: Table, solution: Solution, gram: Array, covariance: Array, mean: Array) -> Bend:
+    """From the ``gram`` (W, W), the unknowns' ``covariance`` (C, P, P) and the regressors' ``mean`` (P,)."""
+    P = plan.columns.size
+    v = misfits(plan, solution.theta)
+    gradient = (gram[plan.columns] @ v).T * plan.mine.T  # (C, P)
+    normal = gram[plan.columns[:, None], plan.columns] * plan.same
+    in_offset = covariance @ mean
+    ways = np.empty((*covariance.shape[:2], P + 1))  # how the slopes move with each, and behind them with the offset
+    ways[:, :, :P] = covariance / np.maximum(covariance.diagonal(axis1=1, axis2=2), TINY)[:, None, :]
+    ways[:, :, P] = -in_offset / np.maximum(in_offset @ mean, TINY)[:, None]
+    scale = 1.0 / np.maximum(solution.residual, TINY)[:, None]
+    with np.errstate(over="ignore", invalid="ignore"):
+        slope = (gradient[:, None] @ ways)[:, 0] * (-2.0 * scale)
+        curve = ((normal @ ways) * ways).sum(axis=1) * scale
+    instrumented = (plan.mine.T @ (plan.columns != plan.instruments)) > 0.0
+    place = table.coefficient, np.where(table.offset, P, table.unknown)
+    return Bend(*(np.where(instrumented[:, None], x, 0.0)[place] for x in (slope, curve)))
+
+
+def counted(freedom: Array, quantiles: Array, gusts: Array) -> Array:
+    """(C,) share of t^2 se^2 that h^2 is; ``gusts`` (C,): their share of the residual."""
+    square = quantiles * quantiles
+    return np.asarray((freedom + gusts * square) / (freedom + square))
+
+
+def reach(halves: Array, counted: Array, bend: Bend) -> tuple[Array, Array]:
+    """How far intervals (..., D) go below and above the estimates, of which ``halves`` are Student's."""
+    square = halves * halves * counted
+    left = 1.0 - square * bend.curve
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        middle = 0.5 * square * bend.slope / left
+        half = np.sqrt(middle * middle + square / left)
+    student, endless = bend.curve == 0.0, left <= 0.0
+    below, above = (np.where(student, halves, np.where(endless, np.inf, x)) for x in (half - middle, half + middle))
+    return below, above
