@@ -40,6 +40,9 @@ MATERIAL, MATERIAL_OF_ALL = 0.25, 0.04
 #: Error, as a share of the motion, that nobody would look for.
 NOTICED = 0.05
 
+#: Of these, as many of one effect: it may act on several controls or coefficients.
+_SHAPES = 2
+
 #: Rivals of a cause that are fitted to the end.
 _RIVALS = 4
 
@@ -212,12 +215,13 @@ class Trier:
 
 
 def _likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Trial, Look]]:
-    """The best looks upon each explanation."""
-    seen: Counter[int] = Counter()
+    """The best looks upon each explanation; one effect in many shapes leaves room for others."""
+    seen: Counter[tuple[int, str]] = Counter()
     kept = []
     for current, look in looks:
-        seen[id(current)] += 1
-        if seen[id(current)] <= most:
+        effect = look[1].effect
+        if seen[id(current), ""] < most and seen[id(current), effect] < _SHAPES:
+            seen.update([(id(current), ""), (id(current), effect)])
             kept.append((current, look))
     return kept
 
