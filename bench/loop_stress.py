@@ -18,6 +18,7 @@ import random
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -88,19 +89,24 @@ class Loop:
     watch: Any
     relay: Relay
     executor: Any
+    logs: Path
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+    killed: set[str] = field(default_factory=set)
     said: list[tuple[float, str, str]] = field(default_factory=list)  # s, node, words
 
     def begin(self, name: str) -> None:
         """Start a node, anew where it was."""
+        self.killed.discard(name)
         words = [word for pair in ("aircraft:=cdrw", *NODES[name]) for word in ("-p", pair)]
         if name == "flight_simulator":
             words += [word for topic in RAW for word in ("-r", f"{topic}:=raw/{topic}")]
         command = [sys.executable, "-m", f"sysid_node.ros.{name}", "--ros-args", *words]
-        self.processes[name] = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with (self.logs / f"{name}.log").open("ab") as log:
+            self.processes[name] = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
 
     def kill(self, name: str) -> None:
         """As a crash would."""
+        self.killed.add(name)
         self.processes[name].kill()
         self.processes[name].wait()
 
@@ -108,6 +114,9 @@ class Loop:
         """Fly on, asking for roll and pitch."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
+            for name, process in self.processes.items():
+                if process.poll() is not None and name not in self.killed:
+                    raise SystemExit(f"{name} died with code {process.returncode}; see {self.logs / name}.log")
             phase = int(time.monotonic() / 3.0) % 4
             self.watch.ask_for({"roll": (0.2, 0.0, -0.2, 0.0)[phase], "pitch": (0.12, 0.08, 0.05, 0.08)[phase]})
             begun = time.monotonic()
@@ -149,7 +158,8 @@ def flying() -> Iterator[Loop]:
     node = rclpy.create_node("relay")
     executor = EventsExecutor()
     executor.add_node(node)
-    loop = Loop(LoopWatch(), Relay(node), executor)
+    logs = Path(tempfile.mkdtemp(prefix="loop_stress_"))
+    loop = Loop(LoopWatch(), Relay(node), executor, logs)
     node.create_subscription(DiagnosticArray, "/diagnostics", loop.hear, 100)
     try:
         for name in NODES:
@@ -258,7 +268,7 @@ def endure(minutes: float) -> str:
         for name, process in loop.processes.items():
             share = 100.0 * (_seconds(loop)[name] - used[name]) / passed
             said = [line for _, node, line in loop.said if node == name]
-            late = sum(bool(re.search("late|lost|silent|not flown|no commands", line)) for line in said)
+            late = sum(bool(re.search(r"\blate\b|lost|silent|not flown|no commands", line)) for line in said)
             memory = [f"{first[name]:.1f}", f"{_memory(process.pid):.1f}"]
             rows.append([name, *memory, f"{share:.0f}", f"{late} of {len(said)}", _slowest(loop, name)])
         skipped = _skipped(loop)
