@@ -164,13 +164,13 @@ def _watch(
     with Live(console=console, auto_refresh=False) as live:
         while playing.poll() is None and identifying.poll() is None:
             follower.listen(0.1)
-            live.update(_picture(flight, follower, console.width), refresh=True)
+            live.update(_picture(flight, follower, console.width, console.height), refresh=True)
         follower.listen(AFTERWARDS)
         live.update(_picture(flight, follower, console.width), refresh=True)
     console.print()
 
 
-def _picture(flight: Flight, follower: Follower, width: int) -> RenderableType:
+def _picture(flight: Flight, follower: Follower, width: int, height: int | None = None) -> RenderableType:
     rates = [(topic, follower.word("input", f"{topic}: rate (Hz)")) for topic in INPUT_TOPICS]
     moment = Moment(
         title=f"{flight.aircraft.name}, {flight.bag.name}",
@@ -179,7 +179,7 @@ def _picture(flight: Flight, follower: Follower, width: int) -> RenderableType:
         remark=" · ".join(f"{topic} {float(rate):.0f} Hz" for topic, rate in rates if rate),
         estimates=follower.history[-1] if follower.history else None,
     )
-    return live_table(moment, tuple(flight.aircraft.derivatives), flight.reference, width)
+    return live_table(moment, tuple(flight.aircraft.derivatives), flight.reference, width, height)
 
 
 def _rejected(follower: Follower) -> dict[str, int]:

@@ -15,6 +15,8 @@ from sysid_node.online.types import DerivativeEstimate, Estimates
 
 LONGITUDINAL = ("CL", "CD", "Cm")
 SIDE_BY_SIDE = 170  # columns of a terminal from which on the two halves stand side by side
+HEADS = 5  # lines that are no derivative's: headline, remark, the tables' headings, and the cursor's
+TURN = 3.0  # s of flight for which each half is shown where there is no room for both
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,13 @@ class Moment:
     estimates: Estimates | None
 
 
-def live_table(moment: Moment, names: Sequence[str], reference: Reference, width: int) -> RenderableType:
-    """The whole picture for a terminal ``width`` columns wide."""
+def live_table(
+    moment: Moment, names: Sequence[str], reference: Reference, width: int, height: int | None = None
+) -> RenderableType:
+    """The whole picture for a terminal ``width`` columns wide.
+
+    Where it is too high for a terminal of ``height`` lines, its halves are shown by turns.
+    """
     groups = [[n for n in names if (n.split("_")[0] in LONGITUDINAL) == first] for first in (True, False)]
     known = moment.estimates.derivatives if moment.estimates else {}
     tables = [_table(group, known, reference) for group in groups if group]
@@ -45,6 +52,8 @@ def live_table(moment: Moment, names: Sequence[str], reference: Reference, width
         grid = Table.grid(padding=(0, 3))
         grid.add_row(*tables)
         return Group(_headline(moment), grid)
+    if height is not None and len(names) + HEADS > height:
+        tables = [tables[int(moment.seconds / TURN) % len(tables)]]
     return Group(_headline(moment), *tables)
 
 

@@ -21,11 +21,12 @@ ESTIMATES = Estimates(
 )
 
 
-def shown(estimates: Estimates | None, width: int) -> list[str]:
+def shown(estimates: Estimates | None, width: int, height: int | None = None, seconds: float = 12.0) -> list[str]:
     """The table's lines without colours."""
     console = Console(width=width, record=True, file=io.StringIO())
-    moment = Moment("cdrw, a flight", 12.0, 60.0, "imu/data 200 Hz", estimates)
-    console.print(live_table(moment, NAMES, Reference("true", {"CL_alpha": 3.1, "Cm_q": -1.0, "Cl_p": 0.2}), width))
+    moment = Moment("cdrw, a flight", seconds, 60.0, "imu/data 200 Hz", estimates)
+    reference = Reference("true", {"CL_alpha": 3.1, "Cm_q": -1.0, "Cl_p": 0.2})
+    console.print(live_table(moment, NAMES, reference, width, height))
     return console.export_text().splitlines()
 
 
@@ -47,6 +48,15 @@ def test_every_derivative_has_its_row() -> None:
 def test_halves_stand_side_by_side_where_there_is_room() -> None:
     assert "Cl_p" in row(shown(ESTIMATES, 200), "CL_alpha")
     assert "Cl_p" not in row(shown(ESTIMATES, 100), "CL_alpha")
+
+
+def test_halves_come_by_turns_where_a_terminal_is_too_low_for_both() -> None:
+    assert len(shown(ESTIMATES, 100)) == 9
+    for seconds, here, there in ((12.0, "Cm_q", "Cl_p"), (15.0, "Cl_p", "Cm_q")):
+        lines = shown(ESTIMATES, 100, height=9, seconds=seconds)
+        assert row(lines, here) and not any(f" {there} " in line for line in lines)
+        assert len(lines) < 9
+    assert row(shown(ESTIMATES, 100, height=10), "Cl_p") and row(shown(ESTIMATES, 100, height=10), "Cm_q")
 
 
 def test_before_anything_is_known() -> None:
