@@ -46,18 +46,15 @@ def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxilia
     return Auxiliary(gains, layout.deflections)
 
 
-def with_instruments(model: Auxiliary, lines: Array) -> Array:
-    """(..., 2F, W) the transformed lines (..., 2F, T), and behind them the instruments'."""
-    (F, made, controls), T = model.gains.shape, lines.shape[-1]
+def fill_in(model: Auxiliary, lines: Array) -> None:
+    """Write the instruments of lines (..., 2F, W) into their last columns, by the deflections' columns."""
+    F, made, controls = model.gains.shape
     deflections = np.empty((*lines.shape[:-2], F, controls, 1), dtype=complex)
     deflections.real[..., 0] = lines[..., :F, model.controls]
     deflections.imag[..., 0] = lines[..., F:, model.controls]
     answers = (model.gains @ deflections)[..., 0]
-    every = np.empty((*lines.shape[:-1], T + made))
-    every[..., :T] = lines
-    every[..., :F, T:] = answers.real
-    every[..., F:, T:] = answers.imag
-    return every
+    lines[..., :F, -made:] = answers.real
+    lines[..., F:, -made:] = answers.imag
 
 
 def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[np.intp], Array]:

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.auxiliary import Auxiliary, with_instruments
+from sysid_node.online.auxiliary import Auxiliary, fill_in
 from sysid_node.online.signals import OFFSET, Layout
 from sysid_node.online.unevenness import Unevenness
 
@@ -105,9 +105,14 @@ def about_mean(transform: Array, model: Auxiliary | None) -> Array:
     """
     share = transform[..., -1, :] / np.maximum(transform[..., -1, OFFSET, None], 1e-12)
     share[..., OFFSET : OFFSET + 3] = 0.0
-    lines: Array = transform[..., :-1, OFFSET, None] * share[..., None, :]
-    np.subtract(transform[..., :-1, :], lines, out=lines)
-    return lines if model is None else with_instruments(model, lines)
+    *several, rows, T = transform.shape
+    lines = np.empty((*several, rows - 1, T + (0 if model is None else model.gains.shape[1])))
+    measured = lines[..., :T]
+    np.multiply(transform[..., :-1, OFFSET, None], share[..., None, :], out=measured)
+    np.subtract(transform[..., :-1, :], measured, out=measured)
+    if model is not None:
+        fill_in(model, lines)
+    return lines
 
 
 def project(lines: Array) -> Array:

@@ -125,15 +125,17 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
     """
     P, several = plan.columns.size, gram.shape[:-2]
-    flat = gram.reshape(*several, -1)
+    flat = gram.reshape(*several, gram.shape[-1] ** 2)
     gathered = flat.take(plan.entries, axis=-1)
     gathered *= plan.counted
     normal, cross = gathered[..., 0, :, :], gathered[..., -1, :, :]
     if bias is not None:
         cross = cross - bias
-    solved, usable = np.empty((*several, P, P + plan.outputs.size)), np.empty(several, dtype=bool)
-    for at in np.ndindex(several):
-        solved[at], usable[at] = _factorised(plan, cross[at])
+    if several:
+        solved, usable = _each(plan, cross)
+    else:
+        solved, fine = _factorised(plan, cross)
+        usable = np.array(fine)
     theta = solved[..., P:]
     # |y - A theta|^2, with the noise in it
     misfit = theta.swapaxes(-1, -2) @ normal[..., :P, :]
@@ -143,6 +145,12 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     squares = flat.take(plan.square, axis=-1)
     residual = np.maximum(squares + misfit.sum(axis=-1), ROUNDING * squares)
     return Solution(theta, solved[..., :P], residual, usable)
+
+
+def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """``_factorised`` of each of K moments."""
+    found = [_factorised(plan, one) for one in cross]
+    return np.array([solved for solved, _ in found]), np.array([fine for _, fine in found])
 
 
 def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:

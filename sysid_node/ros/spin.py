@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 
 import rclpy
@@ -45,6 +46,7 @@ def serve(node: Node) -> None:
     """
     executor = EventsExecutor()
     executor.add_node(node)
+    gc.freeze()  # modules stay: the collector need not go through them while messages wait
     try:
         while rclpy.ok():
             executor.spin_once(timeout_sec=0.1)

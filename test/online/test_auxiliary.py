@@ -36,7 +36,8 @@ def test_instruments_lie_behind_the_lines_they_are_made_of() -> None:
     model = auxiliary.auxiliary_model(AIRCRAFT, LAYOUT, OMEGA)
     assert model is not None
     lines = np.random.default_rng(0).normal(size=(6, LAYOUT.transformed))
-    every = auxiliary.with_instruments(model, lines)
+    every = np.hstack([lines, np.full((len(lines), model.gains.shape[1]), np.nan)])
+    auxiliary.fill_in(model, every)
     np.testing.assert_array_equal(every[:, : LAYOUT.transformed], lines)
     deflections = lines[:3, LAYOUT.deflections] + 1j * lines[3:, LAYOUT.deflections]
     for i, name in enumerate(LAYOUT.instrumented):
