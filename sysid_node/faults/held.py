@@ -24,6 +24,7 @@ from sysid_node.faults.terms import Terms
 Array = NDArray[np.float64]
 
 RIPE = 10.0  # s
+REAL = 0.5  # share of a direction's information that must be motion's
 KEPT = 0.9995  # share of what a block has shown that the next one leaves: 200 s
 
 
@@ -114,10 +115,14 @@ def belief(held: Held, noise: Array, slack: float) -> Belief:
     ``noise`` (D, D) is the part of the information that is the regressors' noise.
     """
     terms, values = held.terms, held.values
-    errors = np.maximum(held.errors, 1e-9)
-    size, axes = np.linalg.eigh((held.J - noise) * np.outer(errors, errors))
-    covariance = (axes / (1.0 + np.maximum(size, 0.0))) @ axes.T * np.outer(errors, errors)
-    shift = covariance @ (held.v + noise @ values)
+    root = np.linalg.cholesky(_covariance(held))
+    size, axes = np.linalg.eigh(root.T @ (held.J - noise) @ root)
+    axes = root @ axes
+    # where the noise makes as much of the information as the motion, nothing is learned: it is not known that well
+    learned = size > REAL * np.einsum("di,de,ei->i", axes, held.J, axes)
+    size = np.where(learned, size, 0.0)
+    covariance = (axes / (1.0 + size)) @ axes.T
+    shift = axes @ np.where(learned, axes.T @ (held.v + noise @ values) / (1.0 + size), 0.0)
     loose = (slack * values) ** 2
     for output in set(terms.output.tolist()):
         mine = terms.output == output
@@ -128,6 +133,21 @@ def belief(held: Held, noise: Array, slack: float) -> Belief:
         # and they are off by what the other terms' slack makes of the motion
         loose[d] = float(((slack * values * terms.signal)[mine] ** 2).sum()) + (slack * values[d]) ** 2 + 1e-12
     return Belief(shift, np.asarray(np.linalg.inv(covariance + np.diag(loose)), dtype=np.float64))
+
+
+def _covariance(held: Held) -> Array:
+    """(D, D) of the held values: each by itself, and as much again for what is common to a coefficient's.
+
+    A wrong area, inertia or airspeed calibration scales all of a coefficient's derivatives alike.
+    """
+    terms, errors = held.terms, np.maximum(held.errors, 1e-9)
+    found = np.diag(errors**2)
+    for output in set(terms.output.tolist()):
+        mine = (terms.output == output) & (terms.signal < 1.0)
+        share = float(np.median(errors[mine] / np.maximum(np.abs(held.values[mine]), 1e-9))) if mine.any() else 0.0
+        common = np.where(terms.output == output, min(share, 1.0) * held.values, 0.0)
+        found += np.outer(common, common)
+    return found
 
 
 def whole(held: Held, shift: Array) -> Array:

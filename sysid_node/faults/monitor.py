@@ -253,6 +253,6 @@ def _left(state: State, over: Stretch, usual: Array) -> float:
 
 def _over(state: State, place: int, alarm: Alarm) -> bool:
     """Whether the last seconds speak against the fault."""
-    over = stretch(state, LAG)
+    over = stretch(state, min(LAG, len(state.pieces)))
     factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over).values()]
     return factors[place] < 0.0
