@@ -60,9 +60,25 @@ def _fit(
         )
         for flight, X, of_sensors in zip(flights, passed, sensors, strict=True)
     ]
-    fit = regress(names, ys, passed, noisy=noisy)
+    fit = regress(names, ys, passed, None, _freedom(names, flights, low_pass), noisy)
     values = np.array([estimate.value for estimate in fit.estimates.values()])
     return replace(fit, modelled=[X @ values for X in Xs])
+
+
+def _freedom(names: Sequence[str], flights: Sequence[Equations], low_pass: float) -> float:
+    """How many independent values the band holds beyond the regressors. Raises InputError where it holds none."""
+    independent = 0.0
+    for flight in flights:
+        duration = float(flight.time[-1] - flight.time[0])
+        rate = (flight.time.size - 1) / duration
+        independent += min(2.0 * low_pass, rate) * duration if low_pass > 0.0 else rate * duration
+    if independent - len(names) < 1.0:
+        band = f" below {low_pass:g} Hz" if low_pass > 0.0 else ""
+        raise InputError(
+            f"these flights hold {independent:.0f} independent values{band}, too few for {len(names)} regressors "
+            f"({', '.join(names)}); give a longer flight"
+        )
+    return independent - len(names)
 
 
 def noises(

@@ -30,6 +30,9 @@ Frequencies = tuple[float, float, float]
 #: The short-period band of most aircraft; below it trim and phugoid, above it noise.
 DEFAULT_FREQUENCIES: Frequencies = (0.1, 0.04, 2.0)
 
+#: A signal that moves by no more of its size than this does not move.
+_ROUNDING = 1e-9
+
 #: What is taken out of every flight within the band: a constant and a slow drift.
 _NUISANCES = 2
 
@@ -72,9 +75,9 @@ def regress_in_band(
             f"{lines[0]:g} to {lines[-1]:g} Hz holds {independent:.0f} independent values in these flights, too few "
             f"for {len(names)} regressors ({', '.join(names)}); give a longer flight or a wider band"
         )
-    instruments = [_band_passed(t, X, lines) for t, X in zip(times, Xs, strict=True)]
     # neither constant nor line changes the estimates, but they would leak into the residuals' spectrum
     sides = [_detrended(y) for y in ys], [_detrended(X) for X in Xs]
+    instruments = [_band_passed(t, X, lines) for t, X in zip(times, sides[1], strict=True)]
     noisy = [
         Noisy(Z, lines.size * float(np.median(np.diff(t))) ** 2, several)
         for Z, t, several in zip(instruments, times, noises, strict=bool(noises))
@@ -114,9 +117,10 @@ def _drift(samples: int) -> Array:
 
 
 def _detrended(x: Array) -> Array:
-    """``x`` (N, ...) less its constant and line."""
+    """``x`` (N, ...) less its constant and line; what is then rounding error is zero."""
     drift = _drift(len(x))
-    return np.asarray(x - drift @ np.linalg.lstsq(drift, x, rcond=None)[0])
+    rest = x - drift @ np.linalg.lstsq(drift, x, rcond=None)[0]
+    return np.where(np.ptp(rest, axis=0) > _ROUNDING * np.abs(x).max(axis=0), rest, 0.0)
 
 
 def _fit(
@@ -153,7 +157,12 @@ def _joined(
     ((name, alone),) = offset.estimates.items()
     error = float(np.sqrt(covariance[count, count]))
     half = error * ((alone.upper - alone.value) / alone.standard_error if alone.standard_error > 0.0 else 1.96)
-    found[name] = replace(alone, standard_error=error, lower=alone.value - half, upper=alone.value + half)
+    offset_estimate = replace(alone, standard_error=error, lower=alone.value - half, upper=alone.value + half)
+    # what the flight shows no derivative of, but was not zero, may as well be the offset
+    shared = [n for n, mean in zip(fit.estimates, means, strict=True) if mean and any(n in group for group in fit.lost)]
+    if shared:
+        offset_estimate = replace(offset_estimate, valid=False, status=f"collinear with {', '.join(shared)}")
+    found[name] = offset_estimate
     coefficient = name.partition("_")[0]
     order = [f"{coefficient}_{regressor}" for regressor in regressors]
     index = [list(found).index(n) for n in order]

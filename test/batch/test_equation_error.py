@@ -145,3 +145,18 @@ def test_noise_on_a_regressor_that_hardly_moves_is_no_excitation(method):
     for name in ("CL_alpha", "Cm_alpha", "Cm_q", "CY_beta", "Cl_p", "Cn_r"):
         assert fit.estimates[name].status == "not excited: its regressor is within the sensor's noise", name
         assert not fit.estimates[name].valid
+
+
+@pytest.mark.parametrize("method", [equation_error, frequency_equation_error])
+def test_too_short_a_flight_for_its_band_is_refused(method):
+    with pytest.raises(InputError, match=r"independent values.*give a longer flight"):
+        method(KESTREL, [clean(0.4)])
+
+
+@pytest.mark.parametrize("method", [equation_error, frequency_equation_error])
+def test_a_flight_in_which_nothing_moves_has_nothing_valid(method):
+    record = clean()
+    still = {name: np.full(len(record), values[0]) for name, values in record.columns.items()}
+    fit = method(KESTREL, [dataclasses.replace(record, columns=still)])
+    assert not any(estimate.valid for estimate in fit.estimates.values())
+    assert all(np.isfinite(estimate.value) for estimate in fit.estimates.values())
