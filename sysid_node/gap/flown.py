@@ -81,8 +81,8 @@ def foreseen(views: Sequence[View]) -> bool:
     tables = [_table(v, *[[v.simulator.neutral()] * len(groups_of(v))] * 2) for v in views if shows(v)]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
-    before, floor = np.concatenate(tables, axis=1)[[2, 5]].mean(axis=1)
-    return bool((before <= _BY_CHANCE**2 * floor).all())
+    _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
+    return bool((before <= _BY_CHANCE**2 * np.mean(floors, axis=0)).all())
 
 
 def shows(view: View) -> bool:
@@ -99,40 +99,51 @@ def drawn(view: View, points: Sequence[Array]) -> Drawn:
 
 
 def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
-    """Of motion (S, R) and errors (4, S, R), mean squares by short flight and reading."""
-    whole = _shares(motion, errors)
-    draws = np.array([_overall(_shares(motion[d], errors[:, d])) for d in _blocks(len(motion))])
+    """Of motion (S, R) and errors (3 + K, S, R), mean squares by short flight and reading.
+
+    The last K are what as many flights of the simulator itself leave. What noise leaves of this flight is one more like
+    them, no one knows which: so each draw takes one.
+    """
+    whole = _shares(motion, np.concatenate([errors[:3], errors[3:].mean(axis=0, keepdims=True)]))
+    whole[3] = whole.min(axis=0)  # what is left cannot be less than the floor, so the floor cannot be more
+    random = np.random.default_rng(0)
+    draws: list[Array] = []
+    for windows in _blocks(len(motion), random):
+        taken = errors[[0, 1, 2, int(random.integers(3, len(errors)))]]
+        draws.append(_overall(_shares(motion[windows], taken[:, windows])))
     channels = {name: dict(zip(STAGES, whole[:, r].tolist(), strict=True)) for r, name in enumerate(names)}
-    return gap_from(_overall(whole), draws, channels)
+    return gap_from(_overall(whole), np.array(draws), channels)
 
 
 def _shares(motion: Array, errors: Array) -> Array:
-    """Errors (4, R) as shares of the motion; what a model leaves is no less than the floor, so the floor is no more."""
-    shares = np.sqrt(errors.mean(axis=1) / motion.mean(axis=0))
-    shares[3] = shares.min(axis=0)
-    return np.asarray(shares)
+    """Errors (4, R) as shares of the motion."""
+    return np.asarray(np.sqrt(errors.mean(axis=1) / motion.mean(axis=0)))
 
 
 def _overall(shares: Array) -> Array:
     return np.asarray(np.sqrt((shares**2).mean(axis=-1)))
 
 
-def _blocks(count: int) -> NDArray[np.intp]:
+def _blocks(count: int, random: np.random.Generator) -> NDArray[np.intp]:
     """Draws (D, count) of short flights, a few in a row together; the last are followed by the first."""
     size = min(_BLOCK, count)
-    starts = np.random.default_rng(0).integers(count, size=(_DRAWS, -(-count // size)))
+    starts = random.integers(count, size=(_DRAWS, -(-count // size)))
     return np.asarray((starts[..., None] + np.arange(size)).reshape(_DRAWS, -1)[:, :count] % count)
 
 
 def _table(view: View, base: Sequence[Array], final: Sequence[Array]) -> Array:
-    """Mean squares (6, S, R) by short flight: of the motion, of the sensors' noise, and of the four errors."""
+    """Mean squares (5 + K, S, R) by short flight.
+
+    Of the motion, of the sensors' noise, of the errors of the file, of the derivatives within their tolerances and with
+    the causes, and of what is left of each of K flights of the simulator itself.
+    """
     course, neutral = course_of(view, _size(view)), view.simulator.neutral()
     measured = _cut(view, beside(view, neutral, course)[1])
     errors = [_squares(view, _errors(view, points, course)) for points in ([neutral] * len(base), base, final)]
-    own = unavoidable(view, final[len(final) // 2], course)
-    floor, noise = (np.mean([_squares(view, each) for each in kind], axis=0) for kind in zip(*own, strict=True))
+    floors, noise = zip(*unavoidable(view, final[len(final) // 2], course), strict=True)
     motion = ((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
-    return np.stack([motion, noise, *errors, floor])
+    sensors = np.mean([_squares(view, each) for each in noise], axis=0)
+    return np.stack([motion, sensors, *errors, *(_squares(view, floor) for floor in floors)])
 
 
 def _errors(view: View, points: Sequence[Array], course: Course) -> Array:

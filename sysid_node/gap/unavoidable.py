@@ -22,7 +22,7 @@ from sysid_node.sim.dryden import Dryden
 from sysid_node.sim.layout import OUTPUTS, Scalar
 
 #: Flights of the simulator itself.
-_REALISATIONS = 4
+_REALISATIONS = 6
 
 #: Height over ground that the air's rotation is taken for, m: it matters little.
 _HEIGHT = 100.0
