@@ -29,12 +29,9 @@ def beliefs(aircraft: Aircraft, plan: Plan) -> tuple[Array, Array]:
 
 def weighed(plan: Plan, theta: Array, covariance: Array, values: Array, precisions: Array) -> tuple[Array, Array]:
     """``theta`` (P, C) and its ``covariance`` (C, P, P) with the beliefs counted in."""
-    theta, covariance = theta.copy(), covariance.copy()
-    for c in range(theta.shape[1]):
-        mine = plan.unknowns(c)
-        block = covariance[c][np.ix_(mine, mine)]
-        # gain form: needs no inverse of a covariance that may be near singular
-        gain = np.linalg.solve(np.eye(mine.size) + block * precisions[mine, c], np.eye(mine.size))
-        theta[mine, c] = gain @ (theta[mine, c] + block @ (precisions[mine, c] * values[mine, c]))
-        covariance[c, mine[:, None], mine] = gain @ block
-    return theta, covariance
+    P = plan.columns.size
+    believed = covariance @ (precisions * values).T[:, :, None]
+    # gain form: needs no inverse of a covariance that may be near singular
+    gain = plan.unit + covariance * precisions.T[:, None]
+    found = np.linalg.solve(gain, np.concatenate([covariance, theta.T[:, :, None] + believed], axis=2))
+    return found[:, :, P].T, found[:, :, :P]
