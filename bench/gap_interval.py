@@ -1,0 +1,135 @@
+"""Whether the interval of the gap's shrinkage holds: `python bench/gap_interval.py [--flights 20] [--page docs/gap.md]`
+
+Flights of cdrw with one effect and derivatives off by half their tolerances: one is fitted with that effect, the other
+held out. What could be closed on it is known here: the file's error less that of the simulator with everything right.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from evaluation.pages import publish, table
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.flight.align import flight_record
+from sysid_node.gap.candidates import candidates_of
+from sysid_node.gap.evidence import Evidence, groups_of, held_out
+from sysid_node.gap.fit import Fit, blank, polish, with_candidates
+from sysid_node.gap.flights import RATE, Flight, complete
+from sysid_node.gap.flown import flown
+from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.structure import unbiased
+from sysid_node.gap.view import View, view_of
+from sysid_node.sim import Simulator
+from sysid_node.sim.recording import Recorder
+from sysid_node.sim.sortie import Conditions, fly_sortie
+
+Effects = Mapping[str, Mapping[str, float]]
+
+EFFECTS: tuple[Effects, ...] = (
+    {"actuator_lag": {"time_constant": 0.09}},
+    {"command_delay": {"delay": 0.07}},
+    {"cg_shift": {"x": 0.05}},
+    {"airspeed_scale": {"error": 0.12}},
+    {"mass_error": {"error": 0.25}},
+)
+
+_STEPS = (
+    "3211:elevator:amplitude=0.06:width=0.3:start=1:every=12:repeat=3",
+    "3211:aileron:amplitude=0.06:width=0.25:start=5:every=12:repeat=3",
+    "3211:rudder:amplitude=0.12:width=0.3:start=9:every=12:repeat=3",
+)
+_IMU_RATE, _DURATION = 100.0, 42.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One pair of flights: shares of the motion, and percent of what could be closed."""
+
+    before: float
+    after: float
+    foreseen: float  # the noise floor as it is stated
+    floor: float  # what the simulator leaves with everything right
+    interval: tuple[float, float]
+
+    @property
+    def closed(self) -> float:
+        """Percent of what could be closed that was."""
+        return 100.0 * (self.before - self.after) / (self.before - self.floor)
+
+    @property
+    def covered(self) -> bool:
+        """Whether the interval holds it."""
+        low, high = self.interval
+        return low <= self.closed <= high
+
+
+def fly(aircraft: Aircraft, effects: Effects, seed: int, turbulence: str) -> Flight:
+    """A flight as a bag would hold it."""
+    simulator = Simulator(aircraft, _IMU_RATE)
+    plan = parse_manoeuvre(list(_STEPS), aircraft, _IMU_RATE, _DURATION)
+    deflections = np.zeros((round(_DURATION * _IMU_RATE) + 1, len(simulator.commands)))
+    deflections[:, :-1] = plan.surfaces()
+    sortie = fly_sortie(simulator, deflections, Conditions(effects, turbulence=turbulence, seed=seed))
+    record = flight_record(aircraft, Recorder(_IMU_RATE, 100.0, 100.0).record(sortie), 0.2)
+    return complete(aircraft, Flight(record, _IMU_RATE, 100.0, 100.0, source=f"flight {seed}"))
+
+
+def fitted(view: View, effect: str) -> tuple[Fit, Fit]:
+    """Derivatives within their tolerances, and the effect with them."""
+    nuisances = nuisances_of(view.simulator.aircraft, view)
+    base = polish(blank([view], nuisances))
+    candidate = next(c for c in candidates_of(view.simulator, [view]) if c.effect == effect)
+    starts = (polish(with_candidates(base, [candidate], nuisances, start), rounds=1) for start in candidate.starts)
+    return unbiased(base), unbiased(polish(min(starts, key=lambda fit: fit.cost)))
+
+
+def outcome(aircraft: Aircraft, case: int, turbulence: str) -> Outcome:
+    """Of one pair of flights."""
+    random, simulator = np.random.default_rng(case), Simulator(aircraft, RATE)
+    known = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
+    wrong = {n: 0.5 * tolerance * float(random.standard_normal()) for n, tolerance in known.items()}
+    effects = EFFECTS[case % len(EFFECTS)]
+    truth = {**effects, "derivative_error": wrong}
+    first, second = (view_of(simulator, fly(aircraft, truth, 2 * case + k, turbulence)) for k in (0, 1))
+    own = [nuisances_of(aircraft, second)]
+    base, final = (held_out(fit, [second], own) for fit in fitted(first, next(iter(effects))))
+    groups = len(groups_of(second))
+    right = Evidence(np.zeros(groups), (), (second,), ((simulator.vector(truth),) * groups,))
+    stated, best = flown(base, final), flown(base, right)
+    assert stated is not None and best is not None
+    return Outcome(stated.before, stated.after, stated.noise_floor, best.after, stated.ci95)
+
+
+def section(flights: int) -> str:
+    """The table of both kinds of air."""
+    aircraft, rows = load_aircraft("cdrw"), []
+    for turbulence in ("none", "light"):
+        found = [outcome(aircraft, case, turbulence) for case in range(flights)]
+        medians = (np.median([getattr(o, name) for o in found]) for name in ("before", "after", "foreseen", "floor"))
+        wide = np.median([o.interval[1] - o.interval[0] for o in found])
+        missed = [f"{o.closed:.1f} ({o.interval[0]:.1f} to {o.interval[1]:.1f})" for o in found if not o.covered]
+        held = f"{sum(o.covered for o in found)} of {flights}"
+        rows.append([turbulence, *(f"{m:.3f}" for m in medians), held, f"{wide:.1f}", "; ".join(missed)])
+    sizes = ("before", "after", "noise floor as stated", "with everything right")
+    heads = ("turbulence", *sizes, "interval holds the truth", "its width, points", "missed: truth, % (interval)")
+    return table(heads, rows)
+
+
+def main() -> None:
+    """Print the table, or put it in the documentation."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flights", type=int, default=20, help="pairs of flights in each kind of air")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    publish("bench/gap_interval.py", section(args.flights), args.page)
+
+
+if __name__ == "__main__":
+    main()
