@@ -107,12 +107,7 @@ class _FilterError(Problem):
         ]
 
     def sensitivities(self, z: Array) -> list[Array]:
-        blocks = []
-        for i, manoeuvre in enumerate(self.unknowns.manoeuvres):
-            block = np.zeros((*manoeuvre.outputs.shape, z.size))
-            block[:, :, self.columns(i, z)] = np.asarray(_predict_jacobian(*self._of(i, z)))
-            blocks.append(block)
-        return blocks
+        return [np.asarray(_predict_jacobian(*self._of(i, z))) for i in range(len(self.unknowns.manoeuvres))]
 
     def priors(self) -> Priors:
         """Besides the parameters': noises of about the start values, so that one that does not matter stays put."""

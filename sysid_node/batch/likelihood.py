@@ -64,7 +64,7 @@ class Problem(ABC):
 
     @abstractmethod
     def sensitivities(self, z: Array) -> list[Array]:
-        """d modelled / d z (N, ny, n) of each manoeuvre, zero where nothing was measured."""
+        """d modelled / d z[columns] (N, ny, k) of each manoeuvre, zero where nothing was measured."""
 
     def priors(self) -> Priors:
         """What is known beforehand: indices into z, means, 1-sigma uncertainties."""
@@ -83,7 +83,11 @@ class Problem(ABC):
     def weighted(self, z: Array, noise: Array) -> tuple[list[Array], list[Array]]:
         """Residuals (N, ny), zero where nothing was measured, and sensitivities (N, ny, n), in units of the noise."""
         residuals = [whitened(_measured_only(answer), noise) for answer in self.answers(z)]
-        return residuals, [whitened(block, noise) for block in self.sensitivities(z)]
+        blocks = []
+        for i, block in enumerate(self.sensitivities(z)):
+            blocks.append(np.zeros((*block.shape[:2], z.size)))
+            blocks[-1][:, :, self.columns(i, z)] = whitened(block, noise)
+        return residuals, blocks
 
     def cost(self, z: Array, noise: Array) -> float:
         """Sum of squares of the residuals in units of the noise, and of the priors'."""
@@ -96,7 +100,7 @@ class Problem(ABC):
         information, moment = np.zeros((z.size, z.size)), np.zeros(z.size)
         for i, (answer, block) in enumerate(zip(self.answers(z), self.sensitivities(z), strict=True)):
             columns = self.columns(i, z)
-            slopes = whitened(block[:, :, columns], noise).reshape(-1, len(columns))
+            slopes = whitened(block, noise).reshape(-1, len(columns))
             information[np.ix_(columns, columns)] += slopes.T @ slopes
             moment[columns] += slopes.T @ whitened(_measured_only(answer), noise).ravel()
         index, mean, sigma = self.priors()
