@@ -39,7 +39,7 @@ class Rigid:
         self._masses()
         density = aircraft.reference.air_density
         self._height = (1.0 - (density / _SEA_LEVEL) ** (1.0 / _EXPONENT)) / _LAPSE
-        self._alpha_rate = 0.0
+        self._alpha, self._alpha_rate = 0.0, 0.0
         self._initial, self.trim = self._trimmed()
         self._state = self._initial
 
@@ -60,17 +60,18 @@ class Rigid:
         self._state, self._alpha_rate = self._initial, 0.0
         self._slosh.start()
         _, instant = self._rates(self._state, self.trim, self.trim["thrust"], _STILL, 0.0)
-        self._separation.start(flow_angles(instant.flow)[1])
+        self._alpha = flow_angles(instant.flow)[1]
+        self._separation.start(self._alpha)
         return instant
 
     def step(self, surfaces: Mapping[str, float], thrust: float, gusts: tuple[float, ...], time: float) -> Instant:
         """One step of Heun's rule, then the motion at its end."""
         h, x = self.step_s, self._state
-        k1, before = self._rates(x, surfaces, thrust, gusts, time - h)
+        k1, _ = self._rates(x, surfaces, thrust, gusts, time - h)
         k2, _ = self._rates(tuple(a + h * b for a, b in zip(x, k1, strict=True)), surfaces, thrust, gusts, time)
         self._state = tuple(a + 0.5 * h * (b + c) for a, b, c in zip(x, k1, k2, strict=True))
         _, now = self._rates(self._state, surfaces, thrust, gusts, time)
-        self._remember(before, now)
+        self._remember(now)
         if not (abs(self._state[7]) < 1.4 and abs(now.force[2]) < 500.0 and math.isfinite(self._state[6])):
             raise DivergedError(f"at {time:.1f} s")
         return now
@@ -79,10 +80,10 @@ class Rigid:
         """The command: nothing measures the thrust."""
         return commanded
 
-    def _remember(self, before: Instant, now: Instant) -> None:
-        """What has a memory: the rate of alpha, the flow's separation, the fuel."""
+    def _remember(self, now: Instant) -> None:
+        """What has a memory: the rate of alpha, gusts' share of it included, the flow's separation, the fuel."""
         speed, alpha, _ = flow_angles(now.flow)
-        rate = (alpha - flow_angles(before.flow)[1]) / self.step_s
+        rate, self._alpha = (alpha - self._alpha) / self.step_s, alpha
         time_scale = self.aircraft.geometry.cbar / speed
         self._alpha_rate = 0.5 * time_scale * rate
         self._separation.advance(alpha, rate, time_scale, self.step_s)

@@ -24,10 +24,11 @@ WIDENED, WIDER = "derivative_error", 5.0
 #: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
 LIMIT = 3.0
 
-#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves.
+#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. Beside a
+#: late IMU the others stay as they are: it is late against both, and a servo's own lag must not pass for its lateness.
 _CLOCKS = {
-    "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay", "imu_delay"),
-    "air_data_delay": ("air_data_delay", "imu_delay"),
+    "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
+    "air_data_delay": ("air_data_delay",),
 }
 
 #: Share of the airspeed from which on the air's motion counts.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -106,3 +107,14 @@ def test_every_effect_that_is_drawn_is_the_simulators_and_the_sets_differ() -> N
     assert draw("development", 7) == draw("development", 7)
     assert any(draw("development", n) != draw("final", n) for n in range(3))
     assert len(set(SETS.values())) == len(SETS)
+
+
+def test_the_stated_interval_covers_what_further_flights_show() -> None:
+    said = _said("explained", ("mass_error", 0.9, {"error": [0.2, 0.01]}, []))
+    said["gap"] = {**GAP, "ci95": [90.0, 97.0]}
+    case = judge(_label("one", {"mass_error": {"error": 0.2}}), said)
+    assert case.covers is None
+    further = {"before": 0.5, "after": 0.1, "truth": 0.08, "shrink_percent": 95.2}
+    assert replace(case, further=further).covers is True
+    assert replace(case, further={**further, "shrink_percent": 88.0}).covers is False
+    assert replace(case, further={**further, "truth": 0.49}).covers is None  # next to no gap
