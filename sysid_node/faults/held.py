@@ -123,6 +123,7 @@ def belief(held: Held, noise: Array, slack: float) -> Belief:
     size = np.where(learned, size, 0.0)
     covariance = (axes / (1.0 + size)) @ axes.T
     shift = axes @ np.where(learned, axes.T @ (held.v + noise @ values) / (1.0 + size), 0.0)
+    values = values + shift
     loose = (slack * values) ** 2
     for output in set(terms.output.tolist()):
         mine = terms.output == output

@@ -29,7 +29,6 @@ from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
 from sysid_node.faults.terms import terms
 from sysid_node.faults.types import VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
-    VANES,
     Stretch,
     excess,
     explained,
@@ -37,6 +36,7 @@ from sysid_node.faults.weighing import (
     stretch,
     stretches,
     stuck_vanes,
+    vane_noise,
     weights,
 )
 from sysid_node.online.signals import OFFSET
@@ -44,6 +44,7 @@ from sysid_node.online.signals import OFFSET
 Array = NDArray[np.float64]
 
 EVERY = 5  # a span of n times so many blocks is looked at with every n-th block
+PATIENT = 20  # blocks that a vane must have stood still
 LEAST = 3  # blocks that a fault must have lasted
 RENEWED = 10  # blocks after which hypotheses and whitening are made anew
 SETTLED = 0.5  # share of the learning, after which the residuals' colour is known well enough to learn by
@@ -144,8 +145,7 @@ def _renew(state: State, now: Block) -> None:
     colour.settle(state.colour)
     if held.ripen(state.held, now.time):
         _rebuild(state)
-    noise = {vane: state.aircraft.noise[vane] ** 2 / now.samples for vane in VANES}
-    share = held.noise_of(state.terms, state.colour, noise) * state.held.blocks
+    share = held.noise_of(state.terms, state.colour, vane_noise(state, now.samples)) * state.held.blocks
     state.belief = held.belief(state.held, share, state.settings.slack)
     state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held, state.belief.shift))
 
@@ -184,7 +184,7 @@ def _watch(state: State) -> None:
 def _proven(state: State, over: Stretch, usual: Array, threshold: float) -> float:
     """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
     found = weights(state, over, usual)
-    best = max(stuck_vanes(state, over).values(), default=0.0)
+    best = max(stuck_vanes(state, over).values(), default=0.0) if len(over.pieces) >= PATIENT else 0.0
     for place, weighed in enumerate(found):
         if weighed.factor > threshold:
             left = max(excess(state, over, place, weighed), float(usual[place]), 1.0)

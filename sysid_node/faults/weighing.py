@@ -98,6 +98,19 @@ def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
     return float((left**2).mean(axis=0).max())
 
 
+def vane_noise(state: State, samples: float) -> dict[str, float]:
+    """Variance (rad^2) of each vane's noise in a block of so many ``samples``: the file's, or what residuals allow."""
+    found = {}
+    for vane, (_, output) in VANES.items():
+        terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
+        if terms.size:
+            taps = state.colour.filter[:, output]
+            slope = float(state.held.values[terms[0]])
+            most = float(colour.scale(state.colour)[output] / slope) ** 2 / (1.0 + float(taps @ taps))
+            found[vane] = min(state.aircraft.noise[vane] ** 2 / samples, most)
+    return found
+
+
 def stuck_vanes(state: State, over: Stretch) -> dict[str, float]:
     """Logarithms of the Bayes factors of jammed vanes."""
     found = {}
@@ -110,8 +123,8 @@ def stuck_vanes(state: State, over: Stretch) -> dict[str, float]:
         read = np.array([piece.block.air[column] for piece in over.pieces])
         off = [(p.residual[output] / p.block.regressors[OFFSET] - state.held.offsets[output]) for p in over.pieces]
         asked = read + np.array(off) / slope
-        samples = np.mean([piece.block.samples for piece in over.pieces])
-        noise = state.aircraft.noise[vane] ** 2 / float(samples)
+        samples = float(np.mean([piece.block.samples for piece in over.pieces]))
+        noise = vane_noise(state, samples)[vane]
         difference = float(colour.scale(state.colour)[output] / slope) ** 2
         found[vane] = stuck_factor(read, asked, state.colour.filter[:, output], noise, difference)
     return found
