@@ -34,6 +34,9 @@ from sysid_node.ros.save import save_estimates
 from sysid_node.ros.session import Due, Session
 from sysid_node.ros.spin import run_program, serve
 
+DIAGNOSTICS = 1.0  # s between diagnostics
+TICK = 0.2  # s, by which they come later where nothing is published
+
 
 class Identifier(CarefulNode):
     """``config/identifier.yaml`` says what its parameters mean; where ``autostart`` is true it starts by itself.
@@ -47,8 +50,9 @@ class Identifier(CarefulNode):
         declare(self)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._told = -math.inf  # s, time.monotonic of the last diagnostics
         # A steady clock: diagnostics go on where simulated time stands still.
-        self.create_timer(1.0, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, "~/reset", self.answered(self.reset))
         self.create_service(Trigger, "~/save", self.answered(self.save))
         if self.get_parameter("autostart").value:
@@ -127,6 +131,9 @@ class Identifier(CarefulNode):
         self._lag = (self.get_clock().now().nanoseconds - due.stamp_ns) / conversion.NANOSECONDS
         self._model_gap.publish(conversion.gap_message(session.gap, header, aircraft))
         self._publish_times.add(time.perf_counter() - start)
+        # right after an estimate, when no other one can be waiting for it
+        if time.monotonic() - self._told >= DIAGNOSTICS:
+            self._tell()
 
     # Requests
 
@@ -151,13 +158,18 @@ class Identifier(CarefulNode):
 
     def _on_tick(self) -> None:
         self.settle()
+        if time.monotonic() - self._told >= DIAGNOSTICS + TICK:
+            self._tell()
+
+    def _tell(self) -> None:
+        self._told = time.monotonic()
         source = Source(self.get_name(), self._session.aircraft.name if self._session else "")
         message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
         message.header.stamp = self.get_clock().now().to_msg()
-        self.guarded(self._on_active_tick)(message)
+        self.guarded(self._tell_of_flight)(message)
         self._diagnostics.publish(message)
 
-    def _on_active_tick(self, message: DiagnosticArray) -> None:
+    def _tell_of_flight(self, message: DiagnosticArray) -> None:
         session = self._session
         if session is None:
             return
