@@ -237,6 +237,8 @@ def _onset(state: State, alarm: Alarm) -> float:
     counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
     spans = stretches(state, counts)
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
+    if not factors.max() > 0.0:
+        return alarm.found - PATIENT * PERIOD  # only a vane that stands still speaks of a fault
     much = factors.max(axis=0) > MUCH * factors.max()
     best = sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True)
     left = [_left(state, spans[i], alarm.usual) for i in best]
