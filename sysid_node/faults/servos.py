@@ -27,7 +27,7 @@ LASTING = 0.3  # s that a surface must be off
 FOLLOWING = 1.0  # s that it must be where it should, to be taken for sound again
 STILL = 0.005  # rad: one that moves less is stuck
 RECENT = 0.5  # s of positions by which that is told
-COMMAND_AGE = 1.0  # s, after which commands no longer count
+COMMAND_AGE = 0.15  # s, after which commands no longer count
 
 
 @dataclass
@@ -40,6 +40,7 @@ class Servos:
     command: Array  # rad, NaN before the first
     off_since: Array  # s, inf = where it should be
     off_at: Array  # s, when it was last not where it should be
+    coming: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=2000))  # commands by time (s)
     commanded: float = -math.inf  # s
     expected: Array | None = None  # behind the lag
     time: float = math.nan  # s, of the last positions
@@ -55,13 +56,20 @@ def init(aircraft: Aircraft, settings: Settings) -> Servos:
 
 
 def command(state: Servos, time: float, controls: Sequence[float]) -> None:
-    """What the controls (rad) are told at a time (s)."""
-    state.command, state.commanded = np.clip(controls, -state.limits, state.limits), time
+    """What the controls (rad) are told at a time (s, of the positions' clock)."""
+    if state.coming and time < state.coming[-1][0]:
+        state.coming.clear()  # the clock has stepped back
+    state.coming.append((time, np.clip(controls, -state.limits, state.limits)))
 
 
 def position(state: Servos, time: float, controls: Sequence[float]) -> list[Fault]:
-    """Where the controls (rad) are at a time (s); returns what is wrong with them at present."""
+    """Where the controls (rad) are at a time (s); returns what is wrong with them at present.
+
+    Nothing is, where the commands of that time have not come: they may be on their way.
+    """
     found = np.asarray(controls, dtype=float)
+    while state.coming and state.coming[0][0] <= time:
+        state.commanded, state.command = state.coming.popleft()
     if not abs(time - state.commanded) <= COMMAND_AGE:
         _forget(state)
         return []

@@ -22,7 +22,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online import intake
 from sysid_node.ros import conversion
 from sysid_node.ros.conversion import NANOSECONDS, stamp_ns
-from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LATEST, SENSOR_QOS, LoopNode
+from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, SENSOR_QOS, LoopNode
 from sysid_node.ros.monitor import Durations, TopicMonitor
 from sysid_node.ros.parameters import Parameter, setting
 from sysid_node.ros.spin import run_program, serve
@@ -79,7 +79,7 @@ class FaultMonitor(LoopNode):
         self.create_subscription(Imu, IMU, self._on_imu, SENSOR_QOS)
         self.create_subscription(AirData, AIR_DATA, self._on_air_data, SENSOR_QOS)
         self.create_subscription(JointState, ACTUATORS, self._on_actuators, SENSOR_QOS)
-        self.create_subscription(JointState, COMMAND, self._on_command, LATEST)
+        self.create_subscription(JointState, COMMAND, self._on_command, SENSOR_QOS)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
         self.every(PERIOD, self._on_time)
 
@@ -133,7 +133,8 @@ class FaultMonitor(LoopNode):
     def _on_command(self, message: Any) -> None:
         controls = self._controls(message)
         if controls:
-            servos.command(self._servos, self._moved, controls)
+            stamp = stamp_ns(message.header.stamp) / NANOSECONDS
+            servos.command(self._servos, stamp or self._moved, controls)
 
     def _on_estimates(self, message: Any) -> None:
         known = {d.name: Known(d.value, d.standard_error, d.valid) for d in message.derivatives}

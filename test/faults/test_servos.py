@@ -56,6 +56,21 @@ def test_a_surface_that_moves_but_not_where_it_should() -> None:
     assert fault.kind == NOT_FOLLOWING
 
 
+def test_commands_that_come_late_are_waited_for() -> None:
+    """A busy machine hands over positions in bursts, and their commands after them."""
+    state = servos.init(AIRCRAFT, Settings())
+    told, lagged, found = 0, commanded(0.0), []
+    for k in range(1000):
+        if k % 100 == 0:
+            for j in range(told, k):
+                servos.command(state, j * STEP, commanded(j * STEP))
+            told = k
+        asked = commanded(k * STEP)
+        lagged = [x + (1.0 - math.exp(-STEP / 0.05)) * (u - x) for x, u in zip(lagged, asked, strict=True)]
+        found += servos.position(state, k * STEP, lagged)
+    assert found == []
+
+
 def test_old_commands_do_not_count() -> None:
     state = servos.init(AIRCRAFT, Settings())
     servos.command(state, 0.0, [0.3, 0.0, 0.0])
