@@ -40,6 +40,9 @@ MATERIAL, MATERIAL_OF_ALL = 0.25, 0.04
 #: Error, as a share of the motion, that nobody would look for.
 NOTICED = 0.05
 
+#: Error, as a share of the motion, whose end matters however much weather is left.
+_PLAIN = 0.2
+
 #: Of these, as many of one effect: it may act on several controls or coefficients.
 _SHAPES = 2
 
@@ -258,7 +261,7 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     left, now = power_left(without.evidence), power_left(trial.evidence)
     motion = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views)
     gone = left - now
-    matters = (gone > MATERIAL * left) & (gone > NOTICED**2 * motion)
+    matters = ((gone > MATERIAL * left) & (gone > NOTICED**2 * motion)) | (gone > _PLAIN**2 * motion)
     if not matters.any():
         return False
     return bool(np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)))
