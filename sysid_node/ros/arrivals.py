@@ -15,7 +15,7 @@ SEVERAL = 1.6  # usual intervals between two stamps: at least one message is mis
 LEARNED = 0.02  # weight of an interval in what is usual
 SHARE = 0.05  # of messages lost, beyond which it is told
 LATE = 0.03  # s later than the promptest, beyond which it is told
-DRIFT = 1e-3  # s/s by which the promptest may have become slower: clocks drift
+RECENT = 5.0  # s: the promptest of so many, and of those before, is what later ones are compared with
 
 
 @dataclass
@@ -27,7 +27,9 @@ class Arrivals:
     heard: float = -math.inf  # s, monotonic
     stamp: float = math.nan  # s, the newest
     usual: float = math.nan  # s between stamps
-    prompt: float = math.inf  # s, the least of arrival less stamp
+    prompt: float = math.inf  # s, the least of arrival less stamp of late
+    before: float = math.inf  # s, that of the time before
+    since: float = -math.inf  # s, when "of late" began
     came: int = 0  # of late
     missing: int = 0
     latest: float = 0.0  # s
@@ -46,12 +48,14 @@ class Arrivals:
             return False
         if step <= -STEP_BACK or step > STEP_AHEAD:
             self._tell(f"clock set by {step:+.1f} s")
-            self.prompt = math.inf
+            self.prompt = self.before = math.inf
         elif step > 0.0:
             self._count(step)
         self.stamp, self.came = stamp, self.came + 1
+        if now - self.since > RECENT:
+            self.prompt, self.before, self.since = math.inf, self.prompt, now
         self.prompt = min(self.prompt, now - stamp)
-        self.latest = max(self.latest, now - stamp - self.prompt)
+        self.latest = max(self.latest, now - stamp - min(self.prompt, self.before))
         return True
 
     def silent(self) -> bool:
@@ -86,4 +90,3 @@ class Arrivals:
             self.usual = step  # what was taken for usual had gaps
         else:
             self.usual += LEARNED * (step - self.usual)
-        self.prompt += DRIFT * step

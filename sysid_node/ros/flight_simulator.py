@@ -88,6 +88,7 @@ class FlightSimulator(LoopNode):
         self._command: list[float] = self._trim.command.tolist()
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
         self._steps, self._skipped, self._commands, self._refused = Durations(), 0.0, 0, 0
+        self._told = 0.0  # s not flown that were told
         self._commanded = -math.inf  # s, monotonic, when the last command came
         self._open_topics()
         live.step(self._simulator, self._flight, self._command)  # compiles
@@ -124,7 +125,8 @@ class FlightSimulator(LoopNode):
             "commands refused": self._refused,
             "not flown (s)": self._skipped,
         }
-        troubles = [f"{self._skipped:.1f} s were not flown, the machine is too slow"] if self._skipped else []
+        skipped, self._told = self._skipped - self._told, self._skipped
+        troubles = [f"{skipped:.1f} s were not flown, the machine is too slow"] if skipped else []
         silence = time.monotonic() - self._commanded
         if self._commands and silence > COMMAND_AGE:
             troubles.append(f"no commands for {silence:.1f} s: the last one is held")

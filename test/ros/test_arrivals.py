@@ -53,6 +53,21 @@ def test_what_comes_late(clock: Clock) -> None:
     assert any("ms late" in words for words in topic.troubles())
 
 
+def test_a_sender_that_has_lost_time_is_not_late_for_ever(clock: Clock) -> None:
+    """Its stamps fall behind by 2 s once, as a simulator's do that could not keep up."""
+    topic = Arrivals("imu/data", 0.2)
+    fed(clock, topic, 8.0)
+    topic.troubles()
+    for k in range(2000):
+        clock.now += 0.01
+        topic.arrived(1108.01 + 0.01 * k)
+        if k == 50:
+            clock.now += 2.0
+        if k % 100 == 99:
+            said = topic.troubles()
+    assert said == []
+
+
 def test_a_short_silence_is_told_after_it_has_ended(clock: Clock) -> None:
     topic = Arrivals("air_data", 0.1)
     assert not topic.silent()  # nothing was ever heard
