@@ -75,6 +75,15 @@ def test_a_gyro_that_is_off_is_named_with_its_size(found: Path) -> None:
     assert pitch["after"] < 0.3 * pitch["before"]
 
 
+def test_the_gap_is_that_of_short_flights_with_its_interval(found: Path) -> None:
+    gap = json.loads((found / "out" / "gap.json").read_text(encoding="utf-8"))["gap"]
+    assert gap["measured_by"] == "short_flights" and gap["window_s"] == 2.0 and gap["held_out"]
+    low, high = gap["intervals"]["before"]
+    assert low < gap["before"] < high and gap["noise_floor"] <= gap["after"] < gap["before"]
+    assert gap["ci95"][0] <= gap["shrink_percent"] <= gap["ci95"][1]
+    assert gap["forces_and_kinematics"]["window_s"] == 8.0
+
+
 def test_nothing_unfinished_is_left(found: Path) -> None:
     files = {"gap.json", "where.csv", "candidates.csv", "corrected.yaml", "effects.txt", "report.html"}
     assert {path.name for path in (found / "out").iterdir()} == files
@@ -96,4 +105,4 @@ def test_the_corrected_model_can_be_exported(found: Path) -> None:
 
 def test_the_page_begins_with_words(found: Path) -> None:
     page = (found / "out" / "report.html").read_text(encoding="utf-8")
-    assert "imu bias" in page and "What is confused with what" in page
+    assert "Begun anew every 2 s" in page and "imu bias" in page and "What is confused with what" in page
