@@ -38,11 +38,12 @@ def estimates_at(
     K = len(times)
     constants, constant_variances = offsets(state, renewed, current)
     values = np.concatenate([current.solution.theta.reshape(K, -1), constants], axis=1).take(table.place, axis=1)
-    errors = np.concatenate([current.variance.reshape(K, -1), constant_variances], axis=1).take(table.place, axis=1)
-    errors = np.sqrt(np.maximum(errors, 0.0))
-    below, above = interval.reach(grounds.quantiles * errors, grounds.counted, renewed.bend)
-    unbounded = np.isinf(below) | np.isinf(above)
-    statuses = judgement.judge(state, renewed, grounds, current, values, np.where(unbounded, np.inf, errors), nows)
+    variances = np.concatenate([current.variance.reshape(K, -1), constant_variances], axis=1).take(table.place, axis=1)
+    variances = np.maximum(variances, 0.0)
+    errors = np.sqrt(variances)
+    below, above = interval.reach(grounds.squares * variances, renewed.bend)
+    bounded = np.where(np.isinf(above), np.inf, errors)
+    statuses = judgement.judge(state, renewed, grounds, current, values, bounded, nows)
     numbers = np.stack([values, errors, values - below, values + above], axis=1)
     names = table.names
     if table.unformed:

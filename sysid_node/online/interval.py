@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.regression import TINY, Plan, Solution, misfits
+from sysid_node.online.regression import ROUNDING, TINY, Plan, Solution, Uncertainty, misfits, student_95
 from sysid_node.online.table import Table
 
 Array = NDArray[np.float64]
@@ -31,11 +31,24 @@ class Bend(NamedTuple):
 
     slope: Array  # (D,) per unit of the derivative
     curve: Array  # (D,) per unit squared
+    counted: Array  # (D,) h^2 over t^2 se^2
 
 
-def bend(plan: Plan, table: Table, solution: Solution, gram: Array, covariance: Array, mean: Array) -> Bend:
-    """From the ``gram`` (W, W), the unknowns' ``covariance`` (C, P, P) and the regressors' ``mean`` (P,)."""
-    P = plan.columns.size
+def bend(
+    plan: Plan,
+    table: Table,
+    solution: Solution,
+    gram: Array,
+    spread: Uncertainty,
+    noise: Array,
+    mean: Array,
+    gusts: Array,
+) -> Bend:
+    """From the ``gram`` (W, W), the regressors' ``mean`` (P,), and the share of ``gusts`` (C,) in the residuals.
+
+    ``noise`` (C, P, P): the part of the ``spread``'s covariance that comes from the residual; the rest does not bend.
+    """
+    covariance, P = spread.covariance, plan.columns.size
     v = misfits(plan, solution.theta)
     gradient = (gram[plan.columns] @ v).T * plan.mine.T  # (C, P)
     normal = gram[plan.columns[:, None], plan.columns] * plan.same
@@ -47,24 +60,32 @@ def bend(plan: Plan, table: Table, solution: Solution, gram: Array, covariance: 
     with np.errstate(over="ignore", invalid="ignore"):
         slope = (gradient[:, None] @ ways)[:, 0] * (-2.0 * scale)
         curve = ((normal @ ways) * ways).sum(axis=1) * scale
-    instrumented = (plan.mine.T @ (plan.columns != plan.instruments)) > 0.0
+    instrumented = ((plan.mine.T @ (plan.columns != plan.instruments)) > 0.0)[table.coefficient]
     place = table.coefficient, np.where(table.offset, P, table.unknown)
-    return Bend(*(np.where(instrumented[:, None], x, 0.0)[place] for x in (slope, curve)))
+    square = student_95(spread.freedom) ** 2
+    counted = ((spread.freedom + gusts * square) / (spread.freedom + square))[table.coefficient]
+    share = np.where(
+        instrumented, _variances(noise, mean)[place] / np.maximum(_variances(covariance, mean)[place], TINY), 0.0
+    )
+    return Bend(share * slope[place], share * curve[place], 1.0 - share * (1.0 - counted))
 
 
-def counted(freedom: Array, quantiles: Array, gusts: Array) -> Array:
-    """(C,) share of t^2 se^2 that h^2 is; ``gusts`` (C,): their share of the residual."""
-    square = quantiles * quantiles
-    return np.asarray((freedom + gusts * square) / (freedom + square))
+def _variances(covariance: Array, mean: Array) -> Array:
+    """(C, P + 1) of the slopes and of what they bring to the offset."""
+    return np.concatenate([covariance.diagonal(axis1=1, axis2=2), (covariance @ mean @ mean)[:, None]], axis=1)
 
 
-def reach(halves: Array, counted: Array, bend: Bend) -> tuple[Array, Array]:
-    """How far intervals (..., D) go below and above the estimates, of which ``halves`` are Student's."""
-    square = halves * halves * counted
-    left = 1.0 - square * bend.curve
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        middle = 0.5 * square * bend.slope / left
-        half = np.sqrt(middle * middle + square / left)
-    student, endless = bend.curve == 0.0, left <= 0.0
-    below, above = (np.where(student, halves, np.where(endless, np.inf, x)) for x in (half - middle, half + middle))
+def reach(squares: Array, bend: Bend) -> tuple[Array, Array]:
+    """How far intervals (..., D) go below and above the estimates, of which ``squares`` are t^2 se^2."""
+    h = squares * bend.counted
+    left = 1.0 - h * bend.curve
+    endless = left < ROUNDING
+    if endless.any():
+        left[endless] = 1.0
+    h /= left
+    middle = (0.5 * bend.slope) * h
+    half = np.sqrt(middle * middle + h)
+    below, above = half - middle, half + middle
+    if endless.any():
+        below[endless] = above[endless] = np.inf
     return below, above

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import interval, reconstruction, regression
+from sysid_node.online import reconstruction, regression
 from sysid_node.online.present import Present
-from sysid_node.online.regression import student_95
+from sysid_node.online.regression import Plan, student_95
 from sysid_node.online.state import Grounds, Renewed, State
 
 Array = NDArray[np.float64]
@@ -38,13 +38,16 @@ def grounds(state: State, renewed: Renewed) -> Grounds:
     if state.flow.active:
         structure, at = state.model.aircraft.structure, state.piece_start
         flaws[:] = [reconstruction.flaw(state.flow, at, n, structure[n.partition("_")[0]]) for n in table.names]
+    cautions = np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])
+    caution = np.sqrt(np.maximum(cautions, 1.0))
     return Grounds(
         sound=sound & ~spoilt & (flaws == ""),
         spoilt=spoilt,
         flaws=flaws,
-        quantiles=student_95(freedom)[c],
-        counted=interval.counted(freedom, student_95(freedom), renewed.gusts)[c],
-        prudence=np.sqrt(np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])),
+        squares=student_95(freedom)[c] ** 2,
+        allowed=table.allowed / caution,
+        relative=table.relative / caution if table.relative.any() else None,
+        floor=np.maximum(BURIED * renewed.total.bias.take(plan.columns * (plan.width + 1)), regression.TINY),
         fits=list(
             zip(
                 np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density).tolist(),
@@ -66,16 +69,20 @@ def judge(
     nows: Sequence[float],
 ) -> list[tuple[str, ...]]:
     """Of K moments why each of the D estimates ``values`` (K, D) is not to be believed, or "ok"."""
-    table = state.model.table
-    motion = current.gram.reshape(len(values), -1).take(table.motion, axis=1)
-    inflation = current.diagonal.take(table.unknown, axis=1) * motion
-    good = (errors * grounds.prudence <= np.maximum(table.allowed, table.relative * np.abs(values))) & grounds.sound
-    good &= errors > NARROWEST * np.abs(values)
-    slope = ~table.offset
-    buried = slope & (motion < np.maximum(BURIED * renewed.total.bias.take(table.motion), regression.TINY))
-    hidden = buried | (slope & (inflation > HOPELESS))
-    poor = _poor(state, current)[:, table.coefficient]
-    good &= ~(hidden | _lost_with(state, hidden) | poor)
+    table, plan = state.model.table, state.plan
+    flat = current.gram.reshape(len(values), -1)
+    motion = flat.take(plan.columns * (plan.width + 1), axis=1)
+    inflation = current.diagonal * motion
+    buried = motion < grounds.floor
+    hidden = buried | (inflation > HOPELESS)
+    poor = _poor(plan, flat, current.solution.residual)
+    sizes = np.abs(values)
+    allowed = grounds.allowed if grounds.relative is None else np.maximum(grounds.allowed, grounds.relative * sizes)
+    good = (errors <= allowed) & grounds.sound & (errors > NARROWEST * sizes)
+    if hidden.any():
+        good &= ~(hidden.take(table.unknown, axis=1) & ~table.offset) & ~_lost_with(state, hidden)
+    if poor.any():
+        good &= ~poor.take(table.coefficient, axis=1)
     if not state.thrust_known:
         good &= ~table.needs_thrust
     everywhere = [
@@ -83,18 +90,15 @@ def judge(
     ]
     if good.all() and not any(everywhere):
         return [("ok",) * len(table.names)] * len(values)
-    reasons = _reasons(state, renewed, grounds, current, inflation, buried, poor)
+    reasons = _reasons(state, renewed, grounds, current, inflation, buried, poor[:, table.coefficient])
     reasons[good] = "ok"
     return [(w,) * len(table.names) if w else tuple(r) for w, r in zip(everywhere, reasons.tolist(), strict=True)]
 
 
 def _lost_with(state: State, hidden: Flags) -> Flags:
-    """(K, D) offsets that hold what a hidden slope of their coefficient does."""
+    """(K, D) offsets that hold what a hidden slope (K, P) of their coefficient does."""
     table = state.model.table
-    if not hidden.any():
-        return np.zeros_like(hidden)
-    of = table.coefficient == np.arange(len(state.plan.coefficients))[:, None]  # (C, D)
-    return np.asarray((hidden @ of.T)[:, table.coefficient] & table.offset)
+    return np.asarray(((hidden @ state.plan.mine) > 0.0)[:, table.coefficient] & table.offset)
 
 
 def _reasons(
@@ -106,8 +110,12 @@ def _reasons(
     buried: Flags,
     poor: Flags,
 ) -> NDArray[np.object_]:
-    """(K, D) what speaks against each: ``inflation`` of its variance, a regressor ``buried`` in noise, and more."""
+    """(K, D) what speaks against each.
+
+    ``inflation`` (K, P) of its unknown's variance, a regressor ``buried`` (K, P) in noise, ``poor`` (K, D), and more.
+    """
     table, c = state.model.table, state.model.table.coefficient
+    inflation, buried = inflation[:, table.unknown], buried[:, table.unknown] & ~table.offset
     reasons = np.full(poor.shape, "converging", dtype=object)
     # what is found later counts more
     reasons[poor] = "outside model"
@@ -127,10 +135,10 @@ def _reasons(
     return reasons
 
 
-def _poor(state: State, current: Present) -> Flags:
+def _poor(plan: Plan, flat: Array, residual: Array) -> Flags:
     """(K, C) whether the model leaves most of a coefficient's motion unexplained: then its interval means nothing."""
-    motion = current.gram.reshape(len(current.time), -1).take(state.plan.square, axis=1)
-    poor: Flags = (current.solution.residual > POOR * motion) & (motion > regression.TINY)
+    motion = flat.take(plan.square, axis=1)
+    poor: Flags = (residual > POOR * motion) & (motion > regression.TINY)
     return poor
 
 

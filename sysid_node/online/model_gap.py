@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sysid_node.online import regression
 from sysid_node.online.present import present
-from sysid_node.online.prior import beliefs
 from sysid_node.online.state import State
+
+Array = NDArray[np.float64]
 
 
 class CoefficientGap(NamedTuple):
@@ -28,28 +30,23 @@ def model_gap(state: State) -> list[CoefficientGap]:
     current, renewed = present(state), state.renewed
     if current is None or renewed is None or not current.solution.usable[0]:
         return []
-    plan = state.plan
-    values, precisions = beliefs(state.model.aircraft, plan)
+    plan, (values, precisions) = state.plan, state.model.believed
     start, _, stop = state.model.settings.frequencies
     per_energy = 2.0 * (stop - start) / max(float(renewed.total.traces.sum()), 1e-12)
-    gram, variance, theta = current.gram[0], current.variance[0], current.solution.theta[0]
-    gaps = []
-    for c, coefficient in enumerate(plan.coefficients):
-        mine, y = plan.unknowns(c), int(plan.outputs[c])
-        v = np.zeros(plan.width)
-        v[y], v[plan.columns[mine]] = 1.0, -values[mine, c]
-        energy, motion = max(float(v @ gram @ v), 0.0), float(gram[y, y])
-        spread = np.sqrt(np.maximum(variance[mine, c], 0.0) + _tolerances(precisions[mine, c]))
-        deviations = np.abs(theta[mine, c] - values[mine, c]) / np.maximum(spread, 1e-300)
-        worst = int(np.argmax(deviations))
-        noise = math.sqrt(2.0 * (stop - start) * float(renewed.uncertainty.density[c]))
-        relative = math.sqrt(energy / motion) if motion > 0.0 else math.nan
-        name = f"{coefficient}_{plan.regressors[mine[worst]]}"
-        gap_std = math.sqrt(per_energy * energy)
-        gaps.append(CoefficientGap(coefficient, gap_std, noise, relative, name, float(deviations[worst])))
-    return gaps
+    gram, theta = current.gram[0], current.solution.theta[0]
+    v = regression.misfits(plan, values)
+    energy = np.maximum(((gram @ v) * v).sum(axis=0), 0.0)
+    motion = gram.take(plan.square)
+    relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))
+    spread = np.sqrt(np.maximum(current.variance[0], 0.0) + _tolerances(precisions))
+    deviations = np.where(plan.mine > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
+    worst = deviations.argmax(axis=0).tolist()
+    names = [f"{c}_{plan.regressors[i]}" for c, i in zip(plan.coefficients, worst, strict=True)]
+    noise = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density)
+    stds = (column.tolist() for column in (np.sqrt(per_energy * energy), noise, relative))
+    return list(map(CoefficientGap, plan.coefficients, *stds, names, deviations.max(axis=0).tolist()))
 
 
-def _tolerances(precisions: np.typing.NDArray[np.float64]) -> np.typing.NDArray[np.float64]:
+def _tolerances(precisions: Array) -> Array:
     """Squared tolerances; zero where none is stated."""
     return np.divide(1.0, precisions, out=np.zeros_like(precisions), where=precisions > 0.0)

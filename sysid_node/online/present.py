@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online import regression, transform
 from sysid_node.online.information import products
-from sysid_node.online.prior import beliefs, weighed
+from sysid_node.online.prior import weighed
 from sysid_node.online.regression import Solution
 from sysid_node.online.signals import OFFSET
 from sysid_node.online.state import Renewed, State
@@ -60,7 +60,7 @@ def present_at(state: State, lines: Sequence[Array], times: Sequence[float]) -> 
 
 def count_beliefs(state: State, renewed: Renewed, current: Present) -> None:
     """Weigh the solutions with the aircraft file's derivatives."""
-    plan, believed = state.plan, beliefs(state.model.aircraft, state.plan)
+    plan, believed = state.plan, state.model.believed
     for k, theta in enumerate(current.solution.theta):
         weighted, covariance = weighed(plan, theta, renewed.uncertainty.covariance, *believed)
         current.solution.theta[k] = weighted

@@ -27,9 +27,10 @@ from sysid_node.online.contradiction import Reference
 from sysid_node.online.experience import experiences, learn
 from sysid_node.online.information import Information
 from sysid_node.online.prudence import prudence
-from sysid_node.online.regression import Plan, Solution, Uncertainty
+from sysid_node.online.regression import Hold, Plan, Solution, Uncertainty
 from sysid_node.online.signals import OFFSET
 from sysid_node.online.state import Renewed, State
+from sysid_node.online.timing import Timing
 from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
@@ -142,12 +143,42 @@ def _past(state: State) -> Information:
 
 
 def _solve_all(state: State, segment: Information) -> None:
-    """Estimates, their covariance and the noise's part, from the finished segments and the present one."""
-    last = state.renewed
+    """Renew the estimates and what is known of their errors, from the finished segments and the present one."""
     past = _past(state)
     total = past + segment
     gram = total.grams.sum(axis=0)
-    full = state.model.plan
+    hold, solution, compensation = _solve(state, total, gram)
+    plan, table, now = state.plan, state.model.table, state.transform.last
+    spread = regression.uncertainty(plan, solution, total)
+    noise_alone = spread.covariance
+    if state.flow.active:
+        spread.covariance = noise_alone + _doubt(state, solution, total)
+    gusts = _gusts(state, total, plan, solution, spread)
+    scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
+    variance = exogeneity.inflation(spread, gusts) * spread.covariance.diagonal(axis1=1, axis2=2).T
+    mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
+    none = np.zeros(len(plan.coefficients), dtype=bool)
+    state.renewed = Renewed(
+        time=now,
+        total=total,
+        solution=solution,
+        uncertainty=spread,
+        compensation=compensation,
+        base=past.grams.sum(axis=0),
+        factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
+        timing=_timing(state, solution, spread, gram),
+        hold=hold,
+        prudence=prudence(plan, solution, spread, hold, gram, *state.model.believed),
+        bend=interval.bend(plan, table, solution, gram, spread, noise_alone, mean, gusts),
+        lost=none,
+        doubted=none,
+    )
+    state.watch.references.append(Reference(now, plan, solution, spread))
+
+
+def _solve(state: State, total: Information, gram: Array) -> tuple[Hold, Solution, Array | None]:
+    """The instruments' hold, the solution by the plan that it allows, and the noise's part in the equations."""
+    full, last = state.model.plan, state.renewed
     hold = regression.hold(full, regression.solve(full, gram), total)
     plan = state.plan = regression.trusting(full, hold.strength)
     compensation = None
@@ -157,43 +188,22 @@ def _solve_all(state: State, segment: Information) -> None:
     solution = regression.solve(plan, gram, compensation)
     if compensation is not None and not solution.usable:
         solution, compensation = regression.solve(plan, gram), None
-    spread = regression.uncertainty(plan, solution, total)
-    if state.flow.active:
-        model = state.model
-        spread.covariance += reconstruction.doubt(
-            state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, plan, solution, total
-        )
-    scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
-    gusts = _gusts(state, total, plan, solution, spread)
-    variance = exogeneity.inflation(spread, gusts) * spread.covariance.diagonal(axis1=1, axis2=2).T
-    factors = np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
-    none = np.zeros(len(plan.coefficients), dtype=bool)
-    if last is None or state.pieces % TIMING_EVERY == 0:
-        lags = timing.examine(plan, state.model.layout, solution, spread, gram)
-    else:
-        lags = last.timing
-    base = past.grams.sum(axis=0)
-    mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
-    bend = interval.bend(plan, state.model.table, solution, gram, spread.covariance, mean)
-    caution = prudence(plan, solution, spread, hold, gram, *state.model.believed)
-    now = state.transform.last
-    state.renewed = Renewed(
-        time=now,
-        total=total,
-        solution=solution,
-        uncertainty=spread,
-        compensation=compensation,
-        base=base,
-        factors=factors,
-        timing=lags,
-        hold=hold,
-        prudence=caution,
-        bend=bend,
-        gusts=gusts,
-        lost=none,
-        doubted=none,
+    return hold, solution, compensation
+
+
+def _timing(state: State, solution: Solution, spread: Uncertainty, gram: Array) -> Timing:
+    """Whether controls are felt when they are measured, looked at now and then."""
+    if state.renewed is None or state.pieces % TIMING_EVERY == 0:
+        return timing.examine(state.plan, state.model.layout, solution, spread, gram)
+    return state.renewed.timing
+
+
+def _doubt(state: State, solution: Solution, total: Information) -> Array:
+    """(C, P, P) what errors of the aircraft file bring to the covariance through reconstructed flow angles."""
+    model = state.model
+    return reconstruction.doubt(
+        state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.plan, solution, total
     )
-    state.watch.references.append(Reference(now, plan, solution, spread))
 
 
 def _gusts(state: State, total: Information, plan: Plan, solution: Solution, spread: Uncertainty) -> Array:

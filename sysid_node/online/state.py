@@ -53,9 +53,10 @@ class Grounds:
     sound: NDArray[np.bool_]  # (D,) nothing speaks against it but its own error
     spoilt: NDArray[np.bool_]  # (D,) by a control that is not on time
     flaws: NDArray[np.object_]  # (D,) what the lack of a flow angle's sensor takes away, "" for nothing
-    quantiles: Array  # (D,) half an interval over a standard error
-    counted: Array  # (D,) see ``interval.counted``
-    prudence: Array  # (D,) what standard errors are multiplied by before they are called small
+    squares: Array  # (D,) of half of Student's interval over a standard error
+    allowed: Array  # (D,) the largest standard error of a valid estimate
+    relative: Array | None  # (D,) ... and its largest share of the estimate, where there is one
+    floor: Array  # (P,) energy under which a regressor is buried in noise
     fits: list[tuple[float, float, int]]  # by coefficient: what ``FitQuality`` says besides R squared
 
 
@@ -74,7 +75,6 @@ class Renewed:
     hold: Hold  # of the instruments on the regressors
     prudence: Array  # (P, C) see ``prudence``
     bend: Bend  # of the intervals
-    gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
     doubted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
     grounds: Grounds | None = None  # made when first wanted

@@ -20,7 +20,6 @@ class Table:
     unknown: NDArray[np.intp]  # (D,) index into the plan's unknowns; 0 for an offset
     offset: NDArray[np.bool_]  # (D,) whether it is a C_0
     place: NDArray[np.intp]  # (D,) index among the slopes (P x C) and, behind them, the offsets (C,)
-    motion: NDArray[np.intp]  # (D,) index of its regressor's energy in the Gram matrix (W x W)
     allowed: NDArray[np.float64]  # (D,) the largest standard error of a valid estimate
     relative: NDArray[
         np.float64
@@ -56,7 +55,6 @@ def table(aircraft: Aircraft, plan: Plan, valid_fraction: float) -> Table:
         unknown=unknown,
         offset=offset,
         place=np.where(offset, P * C, unknown * C) + coefficient,
-        motion=plan.columns[unknown] * (plan.width + 1),
         allowed=valid_fraction * np.array(sizes),
         relative=np.where(np.array(sizes) > 0.0, 0.0, valid_fraction),
         needs_thrust=np.array([name in ("CL_0", "CD_0") for name in names]),

@@ -8,6 +8,7 @@ from scipy.stats import t as student
 
 from sysid_node.online import interval, regression
 from sysid_node.online.interval import Bend
+from sysid_node.online.regression import Solution, Uncertainty
 from sysid_node.online.signals import layout
 from sysid_node.online.table import table
 
@@ -19,22 +20,22 @@ def test_least_squares_have_students_interval() -> None:
     """With curve = 1 / (nu se^2), as the sum of squares of least squares has."""
     errors, freedom = np.array([0.1, 2.0]), np.array([4.0, 40.0])
     t = student.ppf(0.975, freedom)
-    bend = Bend(np.zeros(2), 1.0 / (freedom * errors**2))
-    below, above = interval.reach(t * errors, interval.counted(freedom, t, np.zeros(2)), bend)
+    bend = Bend(np.zeros(2), 1.0 / (freedom * errors**2), freedom / (freedom + t**2))
+    below, above = interval.reach((t * errors) ** 2, bend)
     np.testing.assert_allclose(below, t * errors)
     np.testing.assert_allclose(above, t * errors)
 
 
 def test_ends_are_where_the_density_of_the_tested_value_allows_no_more() -> None:
     rng = np.random.default_rng(0)
-    halves, counted = rng.uniform(0.1, 1.0, 50), rng.uniform(0.5, 1.0, 50)
-    bend = Bend(rng.normal(size=50), rng.uniform(0.01, 2.0, 50))
-    below, above = interval.reach(halves, counted, bend)
+    squares = rng.uniform(0.1, 1.0, 50) ** 2
+    bend = Bend(rng.normal(size=50), rng.uniform(0.01, 2.0, 50), rng.uniform(0.5, 1.0, 50))
+    below, above = interval.reach(squares, bend)
     ended = np.isfinite(below)
     assert ended.sum() > 20
-    np.testing.assert_array_equal(~ended, halves**2 * counted * bend.curve >= 1.0)
+    np.testing.assert_array_equal(~ended, squares * bend.counted * bend.curve >= 1.0)
     for delta in (-below[ended], above[ended]):
-        allowed = (halves**2 * counted)[ended] * (1.0 + bend.slope[ended] * delta + bend.curve[ended] * delta**2)
+        allowed = (squares * bend.counted)[ended] * (1.0 + bend.slope[ended] * delta + bend.curve[ended] * delta**2)
         np.testing.assert_allclose(delta**2, allowed)
 
 
@@ -51,14 +52,40 @@ def solved(hold: float, endogeneity: float, rng: np.random.Generator, lines: int
     gram = values.T @ values
     solution = regression.solve(PLAN, gram)
     covariance = solution.residual[0] / lines * (z @ z) / (z @ x) ** 2 * np.ones((1, 1, 1))
-    bend = interval.bend(PLAN, TABLE, solution, gram, covariance, np.ones(1))
+    bend = bent(solution, gram, covariance, lines)
     error = np.sqrt(covariance[0, 0])
     t = student.ppf(0.975, lines)
-    counted = interval.counted(np.array([lines]), t, np.zeros(1))
-    return solution.theta[0], error, np.array(interval.reach(t * error, counted, Bend(*(b[:1] for b in bend))))
+    return solution.theta[0], error, np.array(interval.reach((t * error) ** 2, Bend(*(b[:1] for b in bend))))
+
+
+def bent(solution: Solution, gram: Array, covariance: Array, freedom: float, gusts: float = 0.0) -> Bend:
+    spread = Uncertainty(covariance, np.ones(1), np.ones((1, 1)), np.full(1, freedom))
+    return interval.bend(PLAN, TABLE, solution, gram, spread, covariance, np.ones(1), np.full(1, gusts))
 
 
 TABLE = table(AIRCRAFT, PLAN, 0.3)
+
+
+def test_for_the_share_of_gusts_students_quantile_is_not_paid_back() -> None:
+    gram = np.eye(PLAN.width) + 0.5
+    solution = regression.solve(PLAN, gram)
+    still, rough = (bent(solution, gram, np.ones((1, 1, 1)), 10.0, share) for share in (0.0, 1.0))
+    t = student.ppf(0.975, 10.0)
+    np.testing.assert_allclose(still.counted, 10.0 / (10.0 + t * t))
+    np.testing.assert_allclose(rough.counted, 1.0)
+
+
+def test_what_does_not_come_from_the_residual_does_not_bend() -> None:
+    rng = np.random.default_rng(5)
+    values = rng.normal(size=(60, PLAN.width))
+    gram = values.T @ values
+    solution, whole = regression.solve(PLAN, gram), np.ones((1, 1, 1))
+    spread = Uncertainty(whole, np.ones(1), np.ones((1, 1)), np.full(1, 60.0))
+    half = interval.bend(PLAN, TABLE, solution, gram, spread, 0.5 * whole, np.ones(1), np.zeros(1))
+    full = bent(solution, gram, whole, 60.0)
+    np.testing.assert_allclose(half.curve, 0.5 * full.curve)
+    np.testing.assert_allclose(half.slope, 0.5 * full.slope)
+    np.testing.assert_allclose(1.0 - half.counted, 0.5 * (1.0 - full.counted))
 
 
 def test_the_residual_bends_as_it_does() -> None:
@@ -67,7 +94,7 @@ def test_the_residual_bends_as_it_does() -> None:
     values = rng.normal(size=(60, PLAN.width))
     gram = values.T @ values
     solution = regression.solve(PLAN, gram)
-    bend = interval.bend(PLAN, TABLE, solution, gram, np.ones((1, 1, 1)), np.ones(1))
+    bend = bent(solution, gram, np.ones((1, 1, 1)), 60.0)
     place = TABLE.names.index("Cl_p")
     for delta in (-0.3, 0.2):
         moved = ((values[:, Y] - values[:, P] * (solution.theta[0, 0] + delta)) ** 2).sum()
