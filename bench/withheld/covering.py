@@ -1,8 +1,8 @@
 """Whether the stated interval of the shrinkage covers: `python -m withheld.covering SET SEED FOLDER`.
 
-The shrinkage that the diagnosis states is measured on flights that it has not seen, flown by the plant in other gusts
-with other noise: as the file has it, as corrected, and as the truth would have it, which (or less) cannot be closed.
-Only for plants and effects that the simulator can fly as they are. Writes ``FOLDER/SEED/covered.json``.
+The shrinkage that the diagnosis states is measured again, by the same rule, on flights of the plant that it has not
+seen, in other gusts with other noise. Only for plants and effects that the simulator can fly as they are. Writes
+``FOLDER/SEED/covered.json``.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,11 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.bag_writer import write_streams
+from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.flights import RATE as ANALYSIS_RATE
 from sysid_node.gap.flights import load_flight
-from sysid_node.gap.spectra import power_of
-from sysid_node.gap.view import CHANNELS, View, view_of
+from sysid_node.gap.flown import flown
+from sysid_node.gap.view import View, view_of
 from sysid_node.sim import Simulator
 
 from .closing import effects_of
@@ -40,24 +42,23 @@ def main(which: str, seed: int, folder: Path) -> None:
     """Flies, compares and writes."""
     case = folder / str(seed)
     label = json.loads((folder / "labels" / f"{seed}.json").read_text(encoding="utf-8"))
-    said = json.loads((case / "out" / "gap.json").read_text(encoding="utf-8"))
     plant = Plant(Case(**{k: v for k, v in label.items() if k in Case.__dataclass_fields__}), which)
     aircraft = load_aircraft(str(case / "aircraft.yaml"))
     simulator = Simulator(aircraft, ANALYSIS_RATE)
-    views = [_view(plant, simulator, flight, label["effects"]) for flight in _FLIGHTS]
-    corrected = load_aircraft(str(case / "out" / "corrected.yaml"))
+    views = tuple(_view(plant, simulator, flight, label["effects"]) for flight in _FLIGHTS)
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
-    points = {
-        "before": simulator.neutral(),
-        "after": _vector(simulator, corrected, found),
-        "truth": _vector(simulator, plant.truth, label["effects"]),
-    }
-    counted = [CHANNELS.index(name) for name in said["gap"]["per_channel"]]
-    errors = {name: _error(views, point, counted) for name, point in points.items()}
-    before, after, truth = errors.values()
-    floor = min(truth, after)  # in gusts derivatives that bend to them may leave less than the true ones
-    shrink = 100.0 * (before - after) / (before - floor) if before > floor else 0.0
-    (case / "covered.json").write_text(json.dumps({**errors, "shrink_percent": shrink}), encoding="utf-8")
+    after = _vector(simulator, load_aircraft(str(case / "out" / "corrected.yaml")), found)
+    before, corrected = (_everywhere(views, point) for point in (simulator.neutral(), after))
+    gap = flown(before, corrected)
+    errors = asdict(gap) if gap else {}
+    kept = {name: errors[name] for name in ("before", "after", "noise_floor", "shrink_percent") if errors}
+    (case / "covered.json").write_text(json.dumps(kept), encoding="utf-8")
+
+
+def _everywhere(views: tuple[View, ...], point: Array) -> Evidence:
+    """Flights that are predicted with the same parameters throughout."""
+    points = tuple((point,) * len(groups_of(view)) for view in views)
+    return Evidence(np.empty(0), (), views, points)
 
 
 def _view(plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str, Mapping[str, float]]) -> View:
@@ -79,13 +80,6 @@ def _vector(simulator: Simulator, aircraft: Aircraft, effects: Mapping[str, Mapp
         off = effects.get("derivative_error", {}).get(name, 0.0)
         theta[simulator.names.index(f"derivative_error.{name}")] = derivative.value + off - known[name].value
     return np.asarray(theta)
-
-
-def _error(views: Sequence[View], point: Array, counted: Sequence[int]) -> float:
-    """Root-mean-square error as a share of the motion, as the diagnosis measures it (``sysid_node.gap.close``)."""
-    left = sum(power_of(view.residual(point)) for view in views)
-    motion = sum((np.abs(view.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for view in views)
-    return float(np.sqrt(np.mean((left / motion)[list(counted)])))
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ class Judged:
     onset: float | None  # s off
     gap: Mapping[str, Any]
     flown: Mapping[str, float] | None = None  # errors in the plant: before, after, true_effect
-    further: Mapping[str, float] | None = None  # errors on further flights: before, after, truth; shrink_percent
+    further: Mapping[str, float] | None = None  # of further flights: before, after, noise_floor, shrink_percent
 
     @property
     def kind(self) -> str:
@@ -66,7 +66,7 @@ class Judged:
     @property
     def covers(self) -> bool | None:
         """Whether the stated interval holds the shrinkage on further flights; None where there is next to no gap."""
-        if self.further is None or self.further["truth"] > 0.95 * self.further["before"]:
+        if not self.further or self.further["noise_floor"] > 0.95 * self.further["before"]:
             return None
         low, high = self.gap["ci95"]
         return bool(low <= self.further["shrink_percent"] <= high)

@@ -114,7 +114,7 @@ def test_the_stated_interval_covers_what_further_flights_show() -> None:
     said["gap"] = {**GAP, "ci95": [90.0, 97.0]}
     case = judge(_label("one", {"mass_error": {"error": 0.2}}), said)
     assert case.covers is None
-    further = {"before": 0.5, "after": 0.1, "truth": 0.08, "shrink_percent": 95.2}
+    further = {"before": 0.5, "after": 0.1, "noise_floor": 0.08, "shrink_percent": 95.2}
     assert replace(case, further=further).covers is True
     assert replace(case, further={**further, "shrink_percent": 88.0}).covers is False
-    assert replace(case, further={**further, "truth": 0.49}).covers is None  # next to no gap
+    assert replace(case, further={**further, "noise_floor": 0.49}).covers is None  # next to no gap
