@@ -46,7 +46,7 @@ class Held:
     regressors: Array  # (D,) mean of each term's regressor of late
     J: Array  # (D, D) information of sound flight
     v: Array  # (D,) its score about the values
-    blocks: float = 0.0  # that the information is made of
+    blocks: Array  # (D, D) how many it is made of
     offsets: Array = field(default_factory=lambda: np.zeros(6))  # k times these belong to the model, too
     coming: deque[tuple[float, Mapping[str, Known]]] = field(default_factory=deque)
 
@@ -62,7 +62,8 @@ def init(terms: Terms) -> Held:
     """The aircraft file's."""
     count = len(terms.names)
     nothing = np.zeros(count)
-    return Held(terms, terms.values.copy(), terms.tolerance.copy(), nothing, np.zeros((count, count)), nothing.copy())
+    none = np.zeros((count, count))
+    return Held(terms, terms.values.copy(), terms.tolerance.copy(), nothing, none, nothing.copy(), none.copy())
 
 
 def hear(held: Held, time: float, known: Mapping[str, Known]) -> None:
@@ -89,11 +90,12 @@ def ripen(held: Held, now: float) -> bool:
     return taken
 
 
-def learn(held: Held, J: Array, v: Array) -> None:
-    """From a block of sound flight."""
-    held.blocks = KEPT * held.blocks + 1.0
-    held.J = KEPT * held.J + J
-    held.v = KEPT * held.v + v
+def learn(held: Held, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
+    """From a block of sound flight, about the ``chosen`` terms (D,)."""
+    both = np.outer(chosen, chosen)
+    held.blocks = KEPT * held.blocks + both
+    held.J = KEPT * held.J + both * J
+    held.v = KEPT * held.v + chosen * v
 
 
 def noise_of(terms: Terms, colour: Colour, variances: Mapping[str, float]) -> Array:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ from sysid_node.online.signals import OFFSET
 Array = NDArray[np.float64]
 
 EVERY = 5  # a span of n times so many blocks is looked at with every n-th block
+EXPLAINED = 0.9  # share of a coefficient's motion, for it to be learned from
 PATIENT = 20  # blocks that a vane must have stood still
 LEAST = 3  # blocks that a fault must have lasted
 RENEWED = 10  # blocks after which hypotheses and whitening are made anew
@@ -91,10 +93,11 @@ def take(state: State, block: Block) -> None:
             colour.settle(state.colour)
     if len(state.raw) == ORDER:
         piece = _piece(state, block, design, residual)
+        state.pieces.append(piece)
         if not learning:
             _judge(state, piece)
         elif state.count * PERIOD > SETTLED * state.settings.learning:
-            held.learn(state.held, piece.J, piece.v)
+            _learn_model(state)
     state.raw.append(_against_held(state, block))
 
 
@@ -117,7 +120,6 @@ def _piece(state: State, block: Block, design: Array, residual: Array) -> Piece:
 
 
 def _judge(state: State, piece: Piece) -> None:
-    state.pieces.append(piece)
     if state.alarm is not None:
         if state.count % EVERY == 0:
             _follow(state, state.alarm)
@@ -128,7 +130,7 @@ def _judge(state: State, piece: Piece) -> None:
     if state.alarm is None and len(state.pieces) > LAG:
         old = state.pieces[-LAG - 1]
         _learn(state, old.block, old.residual)
-        held.learn(state.held, old.J, old.v)
+        _learn_model(state)
 
 
 def _learn(state: State, block: Block, residual: Array) -> None:
@@ -138,6 +140,21 @@ def _learn(state: State, block: Block, residual: Array) -> None:
     weight = max(PERIOD / OFFSETS, 1.0 / (state.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
     known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
+
+
+def _learn_model(state: State) -> None:
+    """From the block that is old enough, the coefficients whose motion the model explains in the time after it.
+
+    In a closed loop surfaces answer to gusts, and where gusts make the motion least squares are biased by that (Ljung,
+    "System Identification", 2nd ed. (1999), sect. 13.4).
+    """
+    if len(state.pieces) <= LAG:
+        return
+    last = list(islice(state.pieces, len(state.pieces) - LAG - 1, None))
+    motion = np.var([piece.block.outputs for piece in last], axis=0)
+    left = np.var([piece.residual for piece in last], axis=0)
+    explained = (left < (1.0 - EXPLAINED) * motion)[state.terms.output]
+    held.learn(state.held, last[0].J, last[0].v, explained)
 
 
 def _renew(state: State, now: Block) -> None:
@@ -202,10 +219,12 @@ def _alarm(state: State, over: Stretch, usual: Array) -> None:
 
 def _follow(state: State, alarm: Alarm) -> None:
     """Weigh what has come since the onset; end the alarm where the last seconds speak of nothing."""
+    if len(state.pieces) < LEAST:
+        return  # after a gap
     now = state.pieces[-1].block.time
     if now - alarm.found <= DATED:
         alarm.since = _onset(state, alarm)
-    over = stretch(state, max(_since(state, alarm.since), LEAST))
+    over = stretch(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)))
     found = explained(state, over, alarm.usual)
     vanes = stuck_vanes(state, over)
     factors = np.array([*(w.factor for w in found), *vanes.values()])

@@ -152,6 +152,18 @@ def test_a_gap_is_bridged_without_an_alarm() -> None:
     assert fly(state, maker, 20.0) is None
 
 
+def test_a_gap_while_a_fault_is_followed() -> None:
+    state, maker = monitored(seed=12)
+    fly(state, maker, ONSET)
+    assert fly(state, maker, 6.0, lost("de", 0.6)) is not None
+    for _ in range(3):
+        maker.count += 50
+        monitor.take(state, maker.block(lost("de", 0.6))._replace(follows=False))
+        fault = fly(state, maker, 2.0, lost("de", 0.6))
+    assert fault is not None
+    assert (fault.kind, fault.part) == (LOSS, "elevator"), fault.text
+
+
 def test_the_last_good_derivatives_are_held() -> None:
     """What the identifier says is taken up ten seconds later, and nothing that comes after an alarm."""
     state, maker = monitored(seed=9)
