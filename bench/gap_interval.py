@@ -60,8 +60,8 @@ class Outcome:
 
     @property
     def closed(self) -> float:
-        """Percent of what could be closed that was."""
-        return 100.0 * (self.before - self.after) / (self.before - self.floor)
+        """Percent of what could be closed that was; all of it where even the truth leaves more, by chance."""
+        return 100.0 * min((self.before - self.after) / (self.before - self.floor), 1.0)
 
     @property
     def covered(self) -> bool:

@@ -105,14 +105,18 @@ def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
     them, no one knows which: so each draw takes one.
     """
     whole = _shares(motion, np.concatenate([errors[:3], errors[3:].mean(axis=0, keepdims=True)]))
-    whole[3] = whole.min(axis=0)  # what is left cannot be less than the floor, so the floor cannot be more
     random = np.random.default_rng(0)
     draws: list[Array] = []
     for windows in _blocks(len(motion), random):
         taken = errors[[0, 1, 2, int(random.integers(3, len(errors)))]]
         draws.append(_overall(_shares(motion[windows], taken[:, windows])))
-    channels = {name: dict(zip(STAGES, whole[:, r].tolist(), strict=True)) for r, name in enumerate(names)}
-    return gap_from(_overall(whole), np.array(draws), channels)
+    own = {name: dict(zip(STAGES, _floored(whole[:, r]).tolist(), strict=True)) for r, name in enumerate(names)}
+    return gap_from(_floored(_overall(whole)), np.array([_floored(draw) for draw in draws]), own)
+
+
+def _floored(errors: Array) -> Array:
+    """Errors (4,): what is left cannot be less than the floor, so the floor cannot be more."""
+    return np.append(errors[:3], errors.min())
 
 
 def _shares(motion: Array, errors: Array) -> Array:
