@@ -27,7 +27,7 @@ from sysid_node.faults.hypotheses import hypotheses
 from sysid_node.faults.report import Found, fault_of
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
-from sysid_node.faults.terms import terms
+from sysid_node.faults.terms import Terms, terms
 from sysid_node.faults.types import VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
     Stretch,
@@ -150,11 +150,25 @@ def _learn_model(state: State) -> None:
     """
     if len(state.pieces) <= LAG:
         return
-    last = list(islice(state.pieces, len(state.pieces) - LAG - 1, None))
-    motion = np.var([piece.block.outputs for piece in last], axis=0)
-    left = np.var([piece.residual for piece in last], axis=0)
-    explained = (left < (1.0 - EXPLAINED) * motion)[state.terms.output]
-    held.learn(state.held, last[0].J, last[0].v, explained)
+    if state.count % RENEWED == 0 or not state.explained.size:
+        last = islice(state.pieces, len(state.pieces) - LAG - 1, None)
+        state.explained = _explained(state.terms, [piece.block for piece in last])
+    old = state.pieces[-LAG - 1]
+    held.learn(state.held, old.J, old.v, state.explained)
+
+
+def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
+    """(D,) terms of the coefficients whose motion their regressors explain, whatever the derivatives."""
+    outputs, regressors = (np.array([getattr(b, name) for b in last]) for name in ("outputs", "regressors"))
+    found = np.zeros(len(terms.names), dtype=bool)
+    for output in set(terms.output.tolist()):
+        mine = terms.output == output
+        y = outputs[:, output] - outputs[:, output].mean()
+        X = regressors[:, terms.column[mine]]
+        X = X - X.mean(axis=0)
+        left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+        found[mine] = left @ left < (1.0 - EXPLAINED) * (y @ y)
+    return found
 
 
 def _renew(state: State, now: Block) -> None:

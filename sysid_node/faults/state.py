@@ -60,6 +60,7 @@ class State:
     raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
     hypotheses: list[Hypothesis] = field(default_factory=list)
     belief: Belief | None = None  # what the blocks are weighed against
+    explained: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))  # (D,) terms that are learned
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block
     count: int = 0
     alarm: Alarm | None = None
