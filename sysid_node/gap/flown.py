@@ -106,12 +106,13 @@ def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
     """
     whole = _shares(motion, np.concatenate([errors[:3], errors[3:].mean(axis=0, keepdims=True)]))
     random = np.random.default_rng(0)
-    draws: list[Array] = []
+    overall, draws = _overall(whole), list[Array]()
+    centred = np.append(np.ones(3), _floored(overall)[3] / overall[3])  # draws scatter about what is stated
     for windows in _blocks(len(motion), random):
         taken = errors[[0, 1, 2, int(random.integers(3, len(errors)))]]
-        draws.append(_overall(_shares(motion[windows], taken[:, windows])))
+        draws.append(_floored(centred * _overall(_shares(motion[windows], taken[:, windows]))))
     own = {name: dict(zip(STAGES, _floored(whole[:, r]).tolist(), strict=True)) for r, name in enumerate(names)}
-    return gap_from(_floored(_overall(whole)), np.array([_floored(draw) for draw in draws]), own)
+    return gap_from(_floored(overall), np.array(draws), own)
 
 
 def _floored(errors: Array) -> Array:
