@@ -25,6 +25,9 @@ _CHANCE = 4.0
 #: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
 _EXPLAINED = 0.8
 
+#: Percentage of what could be closed of short flights, not fitted, that they must be able to close.
+_CLOSED = 50.0
+
 #: Probability, with what is left over counted against it, below which no cause is said to explain.
 _LIKELY = 0.5
 
@@ -45,6 +48,8 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
         return "unknown_effect" if structured(attribution) else "no_gap"
     if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
         return "unknown_effect"
+    if check.flown is not None and check.flown.ci95[1] < _CLOSED:
+        return "unknown_effect"  # most of what the simulator is off by remains, whatever was found
     sure = [c.probability >= _TOLD_APART and probability(attribution, c) >= _LIKELY for c in attribution.causes]
     return "explained" if all(sure) else "ambiguous"
 

@@ -1,6 +1,7 @@
 """What is put in is found again, by name and size, through derivatives that are wrong; truth: the effects flown."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from gap_flights import fly
@@ -8,6 +9,8 @@ from gap_flights import fly
 from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
+from sysid_node.gap.holdout import Check
+from sysid_node.gap.verdict import verdict_of
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 
@@ -30,6 +33,13 @@ def test_the_gap_closes_on_flight_held_out(lagging) -> None:
     assert gap.after < 0.5 * gap.tolerances < 0.5 * gap.before
     assert gap.after < 1.5 * gap.noise_floor
     assert gap.ci95[0] <= gap.shrink_percent <= gap.ci95[1]
+
+
+def test_effects_that_leave_most_of_the_gap_open_do_not_explain_it(lagging) -> None:
+    check = Check(lagging.views, lagging.base, lagging.final, lagging.gap)
+    assert verdict_of(lagging.views, lagging.attribution, check) == "explained"
+    check.__dict__["flown"] = replace(lagging.flown, ci95=(12.0, 28.0))
+    assert verdict_of(lagging.views, lagging.attribution, check) == "unknown_effect"
 
 
 def test_the_document_is_json_and_its_shares_add_up(lagging) -> None:
