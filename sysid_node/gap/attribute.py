@@ -202,19 +202,30 @@ class Trier:
             best.setdefault(labels, (current, look))
         return list(best.values())
 
-    def beside(self, chosen: Trial, rival: Candidate) -> Trial:
-        """A rival added to what was chosen."""
+    def upon(self, current: Trial, look: Look) -> Trial | None:
+        """A candidate added to an explanation; None where no numbers come of it.
+
+        Slopes of a mode that feeds itself grow without end: such a set predicts nothing, and is no explanation.
+        """
+        try:
+            return self.trial(current.fit, current.fit.candidates, look)
+        except np.linalg.LinAlgError:
+            return None
+
+    def beside(self, chosen: Trial, rival: Candidate) -> Trial | None:
+        """A rival added to what was chosen; None where no numbers come of it."""
         (look,) = self.looks(chosen, [rival], lambda s, t: None)
-        return self.trial(chosen.fit, chosen.fit.candidates, look)
+        return self.upon(chosen, look)
 
     def finish(self, looks: Sequence[tuple[Trial, Look]], progress: Progress) -> list[tuple[Trial, Trial]]:
         """What was looked at, fitted to the end, after what it was looked at upon; the most probable first."""
         trials = _spread(
-            lambda pair: (pair[0], self.trial(pair[0].fit, pair[0].fit.candidates, pair[1])),
+            lambda pair: (pair[0], self.upon(*pair)),
             looks,
             lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
         )
-        return sorted(trials, key=lambda pair: -pair[1].evidence.total)
+        done = [(current, trial) for current, trial in trials if trial is not None]
+        return sorted(done, key=lambda pair: -pair[1].evidence.total)
 
 
 def _likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Trial, Look]]:
@@ -382,7 +393,8 @@ def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
     rivals = [t for t in place.rivals if t.added is not None and t.added.label != candidate.label]
     instead = probabilities([chosen.evidence.scores, *(t.evidence.scores for t in rivals)])[1:]
     strong = [t for t, share in zip(rivals, instead, strict=True) if share > _WORTH_TRYING]
-    both = [trier.beside(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
+    tried = [trier.beside(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
+    both = [trial for trial in tried if trial is not None]
     sets = [chosen, *both, *rivals]
     shares = probabilities([*(t.evidence.scores for t in sets), place.without.evidence.scores])
     by_effect = {candidate.effect: float(shares[: 1 + len(both)].sum())}

@@ -1,10 +1,15 @@
 """Two effects that bend to hold each other's share are both named; truth: the effects that were flown."""
 
+import numpy as np
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap.attribute import attribute
+from sysid_node.gap import attribute as module
+from sysid_node.gap.attribute import Trier, attribute
+from sysid_node.gap.candidates import candidates_of
+from sysid_node.gap.fit import blank
 from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.steps import Steps
 from sysid_node.gap.view import view_of
 from sysid_node.sim import Simulator
 
@@ -29,3 +34,17 @@ def test_both_of_two_effects_are_named_with_their_sizes(weak_and_slow) -> None:
 def test_what_adds_up_is_no_alternative(weak_and_slow) -> None:
     """Each predicts much better beside the other, so that neither takes the other's probability away."""
     assert all(cause.probability > 0.9 for cause in weak_and_slow.causes)
+
+
+def test_what_gives_no_numbers_is_no_explanation(plain_view, monkeypatch) -> None:
+    """As where the slopes of a mode that feeds itself grow without end."""
+
+    def endless(*args: object) -> None:
+        raise np.linalg.LinAlgError("not positive definite")
+
+    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
+    trier = Trier(nuisances, Steps())
+    base = trier.trial(blank([plain_view], nuisances), [])
+    (candidate,) = (c for c in candidates_of(plain_view.simulator, [plain_view]) if c.label == "command_delay")
+    monkeypatch.setattr(module, "judged", endless)
+    assert trier.upon(base, (0.0, candidate, (0.02,))) is None
