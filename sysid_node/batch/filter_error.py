@@ -107,7 +107,12 @@ class _FilterError(Problem):
         ]
 
     def sensitivities(self, z: Array) -> list[Array]:
-        return [np.asarray(_predict_jacobian(*self._of(i, z))) for i in range(len(self.unknowns.manoeuvres))]
+        blocks = []
+        for i, manoeuvre in enumerate(self.unknowns.manoeuvres):
+            block = np.zeros((*manoeuvre.outputs.shape, z.size))
+            block[:, :, self._columns(i, z)] = np.asarray(_predict_jacobian(*self._of(i, z)))
+            blocks.append(block)
+        return blocks
 
     def priors(self) -> Priors:
         """Besides the parameters': noises of about the start values, so that one that does not matter stays put."""
@@ -138,10 +143,16 @@ class _FilterError(Problem):
         scale = np.exp(np.mean(np.log(np.linalg.norm(self.noise(z), axis=1) / np.sqrt(np.asarray(expected)))))
         return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
 
+    def _columns(self, index: int, z: Array) -> list[int]:
+        """Where in z the quantities stand that this manoeuvre depends on."""
+        own = self.unknowns.own(index)
+        noises = range(self.unknowns.size, z.size)
+        return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
+
     def _of(self, index: int, z: Array) -> tuple[Dynamics, Chosen, Array, Array, Array, Array, Array, Array]:
         u, m = self.unknowns, self.unknowns.manoeuvres[index]
         chosen = (u.free, u.states, u.biases, _driven(u.model))
-        local = z[self.columns(index, z)]
+        local = z[self._columns(index, z)]
         return u.model.dynamics, chosen, m.time, m.inputs, m.outputs, m.initial_state, u.model.start, local
 
 

@@ -64,7 +64,7 @@ class Problem(ABC):
 
     @abstractmethod
     def sensitivities(self, z: Array) -> list[Array]:
-        """d modelled / d z[columns] (N, ny, k) of each manoeuvre, zero where nothing was measured."""
+        """d modelled / d z (N, ny, n) of each manoeuvre, zero where nothing was measured."""
 
     def priors(self) -> Priors:
         """What is known beforehand: indices into z, means, 1-sigma uncertainties."""
@@ -83,35 +83,21 @@ class Problem(ABC):
     def weighted(self, z: Array, noise: Array) -> tuple[list[Array], list[Array]]:
         """Residuals (N, ny), zero where nothing was measured, and sensitivities (N, ny, n), in units of the noise."""
         residuals = [whitened(_measured_only(answer), noise) for answer in self.answers(z)]
-        blocks = []
-        for i, block in enumerate(self.sensitivities(z)):
-            blocks.append(np.zeros((*block.shape[:2], z.size)))
-            blocks[-1][:, :, self.columns(i, z)] = whitened(block, noise)
-        return residuals, blocks
+        return residuals, [whitened(block, noise) for block in self.sensitivities(z)]
 
-    def cost(self, z: Array, noise: Array) -> float:
-        """Sum of squares of the residuals in units of the noise, and of the priors'."""
+    def residuals(self, z: Array, noise: Array) -> Array:
+        """Measured minus modelled in units of the noise, zero where nothing was measured, then the priors."""
         index, mean, sigma = self.priors()
-        squares = [float(np.sum(whitened(_measured_only(answer), noise) ** 2)) for answer in self.answers(z)]
-        return sum(squares) + float(np.sum(((mean - z[index]) / sigma) ** 2))
+        parts = [whitened(_measured_only(answer), noise).ravel() for answer in self.answers(z)]
+        return np.concatenate([*parts, (mean - z[index]) / sigma])
 
-    def normal(self, z: Array, noise: Array) -> tuple[Array, Array]:
-        """Information (n, n) and moment (n,) of the unknowns, half the cost's curvature and negative slope."""
-        information, moment = np.zeros((z.size, z.size)), np.zeros(z.size)
-        for i, (answer, block) in enumerate(zip(self.answers(z), self.sensitivities(z), strict=True)):
-            columns = self.columns(i, z)
-            slopes = whitened(block, noise).reshape(-1, len(columns))
-            information[np.ix_(columns, columns)] += slopes.T @ slopes
-            moment[columns] += slopes.T @ whitened(_measured_only(answer), noise).ravel()
-        index, mean, sigma = self.priors()
-        information[index, index] += 1.0 / sigma**2
-        moment[index] += (mean - z[index]) / sigma**2
-        return information, moment
-
-    def columns(self, index: int, z: Array) -> list[int]:
-        """Where in z the quantities stand that a manoeuvre depends on: the common ones, its own, a method's."""
-        own = self.unknowns.own(index)
-        return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *range(self.unknowns.size, z.size)]
+    def jacobian(self, z: Array, noise: Array) -> Array:
+        """d residuals / d z."""
+        index, _, sigma = self.priors()
+        prior = np.zeros((index.size, z.size))
+        prior[np.arange(index.size), index] = -1.0 / sigma
+        parts = [-whitened(block, noise).reshape(-1, z.size) for block in self.sensitivities(z)]
+        return np.concatenate([*parts, prior])
 
     def check(self, z: Array) -> None:
         """Raises InputError with too few measurements, or where the model does not stay finite at ``z``."""
@@ -153,9 +139,9 @@ def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
     moved, evaluations = np.inf, search.early
     for iteration in range(1, search.rounds + 1):
         previous, noise = z, problem.noise(z)
-        z, information = weighted_least_squares(problem, z, np.arange(z.size), noise, evaluations)
-        # bounds every |dz_i| over its standard error
-        moved = float(np.sqrt(max(0.0, float((z - previous) @ information @ (z - previous)))))
+        z = weighted_least_squares(problem, z, np.arange(z.size), noise, evaluations)
+        # |J dz| bounds every |dz_i| over its standard error
+        moved = float(np.linalg.norm(problem.jacobian(z, noise) @ (z - previous)))
         if moved < search.tolerance and evaluations == search.evaluations:
             return z, iteration, ""
         # so few evaluations may also have found no step at all
@@ -170,13 +156,8 @@ def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
 
 def weighted_least_squares(
     problem: Problem, z: Array, chosen: NDArray[np.intp], noise: Array, evaluations: int
-) -> tuple[Array, Array]:
-    """The unknowns with those of index ``chosen`` moved to the least squares for this noise; their information there.
-
-    The optimiser sees as many residuals as unknowns and one more, with the same cost, slope and curvature: a hundred
-    thousand samples at a hundred unknowns would keep it busy with their singular values.
-    """
-    information = np.zeros((chosen.size, chosen.size))
+) -> Array:
+    """The unknowns with those of index ``chosen`` moved to the least squares for this noise."""
 
     def moved(x: Array) -> Array:
         full = z.copy()
@@ -184,12 +165,10 @@ def weighted_least_squares(
         return full
 
     def residuals(x: Array) -> Array:
-        return np.append(np.zeros(chosen.size), np.sqrt(problem.cost(moved(x), noise)))
+        return problem.residuals(moved(x), noise)
 
     def jacobian(x: Array) -> Array:
-        whole, moment = problem.normal(moved(x), noise)
-        information[:] = whole[np.ix_(chosen, chosen)]
-        return _condensed(information, moment[chosen], residuals(x)[-1])
+        return problem.jacobian(moved(x), noise)[:, chosen]
 
     lower, upper = problem.bounds()
     # a start value on its bound would leave the interior method no step
@@ -203,17 +182,7 @@ def weighted_least_squares(
             x_scale="jac",
             max_nfev=evaluations,
         )
-    return moved(solution.x), information
-
-
-def _condensed(information: Array, moment: Array, size: float) -> Array:
-    """J (n + 1, n) with J' J = ``information`` and J' f = -``moment`` for the residuals f = (0, ..., 0, ``size``)."""
-    last = -moment / size if size > 0.0 else np.zeros(moment.size)
-    scale = np.sqrt(np.diag(information))
-    scale[scale == 0.0] = 1.0
-    values, vectors = np.linalg.eigh((information - np.outer(last, last)) / np.outer(scale, scale))
-    root = np.sqrt(np.clip(values, 0.0, None))[:, None] * vectors.T * scale
-    return np.vstack([root, last])
+    return moved(solution.x)
 
 
 def answer_with_own(problem: Problem, z: Array) -> list[Answer]:
@@ -221,5 +190,5 @@ def answer_with_own(problem: Problem, z: Array) -> list[Answer]:
     problem.check(z)
     own = np.arange(len(problem.unknowns.free), problem.unknowns.size)
     for _ in range(_OWN_ROUNDS if own.size else 0):
-        z, _ = weighted_least_squares(problem, z, own, problem.noise(z), DEFAULT_SEARCH.evaluations)
+        z = weighted_least_squares(problem, z, own, problem.noise(z), DEFAULT_SEARCH.evaluations)
     return problem.answers(z)

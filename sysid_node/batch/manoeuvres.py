@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,13 +63,13 @@ def segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:
     if not seconds > 0.0:
         return [record]
     pieces = max(1, int(np.ceil(record.duration / seconds - 1e-9)))
-    samples = len(record) // pieces
-    if samples < _FEWEST:
+    edges = len(record) // pieces * np.arange(pieces + 1)
+    if edges[1] < _FEWEST:
         raise InputError(
             f"flight {record.name!r}: {len(record)} samples in {record.duration:.1f} s cannot be cut into segments of "
             f"{seconds:g} s; give longer segments"
         )
-    return [_piece(record, k * samples, (k + 1) * samples, k, pieces) for k in range(pieces)]
+    return [_piece(record, first, last, k, pieces) for k, (first, last) in enumerate(pairwise(edges.tolist()))]
 
 
 def _piece(record: FlightRecord, first: int, last: int, index: int, pieces: int) -> FlightRecord:

@@ -89,12 +89,16 @@ class _OutputError(Problem):
 
     def sensitivities(self, z: Array) -> list[Array]:
         u = self.unknowns
-        theta, biased = u.theta(z), np.eye(len(u.model.outputs))[:, list(u.biases)]
+        theta, free = u.theta(z), len(u.free)
         blocks = []
         for i, manoeuvre in enumerate(u.manoeuvres):
             of_model = rollout.sensitivities(u.model, manoeuvre, theta, u.initial_state(z, i), u.free, u.states)
-            of_biases = np.broadcast_to(biased, (len(of_model), *biased.shape))
-            block = np.concatenate([of_model, of_biases], axis=2)
+            own = u.own(i).start
+            block = np.zeros((*manoeuvre.outputs.shape, u.size))
+            block[:, :, :free] = of_model[:, :, :free]
+            block[:, :, own : own + len(u.states)] = of_model[:, :, free:]
+            for k, output in enumerate(u.biases):
+                block[:, output, own + len(u.states) + k] = 1.0
             block[~self._measured[i]] = 0.0
             blocks.append(block)
         return blocks
