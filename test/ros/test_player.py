@@ -2,6 +2,7 @@
 
 import itertools
 import struct
+import time
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,11 @@ def hear(probe: Probe, bag: Path, *options: str) -> tuple[list[Imu], list[Clock]
     ]
     with ended(start("player", str(bag), *options)) as player:
         probe.until(lambda: player.poll() is not None, 30.0)
-    probe.spin(0.2)
+    # what is still on its way: a busy machine delivers late
+    count, quiet = -1, time.monotonic() + 10.0
+    while count != len(imu) + len(clock) and time.monotonic() < quiet:
+        count = len(imu) + len(clock)
+        probe.spin(0.5)
     for subscription in mine:
         probe.node.destroy_subscription(subscription)
     return imu, clock
