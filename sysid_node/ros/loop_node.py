@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -43,7 +44,7 @@ AIRCRAFT = Parameter(
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
-class LoopNode(Node):
+class LoopNode(Node, ABC):
     """A node with a table of parameters, of which those in ``live`` may change; says how it goes once a second."""
 
     def __init__(self, name: str, table: Sequence[Parameter], live: frozenset[str] = frozenset()) -> None:
@@ -61,9 +62,9 @@ class LoopNode(Node):
     def changed(self, values: Mapping[str, Any]) -> None:
         """Take new values of live parameters. Raises InputError where they are impossible."""
 
+    @abstractmethod
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
         """Level, one line, and values for /diagnostics."""
-        raise NotImplementedError
 
     def every(self, period: float, callback: Any) -> None:
         """Call back every so many seconds of a clock that never jumps."""
