@@ -245,5 +245,6 @@ def test_drawn_lines_are_the_estimates(full):
 
 def test_figures_are_valid_plotly(full):
     graph_objects = pytest.importorskip("plotly.graph_objects", reason="Plotly for Python checks the figures' keys")
+    assert full.figures
     for figure in full.figures:
-        graph_objects.Figure(figure)
+        assert graph_objects.Figure(figure).data, "a key that Plotly does not know raises"
