@@ -3,7 +3,7 @@
     OMP_NUM_THREADS=1 python bench/update.py [--bag bags/cdrw_multistep] [--aircraft cdrw] [--repeat 3]
 
 Every sample of the flight is taken in (kinematics, transform), and all derivatives are solved for with their variances;
-renewals (segments, colour of the residuals, watch for changes) fall in between, every half second. ``estimate`` adds
+renewals (segments, colour of the residuals, watch for changes) fall in between, every second or so. ``estimate`` adds
 names, intervals and statuses, as published. The bare arithmetic is 14 signals at 48 lines accumulated, their Gram
 matrix and two least-squares solves with covariances. Both are timed by turns, a hundred samples at a time.
 """

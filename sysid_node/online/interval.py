@@ -60,7 +60,7 @@ def bend(
     with np.errstate(over="ignore", invalid="ignore"):
         slope = (gradient[:, None] @ ways)[:, 0] * (-2.0 * scale)
         curve = ((normal @ ways) * ways).sum(axis=1) * scale
-    instrumented = ((plan.mine.T @ (plan.columns != plan.instruments)) > 0.0)[table.coefficient]
+    instrumented = plan.instrumented[table.coefficient]
     place = table.coefficient, np.where(table.offset, P, table.unknown)
     square = student_95(spread.freedom) ** 2
     counted = ((spread.freedom + gusts * square) / (spread.freedom + square))[table.coefficient]

@@ -29,6 +29,5 @@ def prudence(
     meeting, _ = weighed(plan, solution.theta, spread.covariance, values, precisions)
     v = misfits(plan, meeting)
     squares = ((gram @ v) * v).sum(axis=0)
-    instrumented = (plan.mine.T @ (plan.columns != plan.instruments)) > 0.0
-    more = np.where(instrumented, np.maximum(squares / np.maximum(solution.residual, 1e-300), 1.0), 1.0)
-    return np.asarray(np.where(instrumented, hold.luck[:, None], 1.0) * more * plan.mine)
+    more = np.where(plan.instrumented, np.maximum(squares / np.maximum(solution.residual, 1e-300), 1.0), 1.0)
+    return np.asarray(np.where(plan.instrumented, hold.luck[:, None], 1.0) * more * plan.mine)

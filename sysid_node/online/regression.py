@@ -53,6 +53,7 @@ class Plan:
     square: Index = field(init=False)  # (C,) of y'y
     counted: Array = field(init=False)  # (P + C, P) 1 where the entry lies in a block
     unit: Array = field(init=False)  # (P, P)
+    instrumented: NDArray[np.bool_] = field(init=False)  # (C,) whether any of its regressors has an instrument
     least_squares: bool = field(init=False)  # whether every regressor is its own instrument
     kin: dict[tuple[int, ...], Plan] = field(init=False, default_factory=dict, repr=False)  # see ``without``
 
@@ -64,6 +65,7 @@ class Plan:
         object.__setattr__(self, "square", self.outputs * (self.width + 1))
         object.__setattr__(self, "counted", np.vstack([self.same, self.mine.T]))
         object.__setattr__(self, "unit", np.eye(self.columns.size))
+        object.__setattr__(self, "instrumented", (self.mine.T @ (self.columns != self.instruments)) > 0.0)
         object.__setattr__(self, "least_squares", plain)
 
     def unknowns(self, coefficient: int) -> Index:

@@ -1,6 +1,6 @@
-"""What the estimator does every half second of data, when a piece of the watch is complete: look for changes, and
+"""What the estimator does with every piece of data, half a second: look for changes.
 
-every second or so measure the segment and renew what the estimates between rest on.
+And with every piece at first, with every other one later: measure the segment, and renew what all estimates rest on.
 """
 
 from __future__ import annotations
