@@ -80,7 +80,7 @@ def main() -> None:
         with new_bag(options.bag, options.storage) as writer:
             recorder = Recorder(writer, TOPICS)
             recorder.get_logger().info(f"records into {options.bag}")
-            with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):  # the writer aborts on exceptions
+            with contextlib.suppress(ExternalShutdownException):  # the writer aborts on exceptions
                 serve(recorder)
 
     sys.exit(run_program(record))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
+import signal
 from collections.abc import Callable
 
 import rclpy
+from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -19,20 +21,25 @@ def run_program(program: Callable[[], None]) -> int:
 
     0 when it is done or stopped by Ctrl-C, SIGTERM or a shutdown of its context; 2 where it raises InputError, or ROS
     cannot make sense of its arguments, which becomes one line of the log.
+    Ctrl-C shuts ROS down, as SIGTERM does, and ``program`` is to end when ``rclpy.ok()`` is false. It raises no
+    KeyboardInterrupt: one in the middle of rclpy's conversion of a message becomes a RuntimeError.
     """
+    signal.signal(signal.SIGINT, lambda *_: None)  # before ROS adds its own handler, which calls this one
     try:
         rclpy.init()
+    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
+        return 2
+    try:
         program()
     except InputError as error:
         rclpy.logging.get_logger("sysid").fatal(str(error))
         return 2
-    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
-        if rclpy.ok():
-            raise
-        rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
-        return 2
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
+    except (rclpy_implementation.RCLError, rclpy_implementation.InvalidHandle, NotInitializedException):
+        if rclpy.ok():
+            raise  # otherwise something was asked of ROS while it shut down
     finally:
         rclpy.try_shutdown()
     return 0
