@@ -33,7 +33,8 @@ sys.exit(run_program(program))
 
 
 def ended(text: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", text, *arguments], check=False, capture_output=True, text=True, timeout=60)
+    command = [sys.executable, "-c", text, *arguments]
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
 
 
 def test_ctrl_c_and_sigterm_let_the_program_end_instead_of_raising_in_the_middle_of_it() -> None:
