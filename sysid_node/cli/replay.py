@@ -17,13 +17,17 @@ import numpy as np
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.estimates_bag import write_estimates
-from sysid_node.cli.show import progress_bar, show_estimates
+from sysid_node.cli.show import progress_bar, show_estimates, show_faults
 from sysid_node.errors import InputError
+from sysid_node.faults.held import known_of
+from sysid_node.faults.record import Heard, Verdict, judge
+from sysid_node.faults.settings import Settings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import flat, why_nothing_aligned
 from sysid_node.flight.bag import read_streams
+from sysid_node.flight.commands import read_commands
 from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
-from sysid_node.flight.streams import Stamps
+from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
 from sysid_node.online import reconstruction
@@ -54,7 +58,7 @@ class Replay:
     history: Sequence[Estimates]
     stamps_ns: Stamps  # (K,) header stamps at which each of ``history`` (K,) fell due
     final: Estimates  # after the last sample, whether or not one was due
-    frame_id: str
+    streams: Streams
 
 
 def replay(
@@ -83,10 +87,19 @@ def replay(
     history = run_online(aircraft, settings, time, aligned.samples, np.union1d(due, time[-1:]), share)
     published = history if due.size and due[-1] == last else history[:-1]
     stamps = aligned.stamps[np.searchsorted(time, due)]
-    return Replay(aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams.imu.frame_id)
+    return Replay(aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams)
 
 
-def write_replay(folder: Path, done: Replay, truth: Mapping[str, float] | None = None) -> None:
+def judge_replay(done: Replay, bag: str | Path, progress: Callable[[float], None] | None = None) -> Verdict:
+    """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
+    pairs = zip(done.stamps_ns.tolist(), done.history, strict=True)
+    heard = (Heard(stamp, known_of(estimates)) for stamp, estimates in pairs)
+    return judge(done.aircraft, FaultSettings(), done.streams, read_commands(bag), heard, progress)
+
+
+def write_replay(
+    folder: Path, done: Replay, truth: Mapping[str, float] | None = None, faults: Verdict | None = None
+) -> None:
     """Writes summary.json, the tables and report.html, and the bag of all estimates in ``folder``/estimates.
 
     What an earlier replay left there is replaced. Raises InputError where the folder cannot be written.
@@ -105,6 +118,7 @@ def write_replay(folder: Path, done: Replay, truth: Mapping[str, float] | None =
         history=list(shown.values()),
         rejected=flat(aligned.rejected),
         truth=truth,
+        faults=faults,
         remarks=reconstruction.remarks(flow),
     )
     settings = {**result.settings, "publish_rate": done.publish_rate}
@@ -117,7 +131,7 @@ def write_replay(folder: Path, done: Replay, truth: Mapping[str, float] | None =
         done.stamps_ns,
         aircraft=done.aircraft.name,
         method=done.settings.method,
-        frame_id=done.frame_id,
+        frame_id=done.streams.imu.frame_id,
     )
 
 
@@ -186,7 +200,10 @@ def run(args: argparse.Namespace) -> None:
             frame=args.body_frame,
             progress=progress,
         )
-    write_replay(args.out, done, truth)
+    with progress_bar("look for faults", quiet=args.quiet) as progress:
+        faults = judge_replay(done, args.bag, progress)
+    write_replay(args.out, done, truth, faults)
     if not args.quiet:
         show_estimates(done.final, truth)
+        show_faults(faults)
         print(args.out / "report.html")

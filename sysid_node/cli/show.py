@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from sysid_node.faults.record import Verdict
 from sysid_node.online.types import Estimates
 
 
@@ -35,3 +36,10 @@ def show_estimates(final: Estimates, truth: Mapping[str, float]) -> None:
         known = [f"{truth[d.name]:.4f}" if d.name in truth else ""] if truth else []
         table.add_row(*cells, *known, style="" if d.valid else "dim")
     Console().print(table)
+
+
+def show_faults(verdict: Verdict) -> None:
+    """What the fault monitor would have said of the flight."""
+    style = "bold yellow" if verdict.episodes else "dim"
+    for sentence in verdict.sentences:
+        Console().print(f"faults: {sentence}", style=style, highlight=False, soft_wrap=True)

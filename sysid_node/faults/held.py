@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sysid_node.faults.colour import Colour
 from sysid_node.faults.terms import Terms
+from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,11 @@ class Known(NamedTuple):
     value: float
     standard_error: float
     valid: bool
+
+
+def known_of(estimates: Estimates) -> dict[str, Known]:
+    """What the identifier says, as the monitor hears it."""
+    return {d.name: Known(d.value, d.standard_error, d.valid) for d in estimates.derivatives.values()}
 
 
 @dataclass

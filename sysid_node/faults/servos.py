@@ -19,7 +19,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.hypotheses import LIMIT
 from sysid_node.faults.report import AT_LIMIT
 from sysid_node.faults.settings import Settings
-from sysid_node.faults.types import HARD_OVER, NOT_FOLLOWING, STUCK, Fault
+from sysid_node.faults.types import HARD_OVER, NOT_FOLLOWING, POSITION, STUCK, Fault
 
 Array = NDArray[np.float64]
 
@@ -109,4 +109,5 @@ def _fault(state: Servos, i: int, now: float, before: Fault | None) -> Fault:
         kind = HARD_OVER if abs(places[-1]) >= AT_LIMIT * state.limits[i] else STUCK
     since = before.since if before else float(state.off_since[i])
     found = before.found if before else now
-    return Fault(kind, state.names[i], float(places[-1]), math.nan, math.nan, "rad", since, found, 1.0)
+    size = float(places[-1])
+    return Fault(kind, state.names[i], size, math.nan, math.nan, "rad", since, found, 1.0, source=POSITION)

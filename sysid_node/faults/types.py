@@ -11,6 +11,8 @@ LOSS, STUCK, HARD_OVER, SHIFTED = "loss of effectiveness", "stuck surface", "har
 NOT_FOLLOWING = "surface does not follow"
 AIRSPEED, VANE_OFFSET, VANE_STUCK, SILENT = "airspeed wrong", "vane offset", "vane stuck", "sensor silent"
 DAMAGE = "structural damage"
+#: What a fault was found by.
+FORCES, POSITION, ARRIVAL = "forces", "position", "arrival"
 
 
 class Change(NamedTuple):
@@ -36,21 +38,31 @@ class Fault:
     found: float  # s, when it was found
     probability: float  # among all hypotheses
     changes: tuple[Change, ...] = ()  # of a damage: the derivatives that changed for sure, the surest first
+    source: str = FORCES
 
     @property
     def text(self) -> str:
         """In one line."""
         words = f"{self.part}: {self.kind}"
         if not math.isnan(self.size):
-            words += f", {_amount(self.size, self.unit)}"
+            words += f", {amount(self.size, self.unit)}"
         if not math.isnan(self.lower):
-            words += f" ({_amount(self.lower, self.unit)} to {_amount(self.upper, self.unit)})"
+            words += f" ({amount(self.lower, self.unit)} to {amount(self.upper, self.unit)})"
         if self.changes:
             words += ", " + ", ".join(f"{c.name} {c.value:+.3g}" for c in self.changes[:3])
         return words
 
+    def values(self, now: float) -> dict[str, str]:
+        """All of it for a diagnostic_msgs/DiagnosticStatus, at a time (s, as ``since``)."""
+        found: dict[str, object] = {"kind": self.kind, "part": self.part, "size": self.size}
+        found |= {"lower": self.lower, "upper": self.upper, "unit": self.unit, "probability": self.probability}
+        found |= {"since (s)": self.since, "found (s)": self.found, "now (s)": now}
+        found |= {c.name: f"{c.value:.6g} [{c.lower:.6g}, {c.upper:.6g}]" for c in self.changes}
+        return {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in found.items()}
 
-def _amount(value: float, unit: str) -> str:
+
+def amount(value: float, unit: str) -> str:
+    """A size in words: rad as degrees, a share as per cent."""
     if unit == "rad":
         return f"{math.degrees(value):+.1f} deg"
     return f"{100.0 * value:.0f} %" if unit == "1" else f"{value:.3g} {unit}".strip()

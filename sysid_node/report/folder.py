@@ -14,6 +14,7 @@ from sysid_node.errors import InputError
 from sysid_node.online.types import Estimates
 from sysid_node.report import tables
 from sysid_node.report.data import Response, RunResult
+from sysid_node.report.faults import as_summary, from_summary
 from sysid_node.report.page import write_report
 from sysid_node.report.thin import MAX_ROWS, thin_curve, thin_flight
 
@@ -63,6 +64,7 @@ def read_run(folder: Path) -> RunResult:
         responses=tables.read_responses(folder / "responses.csv"),
         rejected=found.get("rejected", {}),
         holdout=_from_json(found.get("holdout", {})),
+        faults=from_summary(found.get("faults")),
         remarks=found.get("remarks", []),
         response_note=found.get("response_note", ""),
     )
@@ -82,6 +84,7 @@ def summary(run: RunResult) -> dict[str, Any]:
         "derivatives": {name: _without(d._asdict(), "name") for name, d in final.derivatives.items()},
         "fits": {name: _without(f._asdict(), "coefficient") for name, f in final.fits.items()},
         "holdout": run.holdout,
+        "faults": as_summary(run.faults),
         "remarks": list(run.remarks),
         "response_note": run.response_note,
     }

@@ -15,6 +15,7 @@ from sysid_node.report.sections import (
     Section,
     derivatives,
     excitation,
+    faults,
     fit,
     history,
     opening,
@@ -33,6 +34,7 @@ SECTIONS: tuple[Section[RunResult], ...] = (
     fit.SECTION,
     excitation.SECTION,
     residuals.SECTION,
+    faults.SECTION,
     rejected.SECTION,
     settings.SECTION,
 )

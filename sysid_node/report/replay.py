@@ -13,6 +13,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.faults.record import Verdict
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import OFFSET, array_signals, layout, momentum_matrix
@@ -54,6 +55,7 @@ def replay_result(
     rejected: Mapping[str, int],
     truth: Mapping[str, float] | None = None,
     title: str = "",
+    faults: Verdict | None = None,
     remarks: Sequence[str] = (),
 ) -> RunResult:
     """All that a report needs, from the aligned ``time`` (N,) s, ``samples`` (N, M) and the estimates over time.
@@ -78,7 +80,8 @@ def replay_result(
         responses=_responses(settings, motion) if motion else {},
         response_note=RESPONSE_NOTE,
         rejected=rejected,
-        remarks=[*remarks, *_change_remark(noticed)],
+        faults=faults,
+        remarks=[*remarks, *_change_remark(noticed), *_fault_remarks(faults)],
     )
 
 
@@ -87,6 +90,11 @@ def _change_remark(noticed: Sequence[float]) -> list[str]:
         return []
     when = " and ".join(f"{at:.1f} s" for at in noticed)
     return [f"An abrupt change was noticed at {when}: estimates and spectra rest on what was flown since."]
+
+
+def _fault_remarks(faults: Verdict | None) -> list[str]:
+    """One remark for each fault."""
+    return [f"Something seems to have failed: {one.text}." for one in faults.episodes] if faults else []
 
 
 def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | None:

@@ -150,6 +150,28 @@ def test_frame_and_topics_are_options(arguments, tmp_path, flight, bag):
     assert frd["derivatives"] == json.loads((tmp_path / "out" / "summary.json").read_text())["derivatives"]
 
 
+def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp_path, capsys):
+    """The elevator of this flight loses half its effect at 30 s; the report drawn anew from the files says the same."""
+    out = tmp_path / "out"
+    bag = Path(__file__).resolve().parents[2] / "bags" / "cdrw_failed_elevator"
+    assert main(["replay", str(bag), "--aircraft", "cdrw", "--out", str(out)]) == 0
+    assert "faults: elevator: loss of effectiveness, " in capsys.readouterr().out
+    found = json.loads((out / "summary.json").read_text())["faults"]
+    (fault,) = found["found"]
+    assert (fault["kind"], fault["part"], fault["until"]) == ("loss of effectiveness", "elevator", None)
+    assert fault["lower"] <= 0.5 <= fault["upper"]
+    assert 30.0 < fault["found"] < 36.0
+    page = (out / "report.html").read_text()
+    assert "<td>elevator: loss of effectiveness</td>" in page
+    assert main(["report", str(out), "--quiet"]) == 0
+    assert (out / "report.html").read_text() == page
+
+
+def test_a_flight_too_short_for_faults_says_so(arguments, capsys):
+    assert main(arguments) == 0
+    assert "faults: no faults were looked for: the flight is too short" in capsys.readouterr().out
+
+
 def line_of(capsys, arguments) -> str:
     assert main(arguments) == 2
     captured = capsys.readouterr()

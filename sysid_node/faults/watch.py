@@ -1,0 +1,148 @@
+"""The whole fault monitor: messages as they come to what is wrong at present; from forces, servos and silences.
+
+    watch = init(aircraft, Settings(), stale_after=0.5)
+    on_imu(watch, arrived, stamp_ns, values)            # and so on, for every message in the order of arrival
+    faults = wrong(watch, now)
+
+The live node and the replay of a recording call these functions; ``arrived`` and ``now`` are s of one clock that only
+runs on, the node's own or the recorder's. A fault's times are those of the samples: s since the first IMU message.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.faults import blocks, monitor, servos
+from sysid_node.faults.held import Known
+from sysid_node.faults.servos import Servos
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.state import State
+from sysid_node.faults.types import ARRIVAL, SILENT, Fault
+from sysid_node.flight.actuation import Actuation
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.online import intake
+from sysid_node.online.intake import IntakeState, Sample
+
+PERIOD = 0.1  # s between looks at what is to be said
+REPEATED = 1.0  # s after which the same is said again
+STALE_AFTER = 0.5  # s without a message, by default
+_SECOND = 1e9  # ns
+
+
+@dataclass
+class Watch:
+    """What is remembered of the messages."""
+
+    state: State
+    servos: Servos
+    intake: IntakeState
+    stale_after: float  # s
+    now: float = 0.0  # s, of the last sample
+    stamp_ns: int = 0  # header stamp of the last sample
+    heard: dict[str, tuple[float, float]] = field(default_factory=dict)  # by topic: arrival (s), ``now`` then
+    moved: float = math.nan  # s, of the last positions
+    off_command: list[Fault] = field(default_factory=list)  # surfaces
+
+    @property
+    def judged(self) -> float:
+        """Seconds of flight that were judged."""
+        return max(0.0, self.state.count * blocks.PERIOD - self.state.settings.learning)
+
+
+def init(aircraft: Aircraft, settings: Settings, stale_after: float) -> Watch:
+    """Nothing heard; a topic that was heard and then is silent for ``stale_after`` s is a fault."""
+    taken = intake.init(aircraft, blocks.MOST_GAP)
+    return Watch(monitor.init(aircraft, settings), servos.init(aircraft, settings), taken, stale_after)
+
+
+def on_imu(watch: Watch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
+    """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD."""
+    watch.heard[IMU] = (arrived, watch.now)
+    _take(watch, intake.on_imu(watch.intake, stamp_ns, values))
+
+
+def on_air_data(watch: Watch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
+    """Take an air data message: true airspeed (m/s), flow angles (rad), air density (kg/m^3)."""
+    watch.heard[AIR_DATA] = (arrived, watch.now)
+    _take(watch, intake.on_air_data(watch.intake, stamp_ns, values))
+
+
+def on_actuators(watch: Watch, arrived: float, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
+    """Take joint positions: rad, throttle 0..1 or N."""
+    watch.heard[ACTUATORS] = (arrived, watch.now)
+    controls = _controls(watch.intake.actuation, names, positions)
+    if controls and watch.intake.bases:
+        watch.moved = _time_of(watch.intake, stamp_ns)
+        watch.off_command = servos.position(watch.servos, watch.moved, controls)
+    _take(watch, intake.on_actuators(watch.intake, stamp_ns, names, positions))
+
+
+def on_command(watch: Watch, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
+    """Take what the joints are told; without a stamp it counts from the last positions on."""
+    controls = _controls(watch.intake.actuation, names, positions)
+    moment = _time_of(watch.intake, stamp_ns) if stamp_ns and watch.intake.bases else watch.moved
+    if controls and math.isfinite(moment):
+        servos.command(watch.servos, moment, controls)
+
+
+def on_estimates(watch: Watch, known: Mapping[str, Known]) -> None:
+    """Take the identifier's estimates of the last sample."""
+    monitor.hear(watch.state, watch.now, known)
+
+
+def wrong(watch: Watch, now: float) -> list[Fault]:
+    """All faults at a time ``now`` (s, of the arrivals' clock). While a topic is silent forces speak of nothing."""
+    silent = [
+        Fault(
+            SILENT,
+            topic,
+            now - arrived,
+            *(math.nan, math.nan, "s"),
+            since=since,
+            found=since + watch.stale_after,
+            probability=1.0,
+            source=ARRIVAL,
+        )
+        for topic in (IMU, AIR_DATA, ACTUATORS)
+        for arrived, since in [watch.heard.get(topic, (math.inf, 0.0))]
+        if now - arrived > watch.stale_after
+    ]
+    forces = [watch.state.fault] if watch.state.fault and not silent else []
+    return [*silent, *watch.off_command, *forces]
+
+
+@dataclass
+class Speech:
+    """Says what is wrong when it is news, and once a second."""
+
+    news: str = ""
+    at: float = -math.inf  # s, when it was last said
+
+    def due(self, faults: Sequence[Fault], now: float) -> bool:
+        """Whether these are to be said at a time (s)."""
+        news = " ".join(f"{fault.part} {fault.kind}" for fault in faults)
+        if news == self.news and now - self.at < REPEATED - 0.5 * PERIOD:
+            return False
+        self.news, self.at = news, now
+        return True
+
+
+def _take(watch: Watch, samples: Sequence[tuple[float, Sample]]) -> None:
+    for moment, sample in samples:
+        watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
+        monitor.update(watch.state, moment, sample)
+
+
+def _time_of(taken: IntakeState, stamp_ns: int) -> float:
+    """s since the first IMU message, as the samples count them."""
+    base = taken.bases[-1]
+    return (stamp_ns - base.stamp + base.since) / _SECOND
+
+
+def _controls(actuation: Actuation, names: Sequence[str], positions: Sequence[float]) -> tuple[float, ...]:
+    """Controls (rad) of joint positions; empty where they are no such."""
+    found = actuation.of_message(actuation.places(names), positions)
+    return () if isinstance(found, str) else found[1:]

@@ -1,0 +1,38 @@
+"""What the joints of a recorded flight were told: one message after the other, in log order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from rosbags.rosbag2 import Reader
+
+from sysid_node.flight.cdr import decode
+from sysid_node.flight.messages import type_store
+from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS
+
+#: Where commands are recorded (``docs/bags.md``), and their type: that of the positions.
+COMMANDS, COMMANDS_TYPE = "/actuators/command", INPUT_TOPICS[ACTUATORS]
+
+
+class JointMessage(NamedTuple):
+    """Joints by name: rad; throttle 0..1 or N."""
+
+    log_ns: int
+    stamp_ns: int
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+
+
+def read_commands(path: str | Path) -> list[JointMessage]:
+    """The commands in a bag that ``read_streams`` can read; none where it holds none of this type."""
+    with Reader(Path(path)) as reader:
+        chosen = [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]
+        found = [(log_ns, data) for _, log_ns, data in reader.messages(chosen)] if chosen else []
+    messages = []
+    for places, fields in decode(type_store(), COMMANDS_TYPE, [data for _, data in found]):
+        seconds, fraction = (fields.numbers(f"header.stamp.{part}").tolist() for part in ("sec", "nanosec"))
+        names = fields.strings("name")
+        rows = zip(places.tolist(), seconds, fraction, fields.numbers("position").tolist(), strict=True)
+        messages += [JointMessage(found[i][0], s * 10**9 + ns, names, tuple(values)) for i, s, ns, values in rows]
+    return sorted(messages, key=lambda message: message.log_ns)

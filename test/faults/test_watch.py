@@ -1,0 +1,85 @@
+"""Messages to faults: what is silent, what does not follow its command; the clock is the test's own."""
+
+import math
+
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.faults import watch as watching
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.types import ARRIVAL, POSITION, SILENT, STUCK, Fault
+from sysid_node.faults.watch import Speech, Watch
+
+AIRCRAFT = load_aircraft("cdrw")
+JOINTS = ("throttle", "elevator", "aileron", "rudder")
+START_NS = 1_700_000_000_000_000_000
+STEP = 0.01  # s
+
+
+def elevator(time: float) -> float:
+    return 0.1 * math.sin(3.0 * time)
+
+
+def flown(
+    watch: Watch, begin: float, end: float, *, silent: str = "", stuck: bool = False, stamped: bool = True
+) -> None:
+    """Level flight from ``begin`` to ``end`` (s) while the elevator moves, its positions behind a servo's lag."""
+    for k in range(round(begin / STEP), round(end / STEP)):
+        now = k * STEP
+        stamp = START_NS + round(1e9 * now)
+        told = (0.3, elevator(now), 0.0, 0.0)
+        place = 0.06 if stuck else elevator(now - 0.05)
+        watching.on_command(watch, stamp if stamped else 0, JOINTS, told)
+        if silent != "imu/data":
+            watching.on_imu(watch, now, stamp, (0.1, 0.0, -9.8, 0.0, 0.0, 0.0))
+        if silent != "air_data":
+            watching.on_air_data(watch, now, stamp, (18.0, 0.07, 0.0, 1.2))
+        if silent != "actuators":
+            watching.on_actuators(watch, now, stamp, JOINTS, (0.3, place, 0.0, 0.0))
+
+
+@pytest.fixture
+def watch() -> Watch:
+    return watching.init(AIRCRAFT, Settings(), watching.STALE_AFTER)
+
+
+def only(faults: list[Fault]) -> Fault:
+    (fault,) = faults
+    return fault
+
+
+@pytest.mark.parametrize("topic", ["imu/data", "air_data", "actuators"])
+def test_a_silent_topic_is_said_until_it_speaks_again(watch: Watch, topic: str) -> None:
+    flown(watch, 0.0, 2.0)
+    assert watching.wrong(watch, 2.0) == []
+    flown(watch, 2.0, 3.0, silent=topic)
+    fault = only(watching.wrong(watch, 3.0))
+    assert (fault.kind, fault.part, fault.source) == (SILENT, topic, ARRIVAL)
+    assert fault.size == pytest.approx(1.01, abs=1e-9)  # its last message came at 1.99 s
+    assert fault.since == pytest.approx(1.99, abs=2 * STEP)
+    assert fault.found == pytest.approx(fault.since + 0.5)
+    flown(watch, 3.0, 3.1)
+    assert watching.wrong(watch, 3.1) == []
+
+
+def test_what_never_spoke_is_not_silent(watch: Watch) -> None:
+    flown(watch, 0.0, 2.0, silent="air_data")
+    assert watching.wrong(watch, 2.0) == []
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_a_jammed_servo_by_the_samples_clock(watch: Watch, stamped: bool) -> None:
+    """Its times count from the first IMU message, as those of all faults do."""
+    flown(watch, 0.0, 2.0, stamped=stamped)
+    assert watching.wrong(watch, 2.0) == []
+    flown(watch, 2.0, 4.0, stuck=True, stamped=stamped)
+    fault = only(watching.wrong(watch, 4.0))
+    assert (fault.kind, fault.part, fault.source) == (STUCK, "elevator", POSITION)
+    assert 2.0 <= fault.since <= fault.found <= 4.0
+
+
+def test_it_says_what_is_news_and_repeats_it_once_a_second() -> None:
+    jam = Fault(STUCK, "elevator", 0.1, math.nan, math.nan, "rad", 1.0, 1.5, 1.0)
+    speech = Speech()
+    said = [k for k in range(40) if speech.due([jam] if k >= 15 else [], 0.1 * k)]
+    assert said == [0, 10, 15, 25, 35]
