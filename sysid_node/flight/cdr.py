@@ -121,8 +121,11 @@ def encode(layout: Layout, columns: Mapping[str, NDArray[Any]], count: int) -> l
     return [whole[i : i + length] for i in range(0, count * length, length)]
 
 
-def layout_of(store: Typestore, msgtype: str, raw: bytes) -> Layout:
-    """The layout of one message. Raises rosbags' SerdeError where it is no whole message of the type."""
+def layout_of(store: Typestore, msgtype: str, raw: bytes, spare: bool = False) -> Layout:
+    """The layout of one message. Raises rosbags' SerdeError where it is no whole message of the type.
+
+    ``spare``: bytes may follow that mean nothing, as in a buffer that was larger than the message.
+    """
     if len(raw) < 4 or raw[0] != 0 or raw[1] not in {0, 1}:
         raise SerdeError(f"{msgtype}: not a CDR message")
     walk = _Walk(store, raw, "<" if raw[1] else ">")
@@ -131,7 +134,7 @@ def layout_of(store: Typestore, msgtype: str, raw: bytes) -> Layout:
     except (ValueError, IndexError) as error:
         raise SerdeError(f"{msgtype}: the message is cut short or damaged") from error
     # Padding to a multiple of 4 may follow.
-    if not walk.position <= len(raw) < walk.position + 4:
+    if not spare and len(raw) >= walk.position + 4:
         raise SerdeError(f"{msgtype}: {len(raw)} bytes for a message of {walk.position}")
     spec: Any = {"names": walk.names, "formats": walk.formats, "offsets": walk.offsets, "itemsize": len(raw)}
     return Layout(raw, np.dtype(spec), walk.strings, np.array(walk.fixed, np.intp))

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import interval, judgement, signals, transform
-from sysid_node.online.present import Present, count_beliefs, offsets, present_at
+from sysid_node.online import interval, judgement, signals
+from sysid_node.online.present import Present, offsets, present, present_at, with_beliefs
 from sysid_node.online.rows import DerivativeRows, FitRows
 from sysid_node.online.state import Grounds, State
 from sysid_node.online.types import DerivativeEstimate, Estimates
@@ -20,25 +20,32 @@ Array = NDArray[np.float64]
 def estimate(state: State, now: float | None = None) -> Estimates:
     """All derivatives of the aircraft's model with their intervals; ``now`` (s) tells how old the last sample is."""
     last = state.transform.last
-    return estimates_at(state, [transform.current(state.transform)], [last], [last if now is None else now])[0]
+    return estimates_of(state, present(state), [last], [last if now is None else now])[0]
 
 
 def estimates_at(
     state: State, lines: Sequence[Array], times: Sequence[float], nows: Sequence[float]
 ) -> list[Estimates]:
     """The same at several ``times`` (s) since the last renewal, at which the transform was ``lines`` (2F + 1, T)."""
-    current, renewed = present_at(state, lines, times), state.renewed
+    return estimates_of(state, present_at(state, lines, times), times, nows)
+
+
+def estimates_of(
+    state: State, current: Present | None, times: Sequence[float], nows: Sequence[float]
+) -> list[Estimates]:
+    """The same from what was solved for at ``times`` (s)."""
+    renewed = state.renewed
     if current is None or renewed is None:
         every = [f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors]
         return [Estimates(time, {name: _unknown(state, name) for name in every}, {}) for time in times]
     table = state.model.table
     grounds = renewed.grounds = renewed.grounds or judgement.grounds(state, renewed)
+    theta, variance, K = current.solution.theta, current.variance, len(times)
     if state.model.settings.use_prior:
-        count_beliefs(state, renewed, current)
-    K = len(times)
-    constants, constant_variances = offsets(state, renewed, current)
-    values = np.concatenate([current.solution.theta.reshape(K, -1), constants], axis=1).take(table.place, axis=1)
-    variances = np.concatenate([current.variance.reshape(K, -1), constant_variances], axis=1).take(table.place, axis=1)
+        theta, variance = with_beliefs(state, renewed, theta)
+    constants, constant_variances = offsets(state, renewed, current, theta)
+    values = np.concatenate([theta.reshape(K, -1), constants], axis=1).take(table.place, axis=1)
+    variances = np.concatenate([variance.reshape(K, -1), constant_variances], axis=1).take(table.place, axis=1)
     variances = np.maximum(variances, 0.0)
     errors = np.sqrt(variances)
     below, above = interval.reach(grounds.squares * variances, renewed.bend)

@@ -146,7 +146,7 @@ def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple[floa
     """
     fault = imu_fault(values) or state.clock.fault(stamp_ns)
     if fault is not None:
-        _reject(state, IMU, fault)
+        refuse(state, IMU, fault)
         return []
     state.accepted[IMU] += 1
     epoch = state.clock.epoch
@@ -201,7 +201,7 @@ def _on_neighbour(
     """Takes a message of an interpolated topic, or the reason why not."""
     fault = values if isinstance(values, str) else topic.clock.fault(stamp)
     if fault is not None or isinstance(values, str):
-        _reject(state, topic.topic, str(fault))
+        refuse(state, topic.topic, str(fault))
         return []
     state.accepted[topic.topic] += 1
     entries, epoch = topic.entries, topic.clock.epoch
@@ -228,9 +228,9 @@ def _release(state: IntakeState) -> list[tuple[float, Sample]]:
             break
         waiting.popleft()
         if air_data is _Missing.FOR_GOOD:
-            _reject(state, IMU, gap(AIR_DATA))
+            refuse(state, IMU, gap(AIR_DATA))
         elif actuators is _Missing.FOR_GOOD:
-            _reject(state, IMU, gap(ACTUATORS))
+            refuse(state, IMU, gap(ACTUATORS))
         else:
             thrust, controls = actuators.values[:1], actuators.values[1:]
             sample = (*imu.values, *air_data.values, *thrust, air_data.interval / 1e9, *controls)
@@ -242,7 +242,7 @@ def _give_up(state: IntakeState) -> None:
     """Leaves out the IMU message that has waited longest, and takes it that the topics' clocks are set apart."""
     imu = state.waiting.popleft()
     missing = isinstance(_at(state, state.air_data, imu), _Missing)
-    _reject(state, IMU, gap(AIR_DATA if missing else ACTUATORS))
+    refuse(state, IMU, gap(AIR_DATA if missing else ACTUATORS))
     for topic in (state.air_data, state.actuators):
         topic.ahead = topic.clock.epoch - state.clock.epoch
 
@@ -270,6 +270,7 @@ def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Entry | _Miss
     return _Entry(epoch, stamp, right.interval, values)
 
 
-def _reject(state: IntakeState, topic: str, reason: str) -> None:
+def refuse(state: IntakeState, topic: str, reason: str) -> None:
+    """Counts a message that is left out."""
     reasons = state.rejected[topic]
     reasons[reason] = reasons.get(reason, 0) + 1

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import regression
-from sysid_node.online.present import present
+from sysid_node.online.present import Present
 from sysid_node.online.state import State
 
 Array = NDArray[np.float64]
@@ -25,9 +25,9 @@ class CoefficientGap(NamedTuple):
     deviation: float  # ... in standard errors of the difference, tolerance included; NaN = not known
 
 
-def model_gap(state: State) -> list[CoefficientGap]:
-    """Gap of every coefficient whose equation can be formed; empty before there are estimates."""
-    current, renewed = present(state), state.renewed
+def model_gap(state: State, current: Present | None) -> list[CoefficientGap]:
+    """Gap of every coefficient whose equation can be formed, at the moment ``current``; empty before there is one."""
+    renewed = state.renewed
     if current is None or renewed is None or not current.solution.usable[0]:
         return []
     plan, (values, precisions) = state.plan, state.model.believed

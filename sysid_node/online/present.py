@@ -58,23 +58,24 @@ def present_at(state: State, lines: Sequence[Array], times: Sequence[float]) -> 
     return Present(np.array(times), solution, variance, gram, part[:, -1], diagonal)
 
 
-def count_beliefs(state: State, renewed: Renewed, current: Present) -> None:
-    """Weigh the solutions with the aircraft file's derivatives."""
-    plan, believed = state.plan, state.model.believed
-    for k, theta in enumerate(current.solution.theta):
-        weighted, covariance = weighed(plan, theta, renewed.uncertainty.covariance, *believed)
-        current.solution.theta[k] = weighted
-        current.variance[k] = covariance.diagonal(axis1=1, axis2=2).T
+def with_beliefs(state: State, renewed: Renewed, theta: Array) -> tuple[Array, Array]:
+    """(K, P, C) the solutions ``theta`` weighed with the aircraft file's derivatives, and their variances."""
+    several = [weighed(state.plan, one, renewed.uncertainty.covariance, *state.model.believed) for one in theta]
+    variances = [covariance.diagonal(axis1=1, axis2=2).T for _, covariance in several]
+    return np.array([values for values, _ in several]), np.array(variances)
 
 
-def offsets(state: State, renewed: Renewed, current: Present) -> tuple[Array, Array]:
-    """(K, C) offsets and their variances, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency."""
+def offsets(state: State, renewed: Renewed, current: Present, theta: Array) -> tuple[Array, Array]:
+    """(K, C) offsets and their variances, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency.
+
+    The slopes ``theta`` are (K, P, C).
+    """
     plan = state.plan
     past = renewed.total.integrals - (state.present.integrals if state.present is not None else 0.0)
     integrals = past + current.integrals
     weight = np.where(integrals[:, OFFSET] > 0.0, integrals[:, OFFSET], np.nan)[:, None]
     x = integrals[:, plan.columns] / weight
-    values = integrals[:, plan.outputs] / weight - (x[:, None] @ current.solution.theta)[:, 0]
+    values = integrals[:, plan.outputs] / weight - (x[:, None] @ theta)[:, 0]
     covariance = renewed.uncertainty.covariance
     P = plan.columns.size
     spread = (covariance.reshape(-1, P) @ x[:, :, None]).reshape(len(x), -1, P) @ x[:, :, None]

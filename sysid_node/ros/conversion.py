@@ -7,7 +7,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
-from sysid_msgs.msg import DerivativeEstimate, DerivativeEstimates, FitQuality, ModelGap
+from sysid_msgs.msg import ModelGap
 
 from sysid_node.online import types
 from sysid_node.online.model_gap import CoefficientGap
@@ -46,34 +46,6 @@ def air_data_values(message: Any) -> tuple[float, float, float, float]:
 def axes_sign(body_frame: str) -> float:
     """What y and z are multiplied by on the way from ``body_frame`` to FRD."""
     return 1.0 if body_frame == "frd" else -1.0
-
-
-def estimates_message(estimates: Estimates, header: Header, aircraft: str, method: str) -> DerivativeEstimates:
-    """The estimates as a message."""
-    message = DerivativeEstimates(header=header, aircraft=aircraft, method=method)
-    message.derivatives = [
-        DerivativeEstimate(
-            name=d.name,
-            value=d.value,
-            standard_error=d.standard_error,
-            lower=d.lower,
-            upper=d.upper,
-            valid=d.valid,
-            status=d.status,
-        )
-        for d in estimates.derivatives.values()
-    ]
-    message.fits = [
-        FitQuality(
-            coefficient=f.coefficient,
-            r_squared=f.r_squared,
-            residual_std=f.residual_std,
-            degrees_of_freedom=f.degrees_of_freedom,
-            samples=f.samples,
-        )
-        for f in estimates.fits.values()
-    ]
-    return message
 
 
 def gap_message(gaps: Sequence[CoefficientGap], header: Header, aircraft: str) -> ModelGap:

@@ -15,17 +15,20 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rosbags.serde import SerdeError
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.ros import conversion
-from sysid_node.ros.conversion import stamp_ns
+from sysid_node.flight.cdr_single import SingleReader
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
+from sysid_node.ros import conversion, inputs
 from sysid_node.ros.declaring import declare, refusal, values_of
 from sysid_node.ros.diagnostics import Source
+from sysid_node.ros.estimates_cdr import EstimatesSerialiser
+from sysid_node.ros.inputs import UNREADABLE, Numbers, Texts
 from sysid_node.ros.lifecycle import CarefulNode
 from sysid_node.ros.loop_node import SENSOR_QOS
 from sysid_node.ros.monitor import Durations, TopicMonitor
@@ -79,6 +82,7 @@ class Identifier(CarefulNode):
         self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
         self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
+        self._serialiser = EstimatesSerialiser(aircraft.name, self._session.settings.method)
         self._inputs = [
             self._listen(Imu, IMU, self._on_imu),
             self._listen(AirData, AIR_DATA, self._on_air_data),
@@ -98,42 +102,50 @@ class Identifier(CarefulNode):
 
     # Messages
 
-    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Any], list[Due]]) -> Any:
-        """Subscribe to an input; what falls due after a message is published."""
-        monitor = self._monitors[topic]
+    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Numbers, Texts], list[Due]]) -> Any:
+        """Subscribe to an input; what falls due after a message is published.
 
-        def on_message(message: Any) -> None:
+        Messages come serialised: making objects of all their parts would take longer than the estimator does.
+        """
+        monitor, reader = self._monitors[topic], SingleReader(INPUT_TOPICS[topic], *inputs.FIELDS[topic])
+
+        def on_message(raw: bytes) -> None:
             monitor.arrived()
-            if self._session is not None:
-                for due in take(self._session, message):
-                    self._publish(self._session, due)
+            if self._session is None:
+                return
+            try:
+                numbers, texts = reader.read(raw)
+            except SerdeError:
+                self._session.refuse(topic, UNREADABLE)
+                return
+            for due in take(self._session, numbers, texts):
+                self._publish(self._session, due)
 
         overrides = QoSOverridingOptions.with_default_policies()
         return self.create_subscription(
-            kind, topic, self.guarded(on_message), SENSOR_QOS, qos_overriding_options=overrides
+            kind, topic, self.guarded(on_message), SENSOR_QOS, qos_overriding_options=overrides, raw=True
         )
 
-    def _on_imu(self, session: Session, message: Any) -> list[Due]:
-        self._frame_id = message.header.frame_id
-        return session.imu(stamp_ns(message.header.stamp), conversion.imu_values(message, self._sign))
+    def _on_imu(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
+        self._frame_id = str(texts[0])
+        return session.imu(*inputs.imu(numbers, self._sign))
 
-    def _on_air_data(self, session: Session, message: Any) -> list[Due]:
-        return session.air_data(stamp_ns(message.header.stamp), conversion.air_data_values(message))
+    def _on_air_data(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
+        return session.air_data(*inputs.air_data(numbers))
 
-    def _on_actuators(self, session: Session, message: Any) -> list[Due]:
-        return session.actuators(stamp_ns(message.header.stamp), message.name, message.position)
+    def _on_actuators(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
+        return session.actuators(*inputs.actuators(numbers, texts))
 
     def _publish(self, session: Session, due: Due) -> None:
         start = time.perf_counter()
-        header = conversion.header(due.stamp_ns, self._frame_id)
-        aircraft, method = session.aircraft.name, session.settings.method
-        self._derivatives.publish(conversion.estimates_message(due.estimates, header, aircraft, method))
+        self._derivatives.publish(self._serialiser.one(due.estimates, due.stamp_ns, self._frame_id))
         self._lag = (self.get_clock().now().nanoseconds - due.stamp_ns) / conversion.NANOSECONDS
-        self._model_gap.publish(conversion.gap_message(session.gap, header, aircraft))
+        header = conversion.header(due.stamp_ns, self._frame_id)
+        self._model_gap.publish(conversion.gap_message(session.gap(due), header, session.aircraft.name))
         self._publish_times.add(time.perf_counter() - start)
         # right after an estimate, when no other one can be waiting for it
         if time.monotonic() - self._told >= DIAGNOSTICS:
-            self._tell()
+            self._tell(due)
 
     # Requests
 
@@ -161,22 +173,23 @@ class Identifier(CarefulNode):
         if time.monotonic() - self._told >= DIAGNOSTICS + TICK:
             self._tell()
 
-    def _tell(self) -> None:
+    def _tell(self, due: Due | None = None) -> None:
+        """Say how it goes; ``due``: the estimates of this moment, where they were just made."""
         self._told = time.monotonic()
         source = Source(self.get_name(), self._session.aircraft.name if self._session else "")
         message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
         message.header.stamp = self.get_clock().now().to_msg()
-        self.guarded(self._tell_of_flight)(message)
+        self.guarded(self._tell_of_flight)(message, due)
         self._diagnostics.publish(message)
 
-    def _tell_of_flight(self, message: DiagnosticArray) -> None:
+    def _tell_of_flight(self, message: DiagnosticArray, due: Due | None) -> None:
         session = self._session
         if session is None:
             return
         source, stale_after = Source(self.get_name(), session.aircraft.name), self.get_parameter("stale_after").value
         message.status.append(source.input(list(self._monitors.values()), session.rejected, stale_after))
         if session.samples:
-            due = session.now(session.silence)
+            due = due or session.now(session.silence)
             if session.silence > stale_after:
                 self._publish(session, due)  # nothing falls due without data; say that what is known grows old
             message.status.append(source.estimate(due.estimates, session.samples))

@@ -38,14 +38,14 @@ class CarefulNode(LifecycleNode):
         """The lifecycle state: unconfigured, inactive, active or finalized; or a transition's name meanwhile."""
         return str(self._state_machine.current_state[1])
 
-    def guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+    def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """The callback, heard while the node is active; its first exception stops all guarded ones."""
 
-        def call(message: Any) -> None:
+        def call(*arguments: Any) -> None:
             if not self.active:
                 return
             try:
-                callback(message)
+                callback(*arguments)
             except Exception as error:
                 self._record(callback.__name__, error)
 

@@ -17,7 +17,7 @@ def save_estimates(folder: Path, session: Session) -> Path:
 
     Returns the file. Raises InputError where the folder cannot be written.
     """
-    stamp_ns, estimates = session.now()
+    stamp_ns, estimates, _ = session.now()
     content = {
         "aircraft": session.aircraft.name,
         "method": session.settings.method,

@@ -9,18 +9,20 @@ from typing import NamedTuple
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flat
 from sysid_node.online import estimator, intake, schedule
-from sysid_node.online.estimates import estimate
+from sysid_node.online.estimates import estimates_of
 from sysid_node.online.model_gap import CoefficientGap, model_gap
+from sysid_node.online.present import Present, present
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 from sysid_node.ros.monitor import Durations
 
 
 class Due(NamedTuple):
-    """Estimates to publish, and the header stamp of the last sample in them."""
+    """Estimates to publish, what they were made of, and the header stamp of the last sample in them."""
 
     stamp_ns: int
     estimates: Estimates
+    current: Present | None
 
 
 class Session:
@@ -55,12 +57,17 @@ class Session:
         """What is known ``silence`` s after the last sample. There must be one."""
         last = self.schedule.previous
         assert last is not None
-        return Due(intake.stamp_of(self.intake, last), estimate(self.state, last + silence))
+        current = present(self.state)
+        estimates = estimates_of(self.state, current, [self.state.transform.last], [last + silence])[0]
+        return Due(intake.stamp_of(self.intake, last), estimates, current)
 
-    @property
-    def gap(self) -> Sequence[CoefficientGap]:
-        """How far the flight is from the aircraft file."""
-        return model_gap(self.state)
+    def gap(self, due: Due) -> Sequence[CoefficientGap]:
+        """How far the flight is from the aircraft file where estimates fell due, before anything else comes."""
+        return model_gap(self.state, due.current)
+
+    def refuse(self, topic: str, reason: str) -> None:
+        """Count a message that cannot be read."""
+        intake.refuse(self.intake, topic, reason)
 
     def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due."""

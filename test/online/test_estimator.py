@@ -17,6 +17,7 @@ from sysid_node.errors import InputError
 from sysid_node.online import estimator, intake
 from sysid_node.online.estimates import estimate
 from sysid_node.online.model_gap import model_gap
+from sysid_node.online.present import present
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.state import State
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -38,7 +39,7 @@ def assert_sound(state: State) -> None:
             assert all(map(math.isfinite, d[1:5])), d
             assert d.lower < d.value < d.upper
             assert d.standard_error > 0.0
-    model_gap(state)
+    model_gap(state, present(state))
 
 
 def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: str = "iv_rft") -> State:

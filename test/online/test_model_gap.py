@@ -13,6 +13,7 @@ from sysid_node.online import estimator
 from sysid_node.online.alignment import align_streams
 from sysid_node.online.estimates import estimate
 from sysid_node.online.model_gap import CoefficientGap, model_gap
+from sysid_node.online.present import present
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 
@@ -25,10 +26,10 @@ def flown(aircraft: Aircraft) -> tuple[Estimates, dict[str, CoefficientGap]]:
     """Estimates and gap after 25 s of the bundled flight."""
     aligned = align_streams(aircraft, read_streams(BAG), SETTINGS.max_gap)
     state = estimator.init(aircraft, SETTINGS)
-    assert not model_gap(state)
+    assert not model_gap(state, present(state))
     for time, sample in zip(aligned.time[:5000].tolist(), aligned.samples.tolist(), strict=False):
         estimator.update(state, time, sample)
-    return estimate(state), {gap.coefficient: gap for gap in model_gap(state)}
+    return estimate(state), {gap.coefficient: gap for gap in model_gap(state, present(state))}
 
 
 def with_values(aircraft: Aircraft, values: dict[str, float]) -> Aircraft:

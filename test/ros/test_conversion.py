@@ -5,11 +5,13 @@ import math
 import pytest
 from geometry_msgs.msg import Vector3
 from harness import START_NS
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
 from sysid_msgs.msg import DerivativeEstimates
 
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.ros import conversion
+from sysid_node.ros.estimates_cdr import EstimatesSerialiser
 
 
 def test_level_flight_in_either_frame() -> None:
@@ -35,8 +37,7 @@ def test_estimates_survive_to_the_last_bit() -> None:
         },
         {"Cm": FitQuality("Cm", 0.9, 1e-3, 7.5, 12)},
     )
-    header = conversion.header(START_NS + 100_000_000, "base_link")
-    message = conversion.estimates_message(estimates, header, "cdrw", "sls_rft")
-    assert isinstance(message, DerivativeEstimates)
+    raw = EstimatesSerialiser("cdrw", "sls_rft").one(estimates, START_NS + 100_000_000, "base_link")
+    message = deserialize_message(raw, DerivativeEstimates)
     assert (message.header.frame_id, message.aircraft, message.method) == ("base_link", "cdrw", "sls_rft")
     assert conversion.estimates_from_message(message, START_NS) == estimates

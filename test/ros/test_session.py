@@ -39,7 +39,7 @@ def session() -> Session:
 
 def test_estimates_fall_due_in_the_time_of_the_data(session: Session) -> None:
     due = fly(session, made_up_streams(3.0), "iaj")
-    assert [stamp - START_NS for stamp, _ in due] == [k * 100_000_000 for k in range(1, 30)]
+    assert [one.stamp_ns - START_NS for one in due] == [k * 100_000_000 for k in range(1, 30)]
     assert session.samples == 599
 
 
@@ -57,8 +57,10 @@ def test_flow_angles_that_fail_in_flight_make_estimates_stale_live_and_at_the_de
     live = fly(Session(aircraft, Settings(), 10.0), flight, "iaj")
     aligned = align_streams(aircraft, flight, Settings().max_gap)
     desk = run(aircraft, Settings(), aligned.time, aligned.samples, due_times(aligned.time, 10.0))
-    assert repr([estimates for _, estimates in live]) == repr(desk)
-    stale = [i for i, (_, e) in enumerate(live) if {d.status for d in e.derivatives.values()} == {"stale input"}]
+    assert repr([one.estimates for one in live]) == repr(desk)
+    stale = [
+        i for i, one in enumerate(live) if {d.status for d in one.estimates.derivatives.values()} == {"stale input"}
+    ]
     assert stale == [54, 55, 56, 57, 58]
 
 
