@@ -81,7 +81,7 @@ def replay(
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
     time = aligned.time
-    due = due_times(time, publish_rate)
+    due = due_times(time, aligned.wait, publish_rate)
     last = float(time[-1])
     share = (lambda t: progress(t / last if last else 1.0)) if progress else None
     history = run_online(aircraft, settings, time, aligned.samples, np.union1d(due, time[-1:]), share)
@@ -132,6 +132,7 @@ def write_replay(
         aircraft=done.aircraft.name,
         method=done.settings.method,
         frame_id=done.streams.imu.frame_id,
+        faults=faults.said if faults else (),
     )
 
 

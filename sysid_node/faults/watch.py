@@ -24,7 +24,7 @@ from sysid_node.faults.types import ARRIVAL, SILENT, Fault
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online import intake
-from sysid_node.online.intake import IntakeState, Sample
+from sysid_node.online.intake import Complete, IntakeState
 
 PERIOD = 0.1  # s between looks at what is to be said
 REPEATED = 1.0  # s after which the same is said again
@@ -130,8 +130,8 @@ class Speech:
         return True
 
 
-def _take(watch: Watch, samples: Sequence[tuple[float, Sample]]) -> None:
-    for moment, sample in samples:
+def _take(watch: Watch, samples: Sequence[Complete]) -> None:
+    for moment, sample, _ in samples:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
         monitor.update(watch.state, moment, sample)
 

@@ -73,6 +73,14 @@ class Alignment:
         """(N,) s, from the first IMU message that was believed."""
         return seconds_since(self.imu.stamps[0], self.stamps) if self.used.size else np.empty(0)
 
+    @property
+    def wait(self) -> Array:
+        """(N,) s from each sample to the last of the messages that it lies before."""
+        last = np.maximum(
+            *(other.stamps[right[self.used]] for other, right in zip(self.others, self.right, strict=True))
+        )
+        return seconds_since(0, last - self.stamps)
+
 
 def seconds_since(start_ns: int | np.int64, stamps: Stamps) -> Array:
     """Seconds as float64 of a difference in whole nanoseconds: nothing is lost in 104 days."""

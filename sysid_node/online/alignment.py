@@ -10,7 +10,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import Alignment, Rejected, Screened, align, buffer_ns
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps, Streams
-from sysid_node.online.intake import KEPT_BUFFERS, Sample, init, on_actuators, on_air_data, on_imu, stamp_of
+from sysid_node.online.intake import KEPT_BUFFERS, Complete, init, on_actuators, on_air_data, on_imu, stamp_of
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 
@@ -21,13 +21,14 @@ class Aligned(NamedTuple):
     samples: Array  # (N, M): SAMPLE_COLUMNS, then the controls
     rejected: Rejected
     stamps: Stamps  # (N,) header stamps of the IMU messages, ns
+    wait: Array  # (N,) s from each to the last of the messages that it lies before
 
 
 def align_streams(aircraft: Aircraft, streams: Streams, max_gap: float) -> Aligned:
     """The samples of a recording: all at once where clocks ran on and topics came together, else message by message."""
     bulk = align(aircraft, streams, max_gap)
     if _is_regular(bulk, streams, max_gap):
-        return Aligned(bulk.time, bulk.samples, bulk.rejected, bulk.stamps)
+        return Aligned(bulk.time, bulk.samples, bulk.rejected, bulk.stamps, bulk.wait)
     return _align_one_by_one(aircraft, streams, max_gap)
 
 
@@ -68,7 +69,7 @@ def _align_one_by_one(aircraft: Aircraft, streams: Streams, max_gap: float) -> A
     rows = np.concatenate([np.arange(np.count_nonzero(topics == topic)) for topic in (0, 1, 2)])
     stamps = [stream.arrival.stamp_ns.tolist() for stream in (imu, air_data, actuators)]
     values = [stream.tolist() for stream in (imu.values, air_data.values, actuators.positions)]
-    complete: list[tuple[float, Sample]] = []
+    complete: list[Complete] = []
     sources: list[int] = []
     for place in np.argsort(order, kind="stable"):
         topic, row = int(topics[place]), int(rows[place])
@@ -79,7 +80,8 @@ def _align_one_by_one(aircraft: Aircraft, streams: Streams, max_gap: float) -> A
         else:
             new = on_actuators(state, stamps[2][row], actuators.names, values[2][row])
         complete += new
-        sources += [stamp_of(state, time) for time, _ in new]
+        sources += [stamp_of(state, one.time) for one in new]
     width = len(SAMPLE_COLUMNS) + len(aircraft.controls)
-    samples = np.array([sample for _, sample in complete]).reshape(len(complete), width)
-    return Aligned(np.array([time for time, _ in complete]), samples, state.rejected, np.array(sources, np.int64))
+    time, samples, wait = (np.array([one[i] for one in complete]) for i in range(3))
+    stamps_used = np.array(sources, np.int64)
+    return Aligned(time, samples.reshape(len(complete), width), state.rejected, stamps_used, wait)

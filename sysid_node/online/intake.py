@@ -75,12 +75,28 @@ class _Missing(Enum):
     FOR_GOOD = auto()
 
 
+class Complete(NamedTuple):
+    """A sample that is complete: SAMPLE_COLUMNS, then the aircraft's controls."""
+
+    time: float  # s
+    sample: Sample
+    wait: float  # s from its own stamp to that of the last message that it lies before
+
+
 class _Entry(NamedTuple):
-    """A message that is believed, or what would have been said between two."""
+    """A message that is believed."""
 
     epoch: int
     stamp: int
     interval: int  # ns since the message before, at most max_gap
+    values: Values
+
+
+class _Between(NamedTuple):
+    """What would have been said at an IMU message's stamp."""
+
+    until: int  # stamp of the message on the right
+    interval: int  # ns
     values: Values
 
 
@@ -139,10 +155,10 @@ def init(aircraft: Aircraft, max_gap: float) -> IntakeState:
     return state
 
 
-def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple[float, Sample]]:
-    """Takes ax ay az (m/s^2) p q r (rad/s), FRD; returns the samples that are now complete: (time s, sample).
+def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[Complete]:
+    """Takes ax ay az (m/s^2) p q r (rad/s), FRD; returns the samples that are now complete.
 
-    A sample holds SAMPLE_COLUMNS, then the aircraft's controls. Never raises for any numbers.
+    Never raises for any numbers.
     """
     fault = imu_fault(values) or state.clock.fault(stamp_ns)
     if fault is not None:
@@ -162,7 +178,7 @@ def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple[floa
     return complete
 
 
-def on_air_data(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple[float, Sample]]:
+def on_air_data(state: IntakeState, stamp_ns: int, values: Values) -> list[Complete]:
     """Takes V (m/s), alpha, beta (rad), rho (kg/m^3); NaN = not measured. Returns as ``on_imu`` does.
 
     The angle of attack and the sideslip may be NaN, and are then NaN in the samples; where the density is, the aircraft
@@ -174,9 +190,7 @@ def on_air_data(state: IntakeState, stamp_ns: int, values: Values) -> list[tuple
     return _on_neighbour(state, state.air_data, stamp_ns, fault or known)
 
 
-def on_actuators(
-    state: IntakeState, stamp_ns: int, names: Sequence[str], positions: Sequence[float]
-) -> list[tuple[float, Sample]]:
+def on_actuators(state: IntakeState, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> list[Complete]:
     """Takes joint positions (rad; throttle 0..1 or N) by name. Returns as ``on_imu`` does.
 
     Joints that the aircraft file does not name are ignored; without its throttle joint the thrust is NaN.
@@ -195,9 +209,7 @@ def stamp_of(state: IntakeState, time: float) -> int:
     return base.stamp + since - base.since
 
 
-def _on_neighbour(
-    state: IntakeState, topic: _Neighbours, stamp: int, values: Values | str
-) -> list[tuple[float, Sample]]:
+def _on_neighbour(state: IntakeState, topic: _Neighbours, stamp: int, values: Values | str) -> list[Complete]:
     """Takes a message of an interpolated topic, or the reason why not."""
     fault = values if isinstance(values, str) else topic.clock.fault(stamp)
     if fault is not None or isinstance(values, str):
@@ -214,9 +226,9 @@ def _on_neighbour(
     return _release(state)
 
 
-def _release(state: IntakeState) -> list[tuple[float, Sample]]:
+def _release(state: IntakeState) -> list[Complete]:
     """The samples whose neighbours have come, in order; counts those that have none close enough."""
-    complete: list[tuple[float, Sample]] = []
+    complete: list[Complete] = []
     waiting = state.waiting
     while waiting:
         imu = waiting[0]
@@ -234,7 +246,8 @@ def _release(state: IntakeState) -> list[tuple[float, Sample]]:
         else:
             thrust, controls = actuators.values[:1], actuators.values[1:]
             sample = (*imu.values, *air_data.values, *thrust, air_data.interval / 1e9, *controls)
-            complete.append((imu.since / 1e9, sample))
+            wait = max(air_data.until, actuators.until) - imu.stamp
+            complete.append(Complete(imu.since / 1e9, sample, wait / 1e9))
     return complete
 
 
@@ -247,7 +260,7 @@ def _give_up(state: IntakeState) -> None:
         topic.ahead = topic.clock.epoch - state.clock.epoch
 
 
-def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Entry | _Missing:
+def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Between | _Missing:
     """What a topic says at an IMU message's stamp, or why nothing. Forgets messages that are no longer needed."""
     entries, epoch, stamp = topic.entries, imu.epoch + topic.ahead, imu.stamp
     while entries and entries[0].epoch < epoch:
@@ -256,7 +269,7 @@ def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Entry | _Miss
         entries.popleft()
     left = entries[0] if entries and entries[0].epoch == epoch else None
     if left is not None and left.stamp == stamp:
-        return left
+        return _Between(stamp, left.interval, left.values)
     if left is not None and left.stamp > stamp:
         return _Missing.FOR_GOOD
     right = entries[1] if len(entries) > 1 and entries[1].epoch == epoch else None
@@ -267,7 +280,7 @@ def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Entry | _Miss
         return _Missing.FOR_GOOD
     weight = (stamp - left.stamp) / (right.stamp - left.stamp)
     values = tuple([a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)])
-    return _Entry(epoch, stamp, right.interval, values)
+    return _Between(right.stamp, right.interval, values)
 
 
 def refuse(state: IntakeState, topic: str, reason: str) -> None:

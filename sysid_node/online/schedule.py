@@ -2,17 +2,27 @@
 
 At a rate of publication f the k-th estimate is that of the sample nearest k / f: the first whose time, with half the
 interval since the sample before it, reaches k / f. Nearest, not first at or past it: where IMU and air data are sampled
-together, stamps that jitter a little would otherwise put every estimate one sample late, and with it the wait for the
-next air data.
+together, stamps that jitter a little would otherwise put every estimate one sample late.
+
+A sample is complete when the air data and positions that it lies before have come, which may be several IMU messages
+later; the last of the samples that are complete then is known as soon as the first. So a sample leaves the estimate to
+a fresher one where that comes before the next falls due. Samples are fresh that wait hardly longer than those that
+waited least lately; how long that is depends on how the stamps of the topics lie to each other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from bisect import bisect_left
+from collections import deque
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
+
+SPARE = 0.25  # IMU intervals that a fresh sample may wait longer than those of late
+RUNS = 8  # runs of ever shorter waits, each ended by a message, in which is looked for what is fresh
 
 
 @dataclass
@@ -22,24 +32,51 @@ class Schedule:
     rate: float  # Hz
     next: int = 1  # k of the next estimate
     previous: float | None = None  # s, time of the last sample
+    wait: float = 0.0  # s, of the last sample
+    shortest: deque[float] = field(default_factory=lambda: deque(maxlen=RUNS))  # s, waits that ended runs
+
+    def advance(self, reach: float, wait: float, fresh: bool) -> bool:
+        """Whether an estimate falls due at a sample that reaches so far (s) and has a ``wait`` (s) before it."""
+        if reach < self.next / self.rate:
+            return False
+        if not fresh and reach + wait < (self.next + 1) / self.rate:
+            return False
+        while reach >= self.next / self.rate:
+            self.next += 1
+        return True
 
 
-def due(schedule: Schedule, time: float) -> bool:
-    """Whether an estimate falls due at the sample at ``time`` (s, increasing); at most one a sample does."""
-    reach = time
-    if schedule.previous is not None:
-        reach += 0.5 * min(time - schedule.previous, 1.0 / schedule.rate)
-    schedule.previous = time
-    if reach < schedule.next / schedule.rate:
-        return False
-    while reach >= schedule.next / schedule.rate:
-        schedule.next += 1
-    return True
+def due(schedule: Schedule, time: float, wait: float) -> bool:
+    """Whether an estimate falls due at the sample at ``time`` (s, increasing); at most one a sample does.
+
+    ``wait`` (s): from the sample to the last of the messages that it lies before.
+    """
+    interval = 0.0 if schedule.previous is None else time - schedule.previous
+    if wait >= schedule.wait and schedule.previous is not None:
+        schedule.shortest.append(schedule.wait)
+    schedule.previous, schedule.wait = time, wait
+    fresh = wait <= max(schedule.shortest, default=0.0) + SPARE * interval
+    return schedule.advance(time + 0.5 * min(interval, 1.0 / schedule.rate), wait, fresh)
 
 
-def due_times(time: Array, rate: float) -> Array:
+def due_times(time: Array, wait: Array, rate: float) -> Array:
     """Those of the samples' times (N,) s, increasing, at which ``due`` says so."""
-    intervals = np.minimum(np.diff(time, prepend=time[:1]), 1.0 / rate)
-    reach = np.maximum.accumulate(time + 0.5 * intervals)
-    places = np.unique(np.searchsorted(reach, np.arange(1, int(reach[-1] * rate) + 2) / rate))
-    return time[places[places < time.size]]
+    intervals = np.diff(time, prepend=time[:1])
+    reach = time + 0.5 * np.minimum(intervals, 1.0 / rate)
+    rows = list(zip(reach.tolist(), wait.tolist(), _fresh(wait, intervals).tolist(), strict=True))
+    crest = np.maximum.accumulate(reach).tolist()
+    schedule, places, at = Schedule(rate), [], 0
+    while (at := bisect_left(crest, schedule.next / rate, at)) < len(rows):
+        if schedule.advance(*rows[at]):
+            places.append(at)
+        at += 1
+    return time[places]
+
+
+def _fresh(wait: Array, intervals: Array) -> NDArray[np.bool_]:
+    """(N,) which samples are fresh."""
+    ends = wait[:-1][wait[1:] >= wait[:-1]]
+    longest = np.lib.stride_tricks.sliding_window_view(np.append(np.zeros(RUNS), ends), RUNS).max(axis=1)
+    run = np.cumsum(np.append(0, wait[1:] >= wait[:-1]))
+    fresh: NDArray[np.bool_] = wait <= longest[run[: wait.size]] + SPARE * intervals
+    return fresh

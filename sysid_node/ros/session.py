@@ -81,14 +81,14 @@ class Session:
         """Take joint positions: rad, throttle 0..1 or N."""
         return self._take(intake.on_actuators(self.intake, stamp_ns, names, positions))
 
-    def _take(self, samples: Iterable[tuple[float, Sequence[float]]]) -> list[Due]:
+    def _take(self, samples: Iterable[intake.Complete]) -> list[Due]:
         results = []
-        for moment, sample in samples:
+        for moment, sample, wait in samples:
             start = time.perf_counter()
             estimator.update(self.state, moment, sample)
             self.update_times.add(time.perf_counter() - start)
             self.samples += 1
             self._heard = time.monotonic()
-            if schedule.due(self.schedule, moment):
+            if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())
         return results

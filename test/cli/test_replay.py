@@ -60,9 +60,9 @@ def one_by_one(path, settings, rate):
     ]
     history = []
     for on_message, arrival, i, values in sorted(calls, key=lambda call: call[1].order[call[2]]):
-        for time, sample in on_message(taken, int(arrival.stamp_ns[i]), *values):
+        for time, sample, wait in on_message(taken, int(arrival.stamp_ns[i]), *values):
             estimator.update(state, time, sample)
-            if due(schedule, time):
+            if due(schedule, time, wait):
                 history.append((intake.stamp_of(taken, time), estimates.estimate(state)))
     return history
 
@@ -102,9 +102,9 @@ def test_the_bag_of_estimates_holds_every_one(arguments, tmp_path, bag):
     assert main([*arguments, "--quiet"]) == 0
     done, store = replay(bag, AIRCRAFT, SETTINGS), type_store()
     with Reader(tmp_path / "out" / "estimates") as reader:
-        (connection,) = reader.connections
-        assert connection.topic == "/identifier/derivatives"
-        messages = [(t, store.deserialize_cdr(raw, connection.msgtype)) for _, t, raw in reader.messages()]
+        assert {c.topic for c in reader.connections} == {"/identifier/derivatives", "/fault_monitor/faults"}
+        chosen = [c for c in reader.connections if c.topic == "/identifier/derivatives"]
+        messages = [(t, store.deserialize_cdr(raw, c.msgtype)) for c, t, raw in reader.messages(chosen)]
     assert len(messages) == len(done.history)
     for (log_ns, m), known, stamp in zip(messages, done.history, done.stamps_ns.tolist(), strict=True):
         assert log_ns == m.header.stamp.sec * 10**9 + m.header.stamp.nanosec == stamp
@@ -122,7 +122,7 @@ def test_a_second_replay_replaces_the_first(arguments, tmp_path, capsys):
     assert main([*arguments, "--quiet"]) == 0
     assert main([*arguments, "--quiet", "--set", "publish_rate=1"]) == 0
     with Reader(tmp_path / "out" / "estimates") as reader:
-        assert reader.message_count == 11
+        assert {c.topic: c.msgcount for c in reader.connections}["/identifier/derivatives"] == 11
     (tmp_path / "out" / "estimates" / "mine.txt").write_text("keep me")
     assert main([*arguments, "--quiet"]) == 2
     assert "holds mine.txt, which no replay wrote" in capsys.readouterr().err
@@ -161,6 +161,13 @@ def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp
     assert (fault["kind"], fault["part"], fault["until"]) == ("loss of effectiveness", "elevator", None)
     assert fault["lower"] <= 0.5 <= fault["upper"]
     assert 30.0 < fault["found"] < 36.0
+    with Reader(out / "estimates") as reader:
+        chosen = [c for c in reader.connections if c.topic == "/fault_monitor/faults"]
+        said = [type_store().deserialize_cdr(raw, c.msgtype) for c, _, raw in reader.messages(chosen)]
+    assert len(said) >= 59  # once a second, and when it is news
+    assert said[0].status == []
+    assert (said[-1].status[0].name, said[-1].status[0].hardware_id) == ("fault_monitor: elevator", "cdrw")
+    assert {pair.key: pair.value for pair in said[-1].status[0].values}["size"] == f"{fault['size']:.6g}"
     page = (out / "report.html").read_text()
     assert "<td>elevator: loss of effectiveness</td>" in page
     assert main(["report", str(out), "--quiet"]) == 0

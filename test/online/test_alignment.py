@@ -22,6 +22,7 @@ def assert_same_bits(streams, max_gap=0.2):
     assert bulk.time.tobytes() == single.time.tobytes()
     assert bulk.samples.tobytes() == single.samples.reshape(bulk.samples.shape).tobytes()
     assert bulk.stamps.tobytes() == single.stamps.tobytes()
+    assert bulk.wait.tobytes() == single.wait.tobytes()
     assert bulk.rejected == single.rejected
     return bulk
 

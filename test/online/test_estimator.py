@@ -104,7 +104,7 @@ def test_any_messages(data: st.DataObject) -> None:
         complete = intake.on_imu(door, stamp, tuple(values[:6]))
         complete += intake.on_air_data(door, stamp, tuple(wrong.get(i, x) for x in values[6:10]))
         complete += intake.on_actuators(door, stamp, (*names, "throttle"), [*values[12:], 0.2])
-        for time, aligned in complete:
+        for time, aligned, _ in complete:
             estimator.update(state, time, aligned)
     assert_sound(state)
 

@@ -12,7 +12,7 @@ from made_flights import JOINTS, made_aircraft, made_streams
 from sysid_node.flight.align import BUFFER_NS, STEP_FORWARD_NS
 from sysid_node.flight.checks import CLOCK_STEP, DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.online.intake import BREAK_NS, init, on_actuators, on_air_data, on_imu, stamp_of
+from sysid_node.online.intake import BREAK_NS, Complete, init, on_actuators, on_air_data, on_imu, stamp_of
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 AIRCRAFT = made_aircraft()
@@ -26,7 +26,7 @@ class Feed:
 
     def __init__(self, max_gap: float = 0.2) -> None:
         self.state = init(AIRCRAFT, max_gap)
-        self.samples: list[tuple[float, tuple[float, ...]]] = []
+        self.samples: list[Complete] = []
 
     def imu(self, stamp, values=FORCE_AND_RATES):
         self.samples += on_imu(self.state, stamp, values)
@@ -47,7 +47,7 @@ class Feed:
 
     @property
     def times(self):
-        return [time for time, _ in self.samples]
+        return [one.time for one in self.samples]
 
     def rejected(self, topic):
         return self.state.rejected[topic]
@@ -89,9 +89,10 @@ def test_a_sample_waits_for_both_neighbours():
     f.air(START + 10 * MS, (20.0, 0.07, 0.03, math.nan))
     assert not f.samples
     f.joints(START + 20 * MS, (0.9, 0.3, 0.0, 0.0, 0.0, 0.0))
-    ((time, sample),) = f.samples
+    ((time, sample, wait),) = f.samples
     named = dict(zip((*SAMPLE_COLUMNS, "de", "da", "dr"), sample, strict=True))
     assert time == 0.0
+    assert wait == 0.015
     assert sample[:6] == FORCE_AND_RATES
     assert named["V"] == pytest.approx(19.0)
     assert named["alpha"] == pytest.approx(0.06)
@@ -113,7 +114,7 @@ def test_flow_angles_that_are_not_measured_stay_unknown():
     f.air(START, (18.0, math.nan, 0.01, 1.2))
     f.joints(START)
     f.imu(START)
-    (_, sample) = f.samples[0]
+    (_, sample, _) = f.samples[0]
     assert math.isnan(sample[7])
     assert sample[8] == 0.01
 
@@ -261,7 +262,7 @@ def test_a_clock_set_for_all_topics_breaks_the_time_and_mixes_nothing(leap, firs
     assert np.all(np.diff(times) > 0)
     step = int(np.argmax(np.diff(times)))
     assert np.diff(times)[step] >= f.state.gap / 1e9 + BREAK_NS / 1e9
-    alphas = [sample[7] for _, sample in f.samples]
+    alphas = [one.sample[7] for one in f.samples]
     assert set(alphas) == {0.1, -0.1}  # never a mixture
     assert before == 99
     assert len(f.samples) - before >= 97
@@ -355,7 +356,7 @@ def test_no_message_makes_it_raise_or_lets_nonsense_through(messages):
     )
     assert counted == len(messages)
     assert all(a < b for a, b in zip(f.times, f.times[1:], strict=False))
-    for _, sample in f.samples:
+    for _, sample, _ in f.samples:
         assert len(sample) == len(SAMPLE_COLUMNS) + 3
         unknown = {i for i, x in enumerate(sample) if not math.isfinite(x)}
         assert unknown <= {7, 8, 10}  # flow angles and thrust may be unknown, nothing else

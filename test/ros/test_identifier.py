@@ -28,7 +28,7 @@ def expected_of(streams: Streams) -> dict[int, Estimates]:
     """What the desk makes of a flight at the default publish rate: header stamp -> estimates."""
     aircraft, settings = load_aircraft("cdrw"), Settings()
     aligned = align_streams(aircraft, streams, settings.max_gap)
-    due = due_times(aligned.time, 20.0)
+    due = due_times(aligned.time, aligned.wait, 20.0)
     results = run(aircraft, settings, aligned.time, aligned.samples, due)
     stamps = aligned.stamps[np.searchsorted(aligned.time, due)]
     return dict(zip(stamps.tolist(), results, strict=True))

@@ -32,7 +32,7 @@ def test_a_bag_of_the_loop_replays_to_the_same_estimates(probe: Probe, tmp_path:
         probe.until(lambda: len(probe.estimates) > SECONDS * 20.0, 90.0)
     aircraft, settings = load_aircraft("cdrw"), Settings(method="sls_rft")
     aligned = align_streams(aircraft, read_streams(bag), settings.max_gap)
-    due = due_times(aligned.time, 20.0)
+    due = due_times(aligned.time, aligned.wait, 20.0)
     stamps = aligned.stamps[np.searchsorted(aligned.time, due)].tolist()
     desk = dict(zip(stamps, run(aircraft, settings, aligned.time, aligned.samples, due), strict=True))
     live = {stamp_ns(message.header.stamp): message for message in probe.estimates}

@@ -56,7 +56,7 @@ def test_flow_angles_that_fail_in_flight_make_estimates_stale_live_and_at_the_de
     flight.air_data.values[500:600, 1] = math.nan
     live = fly(Session(aircraft, Settings(), 10.0), flight, "iaj")
     aligned = align_streams(aircraft, flight, Settings().max_gap)
-    desk = run(aircraft, Settings(), aligned.time, aligned.samples, due_times(aligned.time, 10.0))
+    desk = run(aircraft, Settings(), aligned.time, aligned.samples, due_times(aligned.time, aligned.wait, 10.0))
     assert repr([one.estimates for one in live]) == repr(desk)
     stale = [
         i for i, one in enumerate(live) if {d.status for d in one.estimates.derivatives.values()} == {"stale input"}
