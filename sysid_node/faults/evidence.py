@@ -64,20 +64,31 @@ def weigh(J: Array, v: Array, shift: Shift, excess: float = 1.0) -> Weighed:
     return Weighed(factor, size, covariance)
 
 
-def weigh_each(J: Array, v: Array, shifts: Sequence[Shift], excess: Array) -> list[Weighed]:
-    """``weigh`` for many shifts, each by its own ``excess`` (H,); those with one free direction all at once."""
-    single = [i for i, shift in enumerate(shifts) if shift.spread.size == 1]
-    S = np.column_stack([shifts[i].fixed for i in single])
-    B = np.column_stack([shifts[i].free[:, 0] for i in single])
-    prior = np.array([shifts[i].spread[0] for i in single]) ** -2
-    share = 1.0 / excess[single]
-    JS = J @ S
-    G = (B * (J @ B)).sum(axis=0) * share + prior
-    g = (B * (v[:, None] - JS)).sum(axis=0) * share
-    factor = (S * (v[:, None] - 0.5 * JS)).sum(axis=0) * share + 0.5 * g * g / G - 0.5 * np.log(G / prior)
-    rows = zip(single, factor.tolist(), (g / G)[:, None], (1.0 / G)[:, None, None], strict=True)
+class Shifts:
+    """Many shifts: ``each``, and side by side those with one free direction, which can be weighed at once."""
+
+    def __init__(self, shifts: Sequence[Shift]) -> None:
+        self.each = tuple(shifts)
+        single = [i for i, shift in enumerate(shifts) if shift.spread.size == 1]
+        self.single = np.array(single, dtype=np.intp)  # (n,)
+        self.several = [i for i, shift in enumerate(shifts) if shift.spread.size > 1]
+        self.fixed = np.column_stack([shifts[i].fixed for i in single])  # (D, n)
+        self.free = np.column_stack([shifts[i].free[:, 0] for i in single])  # (D, n)
+        self.prior = np.array([shifts[i].spread[0] for i in single]) ** -2  # (n,)
+
+
+def weigh_each(J: Array, v: Array, shifts: Shifts, excess: Array) -> list[Weighed]:
+    """``weigh`` for many shifts, each by its own ``excess`` (H,)."""
+    share = 1.0 / excess[shifts.single]
+    JS = J @ shifts.fixed
+    G = (shifts.free * (J @ shifts.free)).sum(axis=0) * share + shifts.prior
+    g = (shifts.free * (v[:, None] - JS)).sum(axis=0) * share
+    factor = (shifts.fixed * (v[:, None] - 0.5 * JS)).sum(axis=0) * share
+    factor += 0.5 * g * g / G - 0.5 * np.log(G / shifts.prior)
+    rows = zip(shifts.single.tolist(), factor.tolist(), (g / G)[:, None], (1.0 / G)[:, None, None], strict=True)
     found = {i: Weighed(f, size, covariance) for i, f, size, covariance in rows}
-    return [found[i] if i in found else weigh(J, v, shift, float(excess[i])) for i, shift in enumerate(shifts)]
+    found |= {i: weigh(J, v, shifts.each[i], float(excess[i])) for i in shifts.several}
+    return [found[i] for i in range(len(shifts.each))]
 
 
 def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness: Array, excess: float) -> Weighed:
@@ -105,16 +116,14 @@ def _evidence(G: Array, g: Array, prior: Array) -> tuple[float, Array, Array]:
     return 0.5 * float(g @ mean) - 0.5 * float(freedom), mean, covariance
 
 
-def score_squares(J: Array, v: Array, shifts: Sequence[Shift]) -> Array:
+def score_squares(J: Array, v: Array, shifts: Shifts) -> Array:
     """(H,) mean square of the score along each shift: 1 where nothing has failed and the whitening holds."""
-    found = np.empty(len(shifts))
-    for i, shift in enumerate(shifts):
-        B = shift.free
-        g = v @ B
-        if g.size == 1:
-            found[i] = g[0] ** 2 / max(float(B[:, 0] @ J @ B[:, 0]), 1e-300)
-            continue
-        G = B.T @ J @ B
+    found = np.empty(len(shifts.each))
+    information = (shifts.free * (J @ shifts.free)).sum(axis=0)
+    found[shifts.single] = (v @ shifts.free) ** 2 / np.maximum(information, 1e-300)
+    for i in shifts.several:
+        B = shifts.each[i].free
+        g, G = v @ B, B.T @ J @ B
         scale = 1.0 / np.sqrt(np.maximum(np.diag(G), 1e-300))
         g = g * scale
         found[i] = float(g @ np.linalg.solve(G * np.outer(scale, scale) + 1e-6 * np.eye(g.size), g)) / g.size

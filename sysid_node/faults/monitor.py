@@ -22,6 +22,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import blocks, colour, held
 from sysid_node.faults.blocks import PERIOD, Block
 from sysid_node.faults.colour import ORDER
+from sysid_node.faults.evidence import Shifts
 from sysid_node.faults.held import Known
 from sysid_node.faults.hypotheses import hypotheses
 from sysid_node.faults.report import Found, fault_of
@@ -30,6 +31,7 @@ from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
 from sysid_node.faults.terms import Terms, terms
 from sysid_node.faults.types import VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
+    VANES,
     Stretch,
     excess,
     explained,
@@ -179,6 +181,7 @@ def _renew(state: State, now: Block) -> None:
     share = held.noise_of(state.terms, state.colour, vane_noise(state, now.samples)) * state.held.blocks
     state.belief = held.belief(state.held, share, state.settings.slack)
     state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held, state.belief.shift))
+    state.shifts = Shifts([hypothesis.shift for hypothesis in state.hypotheses])
 
 
 def _rebuild(state: State) -> None:
@@ -243,7 +246,7 @@ def _follow(state: State, alarm: Alarm) -> None:
     vanes = stuck_vanes(state, over)
     factors = np.array([*(w.factor for w in found), *vanes.values()])
     place = int(np.argmax(factors))
-    times = Found(min(alarm.since, alarm.found), alarm.found, float(1.0 / np.exp(factors - factors[place]).sum()))
+    times = Found(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
     if place < len(found):
         state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
     else:
@@ -252,6 +255,13 @@ def _follow(state: State, alarm: Alarm) -> None:
         state.alarm = state.fault = None
         state.pieces.clear()
         state.usual.clear()
+
+
+def _sure(state: State, factors: Array, place: int) -> float:
+    """The probability of a hypothesis among all, together with those that are called the same."""
+    names = [*((h.kind, h.part) for h in state.hypotheses), *((VANE_STUCK, vane) for vane in VANES)]
+    share = np.exp(factors - factors[place])
+    return float(share[[name == names[place] for name in names]].sum() / share.sum())
 
 
 def _since(state: State, time: float) -> int:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.blocks import Block, Blocks
 from sysid_node.faults.colour import ORDER, Colour
+from sysid_node.faults.evidence import Shifts
 from sysid_node.faults.held import Belief, Held
 from sysid_node.faults.hypotheses import Hypothesis
 from sysid_node.faults.settings import Settings
@@ -59,6 +60,7 @@ class State:
     pieces: deque[Piece] = field(default_factory=lambda: deque(maxlen=LONGEST))
     raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
     hypotheses: list[Hypothesis] = field(default_factory=list)
+    shifts: Shifts | None = None  # the hypotheses'
     belief: Belief | None = None  # what the blocks are weighed against
     explained: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))  # (D,) terms that are learned
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import colour
-from sysid_node.faults.evidence import Weighed, marginal, score_squares, weigh_each, weigh_loosely
+from sysid_node.faults.evidence import Shifts, Weighed, marginal, score_squares, weigh_each, weigh_loosely
 from sysid_node.faults.state import Piece, State
-from sysid_node.faults.types import DAMAGE
 from sysid_node.faults.vanes import stuck_factor
 from sysid_node.online.signals import OFFSET
 
@@ -25,7 +24,7 @@ VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index(
 
 
 LOOSE = 0.1  # share by which a fault may differ from its hypothesis
-LAST_RESORT = 0.1  # share by which damage, which can explain all, must explain more than what is simple
+LAST_RESORT = 0.1  # share by which damage of a whole axis, which can explain all, must explain more than what is simple
 
 
 class Stretch(NamedTuple):
@@ -70,7 +69,7 @@ def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
         one = weigh_loosely(*over.whole, hypothesis.shift, state.belief.precision, LOOSE * moved, scale)
-        if hypothesis.kind == DAMAGE:
+        if weighed.size.size > 1:
             one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
         found.append(one)
     return found
@@ -78,12 +77,17 @@ def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
 
 def statistics(state: State, over: Stretch) -> Array:
     """(H,) of each hypothesis; see ``evidence.score_squares``."""
-    return score_squares(over.J, over.v, [h.shift for h in state.hypotheses])
+    return score_squares(over.J, over.v, _shifts(state))
 
 
 def weights(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     """Each hypothesis; ``usual`` (H,) is the size of its statistic where nothing has failed."""
-    return weigh_each(over.J, over.v, [h.shift for h in state.hypotheses], np.maximum(usual, 1.0))
+    return weigh_each(over.J, over.v, _shifts(state), np.maximum(usual, 1.0))
+
+
+def _shifts(state: State) -> Shifts:
+    assert state.shifts is not None
+    return state.shifts
 
 
 def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:

@@ -5,17 +5,18 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from sysid_node.faults import evidence
-from sysid_node.faults.evidence import Shift
+from sysid_node.faults.evidence import Shift, Shifts
 
 RANDOM = np.random.default_rng(5)
 D, N = 6, 40
 X = RANDOM.standard_normal((N, D))
 P = np.diag(RANDOM.uniform(0.01, 0.1, D))
-SHIFTS = (
+EACH = (
     Shift(np.zeros(D), np.eye(D)[:, :1], np.array([0.5])),
     Shift(0.3 * np.eye(D)[0], np.eye(D)[:, 1:2], np.array([0.4])),
     Shift(np.zeros(D), np.eye(D)[:, 2:5], np.array([0.3, 0.5, 0.2])),
 )
+SHIFTS = Shifts(EACH)
 
 
 def summed(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -23,7 +24,7 @@ def summed(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return X.T @ X, X.T @ y
 
 
-@pytest.mark.parametrize("shift", SHIFTS)
+@pytest.mark.parametrize("shift", EACH)
 def test_the_factor_is_the_ratio_of_the_data_s_densities(shift: Shift) -> None:
     y = X @ (0.4 * RANDOM.standard_normal(D)) + RANDOM.standard_normal(N)
     none = multivariate_normal(np.zeros(N), np.eye(N) + X @ P @ X.T)
@@ -44,7 +45,7 @@ def test_many_at_once_are_each_by_itself() -> None:
     y = RANDOM.standard_normal(N)
     J, v = evidence.marginal(*summed(y), np.linalg.inv(P))
     excess = np.array([1.0, 2.5, 1.7])
-    for one, shift, scale in zip(evidence.weigh_each(J, v, SHIFTS, excess), SHIFTS, excess, strict=True):
+    for one, shift, scale in zip(evidence.weigh_each(J, v, SHIFTS, excess), EACH, excess, strict=True):
         alone = evidence.weigh(J, v, shift, float(scale))
         assert one.factor == pytest.approx(alone.factor, rel=1e-9, abs=1e-9)
         np.testing.assert_allclose(one.size, alone.size, rtol=1e-9)
