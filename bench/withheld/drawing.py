@@ -100,6 +100,10 @@ UNLISTED: Mapping[str, Size] = {
 INHERENT = ("unsteady_aerodynamics", "propwash", "thrust_yaw", "drag_rise", "nonlinear_pitching_moment",
             "lateral_alpha_coupling", "stall_separation", "control_nonlinearity")  # fmt: skip
 
+#: Where that plant's load, one person on the left, puts the centre of gravity (m from the plane of symmetry, to the
+#: right). Lift rolls the aircraft by this arm, and no derivative of the file tells of a roll with the angle of attack.
+LOADED_ASIDE = -0.034
+
 
 @dataclass(frozen=True)
 class Case:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .drawing import INHERENT
+from .drawing import FOREIGN, INHERENT, LOADED_ASIDE
 
 #: Probability from which an effect counts as blamed.
 BLAMED = 0.9
@@ -76,10 +76,12 @@ def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:
     """A case by its label and its gap.json."""
     truth = set(label["effects"])
     named = tuple((c["effect"], *c["indistinguishable_from"][: TOGETHER - 1]) for c in said["causes"])
-    there = truth | (set(INHERENT) if label["plant"] == "c172p" else set())
-    stated = tuple((float(c["probability"]), c["effect"] in there) for c in said["causes"])
+    own = [_has(label, c) or _one_of_its(label, c) for c in said["causes"]]
+    stated = tuple(
+        (float(c["probability"]), c["effect"] in truth or i) for c, i in zip(said["causes"], own, strict=True)
+    )
     parameters = tuple(_parameters(label, said))
-    right, every = _right(label, said["verdict"], named, truth)
+    right, every = _right(label, said["verdict"], named, own)
     return Judged(
         label=label,
         verdict=said["verdict"],
@@ -94,16 +96,33 @@ def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:
     )
 
 
+def _has(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
+    """Whether a cause is one that the foreign plant always has, nothing added."""
+    if label["plant"] != FOREIGN:
+        return False
+    if cause["effect"] == "cg_shift" and "y" in cause["parameters"]:
+        return _close("y", LOADED_ASIDE, *cause["parameters"]["y"])
+    return cause["effect"] in INHERENT
+
+
+def _one_of_its(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
+    """Whether one of the foreign plant's own is named beside a cause as one that it cannot be told from."""
+    return label["plant"] == FOREIGN and not set(INHERENT).isdisjoint(cause["indistinguishable_from"][: TOGETHER - 1])
+
+
 def _right(
-    label: Mapping[str, Any], verdict: str, named: tuple[tuple[str, ...], ...], truth: set[str]
+    label: Mapping[str, Any], verdict: str, named: tuple[tuple[str, ...], ...], inherent: Sequence[bool]
 ) -> tuple[bool, bool | None]:
-    """Whether the verdict (none, unlisted) or the first name is right; of two effects, whether both are named."""
+    """Whether the verdict (none, unlisted) or the first name is right; of two effects, whether both are named.
+
+    Of the foreign plant with nothing added: whether nothing is blamed but what it has.
+    """
+    truth = set(label["effects"])
     if label["kind"] == "none":
-        inherent = label["plant"] == "c172p" and all(set(n) & set(INHERENT) for n in named)
-        return verdict == "no_gap" or bool(named and inherent), None
+        return (verdict != "unsupported" and all(inherent) if label["plant"] == FOREIGN else verdict == "no_gap"), None
     if label["kind"] == "unlisted":
         return verdict == "unknown_effect", None
-    first = [n for n in named if label["plant"] != "c172p" or not set(n) & (set(INHERENT) - truth)][:1]
+    first = [n for n, own in zip(named, inherent, strict=True) if truth & set(n) or not own][:1]
     found = {effect for n in named for effect in n}
     return bool(first and set(first[0]) & truth), truth <= found if len(truth) > 1 else None
 

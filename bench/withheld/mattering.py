@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfiltfilt
 
 from sysid_node.aircraft.model import Aircraft
@@ -18,8 +17,8 @@ Array = NDArray[np.float64]
 #: Band that is compared, Hz.
 _BAND = 4.0
 
-#: Tolerances that a derivative is let move at one standard deviation of what is to be explained.
-_WIDE = 3.0
+#: Tolerances of the file that is handed over by which a derivative may be off.
+_WIDEST = 3.0
 
 _READ = slice(0, 6), slice(9, 12)  # of the readings: IMU and air data, without the attitude
 _DELAYS = {"imu_delay": slice(0, 9), "air_data_delay": slice(9, 12)}
@@ -46,53 +45,35 @@ def _sigma(aircraft: Aircraft) -> Array:
     return np.repeat(spreads, [3, 3, 3, 1, 1, 1])
 
 
-class Explained(NamedTuple):
-    """What derivatives do to explain a flight: what of the coefficients (N, 6) they leave, below 4 Hz, and by how many
-    tolerances (D,) each had to move for it."""
+def beyond(with_it: Array, without: Array, noise: Array) -> float:
+    """By how much an effect exceeds what tolerances excuse.
 
-    left: Array
-    shifts: Array
-
-
-def beyond(with_it: Explained, without: Explained, noise: Array) -> float:
-    """By how much an effect exceeds what tolerances excuse: the larger of two ratios.
-
-    What is left of a flight with it over what is left without it and of the noise, on the axis with most; and by how
-    many tolerances a derivative had to move more than without it.
+    What is left (N, 6) of a flight with it over what is left without it and of the noise, on the axis with most.
     """
-    size, floor = (np.mean(x**2, axis=0) for x in (with_it.left, without.left))
-    left = float(np.sqrt(size / (floor + np.mean(noise**2, axis=0))).max())
-    return max(left, float(np.abs(with_it.shifts - without.shifts).max()))
+    size, floor = (np.mean(x**2, axis=0) for x in (with_it, without))
+    return float(np.sqrt(size / (floor + np.mean(noise**2, axis=0))).max())
 
 
-def explained(log: Log, seen: Array, aircraft: Aircraft, effects: Effects, rate: float) -> Explained:
-    """The readings (N, 12) made coefficients as the aircraft file would make them, and derivatives fitted to these."""
+def inexplicable(log: Log, seen: Array, aircraft: Aircraft, effects: Effects, rate: float) -> Array:
+    """What is left (N, 6), below 4 Hz, of the readings made coefficients as the aircraft file would make them, when its
+    derivatives have done their best within three tolerances."""
     late = effects.get("actuator_stamp_delay", {}).get("delay", 0.0)
     commands = np.column_stack([np.interp(log.time - late, log.time, c) for c in log.commands.T])
-    return _explained(aircraft, seen, commands, log.density, rate)
-
-
-def noisy(seen: Array, aircraft: Aircraft, rate: float, random: np.random.Generator) -> Array:
-    """Readings with the sensors' noise, as strong in the band as that of samples at 200 Hz."""
-    return np.asarray(seen + _sigma(aircraft) * random.standard_normal(seen.shape) * np.sqrt(rate / 200.0))
-
-
-def _explained(aircraft: Aircraft, seen: Array, commands: Array, density: Array, rate: float) -> Explained:
-    found, x = coefficients(aircraft, seen, commands, density, rate)
+    found, x = coefficients(aircraft, seen, commands, log.density, rate)
     low = butter(4, _BAND, fs=rate, output="sos")
-    left, shifts = np.empty_like(found), []
+    left = np.empty_like(found)
     for i, coefficient in enumerate(("CL", "CD", "CY", "Cl", "Cm", "Cn")):
         own = [(r, d) for n, d in aircraft.derivatives.items() for c, _, r in [n.partition("_")] if c == coefficient]
         matrix = np.column_stack([x[r] for r, _ in own])
         off = sosfiltfilt(low, found[:, i] - matrix @ [d.value for _, d in own])
         columns = sosfiltfilt(low, matrix, axis=0) * [d.tolerance or 1.0 for _, d in own]
-        # a prior as wide as three tolerances, against samples that are independent every eighth of a second
-        prior = np.eye(len(own)) * np.std(off) * np.sqrt(rate / (2.0 * _BAND)) / _WIDE
-        rows, right = np.vstack([columns, prior]), np.concatenate([off, np.zeros(len(own))])
-        moves = np.linalg.lstsq(rows, right)[0]
-        left[:, i] = off - columns @ moves
-        shifts += moves.tolist()
-    return Explained(left, np.array(shifts))
+        left[:, i] = off - columns @ lsq_linear(columns, off, (-_WIDEST, _WIDEST)).x
+    return left
+
+
+def noisy(seen: Array, aircraft: Aircraft, rate: float, random: np.random.Generator) -> Array:
+    """Readings with the sensors' noise, as strong in the band as that of samples at 200 Hz."""
+    return np.asarray(seen + _sigma(aircraft) * random.standard_normal(seen.shape) * np.sqrt(rate / 200.0))
 
 
 def coefficients(

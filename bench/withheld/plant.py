@@ -26,7 +26,7 @@ from .actuators import servo_lag
 from .drawing import SECONDS, SETS, Case, draw
 from .flying import fly
 from .instruments import SUITES, Log, readings, record
-from .mattering import beyond, explained, moved, noisy, stamped
+from .mattering import beyond, inexplicable, moved, noisy, stamped
 from .motion import Airframe, DivergedError, Effects, Instant
 from .pilot import Pilot
 from .rigid import Rigid
@@ -113,6 +113,12 @@ def _in_units(effects: Mapping[str, Mapping[str, float]], aircraft: Aircraft) ->
     return known
 
 
+def handed_over(plant: Plant) -> tuple[Aircraft, np.random.Generator]:
+    """The aircraft file of a case, and what its recording's noise is drawn from then."""
+    random = np.random.default_rng([SETS[plant.which], plant.case.seed, 99])
+    return believed(plant.truth, random), random
+
+
 def believed(aircraft: Aircraft, random: np.random.Generator) -> Aircraft:
     """The aircraft file that is handed over: derivatives off by their tolerances, no drag below zero."""
     wrong = {}
@@ -141,19 +147,19 @@ def measured(plant: Plant) -> dict[str, float]:
     if not plant.effects:
         return {}
     still = replace(plant.case, turbulence="none")
-    calm = Plant(still, plant.which)
+    calm, belief = Plant(still, plant.which), handed_over(plant)[0]
     log = calm.fly({}, 0)
     without = calm.seen(log, {})
-    bare = explained(log, without, plant.truth, {}, RATE)
+    bare = inexplicable(log, without, belief, {}, RATE)
     rough = noisy(without, plant.truth, RATE, np.random.default_rng(0))
-    noise = explained(log, rough, plant.truth, {}, RATE).left - bare.left
+    noise = inexplicable(log, rough, belief, {}, RATE) - bare
     sizes = {}
     for name, values in plant.effects.items():
         alone = {name: values}
         log = calm.fly(alone, 0)
         late = log if _as_command(alone) is alone else calm.fly(_as_command(alone), 0)
         apart = moved(calm.seen(late, alone), without, plant.truth)
-        after = explained(log, calm.seen(log, alone), plant.truth, alone, RATE)
+        after = inexplicable(log, calm.seen(log, alone), belief, alone, RATE)
         sizes |= {f"{name}, response": apart, f"{name}, beyond tolerances": beyond(after, bare, noise)}
     return sizes
 
@@ -173,10 +179,10 @@ def label(plant: Plant, sizes: Mapping[str, float]) -> dict[str, object]:
 def write(which: str, seed: int, folder: Path) -> None:
     """Flies and writes a case."""
     plant, logs, sizes = flown(which, seed)
-    random = np.random.default_rng([SETS[which], seed, 99])
+    belief, random = handed_over(plant)
     out = folder / str(seed)
     out.mkdir(parents=True, exist_ok=True)
-    (out / "aircraft.yaml").write_text(dump_aircraft(believed(plant.truth, random)), encoding="utf-8")
+    (out / "aircraft.yaml").write_text(dump_aircraft(belief), encoding="utf-8")
     for name, log in zip(("fitted", "held"), logs, strict=True):
         case, seen = plant.case, readings(log, plant.truth, plant.effects)
         streams = record(log, seen, plant.truth, plant.effects, SUITES[case.suite], case.noise, random)

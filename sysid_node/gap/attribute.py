@@ -14,17 +14,20 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import PER_CONTROL, TIMES, Candidate, bounds, candidates_of
+from sysid_node.gap.candidates import BETWEEN, PER_CONTROL, TIMES, Candidate, bounds, candidates_of
 from sysid_node.gap.evidence import Evidence, judged, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, with_candidates
-from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.foretold import advantage
+from sysid_node.gap.nuisance import Nuisances, gusty
 from sysid_node.gap.onset import sought
 from sysid_node.gap.spectra import power_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.structure import Structure, structure_of, unbiased
-from sysid_node.gap.view import View
+from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
+from sysid_node.sim import EFFECTS
 
 #: For the first, second and third effect: explanations that it is tried upon (the best single one need not belong to
 #: the best pair), and candidates that are fitted to the end upon each after a first look at all.
@@ -32,6 +35,12 @@ _STAGES = ((1, 6), (3, 4), (2, 3))
 
 #: Probability, against doing without, from which an effect is accepted.
 _SURE = 0.95
+
+#: The same in nats.
+_SURELY = float(np.log(_SURE / (1.0 - _SURE)))
+
+#: What an effect must make up for having been picked from so many, in nats.
+_MANY = float(np.log(len(EFFECTS)))
 
 #: Share of the power left over that an effect must take away on the axis where it does most, and share of what
 #: derivatives and biases leave there that comes back without it: a fifth of the gap's size.
@@ -82,6 +91,7 @@ class Cause:
 
     candidate: Candidate
     probability: float
+    taken: Array  # power (12,) that it takes away on flight not fitted, the other causes given
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
     rivals: tuple[Trial, ...] = ()  # what was tried in its stead
 
@@ -133,7 +143,8 @@ def attribute(
             break
         chosen, frontier = better[0], better
     progress(0.8, "whether another effect would do as well")
-    chosen, places = _refined(trier, base, chosen, stages)
+    late = [candidate for candidate in candidates if candidate.effect in BETWEEN]
+    chosen, places = _refined(trier, base, chosen, stages, late)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
     causes = tuple(sorted((_cause(trier, chosen, place) for place in places), key=lambda cause: -cause.probability))
     corrected = unbiased(chosen.fit)
@@ -266,16 +277,42 @@ def _likelier(trial: Trial, other: Trial) -> bool:
 
 
 def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
-    """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter."""
+    """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter.
+
+    In gusts it must do so by what the commands foretell: a gust can fake all else.
+    """
     if _trifling(trial) or not _likelier(trial, without):
         return False
-    left, now = power_left(without.evidence), power_left(trial.evidence)
-    motion = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views)
-    gone = left - now
-    matters = ((gone > MATERIAL * left) & (gone > NOTICED**2 * motion)) | (gone > _PLAIN**2 * motion)
-    if not matters.any():
+    matters = _matters_in_gusts(without, trial) if _in_gusts(trial) else _matters(without, trial)
+    if not np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)):
         return False
-    return bool(np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)))
+    return not _in_gusts(trial) or advantage(trial.fit, without.fit) > _SURELY + _MANY
+
+
+def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+    """Channels (12,) on which a trial takes enough of the remainder away."""
+    left, motion = power_left(without.evidence), _motion(trial)
+    gone = left - power_left(trial.evidence)
+    return np.asarray(((gone > MATERIAL * left) & (gone > NOTICED**2 * motion)) | (gone > _PLAIN**2 * motion))
+
+
+def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+    """The same, of forces and moments by what of the remainder is structure: the rest is weather."""
+    before, after = structure_of(without.fit, trial.fit), structure_of(trial.fit)
+    scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
+    gone = before.coherent - after.coherent
+    structured = (gone > MATERIAL * before.coherent) & (gone * scale > NOTICED**2 * _motion(trial))
+    forces = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
+    return np.where(forces, structured, _matters(without, trial))
+
+
+def _motion(trial: Trial) -> Array:
+    """Power (12,) of what was measured, about the windows' means."""
+    return np.asarray(sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views))
+
+
+def _in_gusts(trial: Trial) -> bool:
+    return any(gusty(view) for view in trial.fit.views)
 
 
 def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
@@ -345,13 +382,14 @@ class Place:
 
 
 def _refined(
-    trier: Trier, base: Trial, chosen: Trial, stages: Sequence[list[Trial]]
+    trier: Trier, base: Trial, chosen: Trial, stages: Sequence[list[Trial]], late: Sequence[Candidate]
 ) -> tuple[Trial, tuple[Place, ...]]:
     """The explanation after every cause has stood against its rivals, given the others.
 
     The first effect was chosen before the others were known: another may take its place now, or none may be needed.
     """
-    pool = list({t.added.label: t.added for trials in stages for t in trials if t.added}.values())
+    tried = [t.added for trials in stages for t in trials if t.added]
+    pool = list({candidate.label: candidate for candidate in (*tried, *late)}.values())
     for _ in range(_SWEEPS):
         places = tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
         better = _replacement(base, chosen, places)
@@ -364,13 +402,16 @@ def _refined(
 def _place(
     trier: Trier, base: Trial, chosen: Trial, candidate: Candidate, first: list[Trial], pool: list[Candidate]
 ) -> Place:
+    """Against the likeliest rivals, and where the response is late against all that could make it so."""
     others = [c for c in chosen.fit.candidates if c is not candidate]
-    if not others:
-        return Place(candidate, base, tuple(first))
-    without = trier.trial(chosen.fit, others)
+    without = trier.trial(chosen.fit, others) if others else base
     rest = [c for c in pool if c.effect not in without.fit.effects]
     looks = trier.looks_upon([without], rest, lambda s, t: None)
-    return Place(candidate, without, tuple(t for _, t in trier.finish(looks[:_RIVALS], lambda s, t: None)))
+    likely = looks[:_RIVALS] if others else []
+    late = [(t, look) for t, look in looks[len(likely) :] if {look[1].effect, candidate.effect} <= BETWEEN]
+    rivals = {t.added.label: t for _, t in trier.finish([*likely, *late], lambda s, t: None) if t.added}
+    known = {} if others else {t.added.label: t for t in first if t.added}
+    return Place(candidate, without, tuple({**known, **rivals}.values()))
 
 
 def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial | None:
@@ -391,18 +432,34 @@ def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
     """
     candidate = place.candidate
     rivals = [t for t in place.rivals if t.added is not None and t.added.label != candidate.label]
-    instead = probabilities([chosen.evidence.scores, *(t.evidence.scores for t in rivals)])[1:]
+    instead = _shares([chosen], rivals)[1:]
     strong = [t for t, share in zip(rivals, instead, strict=True) if share > _WORTH_TRYING]
     tried = [trier.beside(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
-    both = [trial for trial in tried if trial is not None]
-    sets = [chosen, *both, *rivals]
-    shares = probabilities([*(t.evidence.scores for t in sets), place.without.evidence.scores])
-    by_effect = {candidate.effect: float(shares[: 1 + len(both)].sum())}
-    for trial, share in zip(rivals, shares[1 + len(both) : -1], strict=True):
+    sets = [chosen, *(trial for trial in tried if trial is not None)]
+    shares = _shares(sets, [*rivals, place.without])
+    by_effect = {candidate.effect: float(shares[: len(sets)].sum())}
+    for trial, share in zip(rivals, shares[len(sets) : -1], strict=True):
         effect = trial.added.effect if trial.added else ""
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
-    return Cause(candidate, by_effect[candidate.effect], tuple(rivals_left), place.rivals)
+    taken = np.maximum(power_left(place.without.evidence) - power_left(chosen.evidence), 0.0)
+    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), place.rivals)
+
+
+def _shares(sets: Sequence[Trial], others: Sequence[Trial]) -> Array:
+    """Probabilities of sets of effects that hold a cause, then of others that do not.
+
+    In gusts the others are as probable as they are by prediction or by what the commands foretell, whichever is more,
+    but no more than the best of the sets: what either cannot exclude is not excluded.
+    """
+    shares = probabilities([t.evidence.scores for t in (*sets, *others)])
+    if not _in_gusts(sets[0]):
+        return shares
+    best = sets[int(np.argmax(shares[: len(sets)]))]
+    ahead = np.array([advantage(best.fit, t.fit) for t in others])
+    most = shares[: len(sets)].max()
+    shares[len(sets) :] = np.clip(shares[len(sets) :], most * np.exp(-np.maximum(ahead, 0.0)), None)
+    return np.asarray(shares / shares.sum())
 
 
 def _ranked(base: Trial, trials: Sequence[Trial]) -> tuple[tuple[str, float], ...]:

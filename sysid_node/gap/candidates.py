@@ -31,6 +31,9 @@ TIMES = frozenset(
     {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
 )
 
+#: Of these, the ones by which the response comes later than the commands: each is a rival of the others, always.
+BETWEEN = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
+
 #: Of these, stamps that may also be early; early stamps of commands are what a command's delay does.
 _EITHER_WAY = frozenset({"air_data_delay", "imu_delay"})
 

@@ -10,28 +10,25 @@ model of the aircraft beats.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import prior
-from sysid_node.gap.fit import Fit, linearised, moved, real_rows, solve, weights
+from sysid_node.gap.candidates import bounds, prior
+from sysid_node.gap.deliberate import deliberate
+from sysid_node.gap.fit import Fit, linearised, moved, real_rows, weights
 from sysid_node.gap.nuisance import gusty
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
 _LAGS = (0.0, 0.06, 0.2, 0.6)
 
-#: A command steps where it changes so many times faster than it usually does.
-_STEP = 8.0
-
-#: Time after which a step is forgotten, s.
-_MEMORY = 3.0
-
-#: Share of a command's movement that must be steps for its steps to stand for it.
-_STEPPED = 0.3
+#: Room that an unknown at its limit is left, in its own standard deviations: bounds must not coincide.
+_ROOM = 1e-6
 
 
 @dataclass(frozen=True)
@@ -51,13 +48,13 @@ class Structure:
 
 def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
     """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare."""
-    basis, rows, slopes = _equations(fit, (like or fit).power)
-    step, _ = _solution(fit, basis, rows, slopes)
-    left = [r - J @ step for r, J in zip(rows, slopes, strict=True)]
+    seen = equations(fit, (like or fit).power)
+    step = within_limits(seen, fit)
     coherent, total, size = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
-    for U, r in zip(basis, left, strict=True):
+    for U, r, J in zip(seen.basis, seen.rows, seen.slopes, strict=True):
+        left = r - J @ step
         for axis, directions in U.items():
-            series = r[:, :, axis].ravel()
+            series = left[:, :, axis].ravel()
             coherent[axis] += float(np.sum((directions.T @ series) ** 2))
             total[axis] += float(np.sum(series**2))
             size[axis] += directions.shape[1]
@@ -76,11 +73,73 @@ def instrumented(fit: Fit) -> Fit:
 
     One Gauss-Newton step from where the fit stands, and everything linearised there.
     """
-    step, information = _solution(fit, *_equations(fit, fit.power))
-    return replace(linearised(moved(fit, step)), information=information)
+    seen = equations(fit, fit.power)
+    return replace(linearised(moved(fit, within_limits(seen, fit))), information=seen.information)
 
 
-def _equations(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
+@dataclass(frozen=True)
+class Equations:
+    """What the instruments see of a fit: a sum of squares, quadratic in the step of all unknowns, priors included.
+
+    ``constant - 2 right . step + step . information step``; without means in ``rows`` (W, 2 L, 12) and ``slopes``
+    (W, 2 L, 12, unknowns) by flight, of which ``basis`` holds the instruments' directions.
+    """
+
+    basis: list[dict[int, Array]]
+    rows: list[Array]
+    slopes: list[Array]
+    information: Array
+    right: Array
+    constant: float
+
+
+def equations(fit: Fit, powers: tuple[Array, ...], *, readings: bool = False) -> Equations:
+    """Those of a fit about where it stands, in noise of these powers (L, 12) by flight.
+
+    ``readings``: with all of air data and attitude, not only what the instruments see of them.
+    """
+    basis, rows, slopes = _seen(fit, powers)
+    precision, pull = priors(fit)
+    information, right, constant = np.diag(precision), -precision * pull, float(precision @ pull**2)
+    parts = [
+        (directions.T @ r[:, :, axis].ravel(), directions.T @ J[:, :, axis].reshape(-1, J.shape[3]))
+        for U, r, J in zip(basis, rows, slopes, strict=True)
+        for axis, directions in U.items()
+        if axis < len(COEFFICIENTS) or not readings
+    ]
+    if readings:
+        kept = [(r[:, :, len(COEFFICIENTS) :], J[:, :, len(COEFFICIENTS) :]) for r, J in zip(rows, slopes, strict=True)]
+        parts += [(r.ravel(), J.reshape(-1, J.shape[3])) for r, J in kept]
+    for series, seen in [*parts, *_means(fit, powers)]:
+        information += seen.T @ seen
+        right += seen.T @ series
+        constant += float(series @ series)
+    return Equations(basis, rows, slopes, information, right, constant)
+
+
+def within_limits(seen: Equations, fit: Fit) -> Array:
+    """The step (unknowns,) of least squares that leaves every unknown within its limits."""
+    spread = np.diag(seen.information) ** -0.5
+    root = np.linalg.cholesky(seen.information).T
+    low, high = bounds(fit.views[0].simulator, fit.indices)
+    now, _, limit = fit.stacked
+    lowest = np.concatenate([low - fit.values, -limit - now]) / spread
+    highest = np.concatenate([high - fit.values, limit - now]) / spread
+    target = np.linalg.solve(root.T, seen.right)
+    found = lsq_linear(root * spread, target, (np.minimum(lowest, -_ROOM), np.maximum(highest, _ROOM)))
+    return np.asarray(found.x * spread)
+
+
+def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
+    """Means by flight, from which gusts average out: residuals (W 12,) and slopes (W 12, unknowns)."""
+    for power, own_power, r, J in zip(powers, fit.power, fit.rows, fit.slopes, strict=True):
+        ratio = np.sqrt(own_power[0] / power[0])
+        mean = r.reshape(r.shape[0], -1, len(CHANNELS))[:, 0] * ratio
+        slope = J.reshape(J.shape[0], -1, len(CHANNELS), J.shape[2])[:, 0] * ratio[:, None]
+        yield mean.ravel(), slope.reshape(-1, J.shape[2])
+
+
+def _seen(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
     """By flight: the instruments' directions, residuals (W, 2 L, 12), slopes (W, 2 L, 12, unknowns), without means."""
     basis, rows, slopes = [], [], []
     for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
@@ -94,23 +153,7 @@ def _equations(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Arra
     return basis, rows, slopes
 
 
-def _solution(fit: Fit, basis: list[dict[int, Array]], rows: list[Array], slopes: list[Array]) -> tuple[Array, Array]:
-    """The step of all unknowns that leaves least of what is coherent, their priors included; its information."""
-    precision, pull = _priors(fit)
-    information, right = np.diag(precision), -precision * pull
-    for U, r, J in zip(basis, rows, slopes, strict=True):
-        for axis, directions in U.items():
-            seen = directions.T @ J[:, :, axis].reshape(-1, J.shape[3])
-            information += seen.T @ seen
-            right += seen.T @ (directions.T @ r[:, :, axis].ravel())
-    for r, J in zip(fit.rows, fit.slopes, strict=True):  # means, from which gusts average out
-        mean = J.reshape(J.shape[0], -1, len(CHANNELS), J.shape[2])[:, 0].reshape(-1, J.shape[2])
-        information += mean.T @ mean
-        right += mean.T @ r.reshape(r.shape[0], -1, len(CHANNELS))[:, 0].ravel()
-    return solve(information, right), information
-
-
-def _priors(fit: Fit) -> tuple[Array, Array]:
+def priors(fit: Fit) -> tuple[Array, Array]:
     """Precision of each unknown's prior, and how far the fit is from the prior's centre."""
     now, spread, _ = fit.stacked
     centre, sigma = prior(fit.views[0].simulator, fit.indices)
@@ -139,14 +182,20 @@ def instruments(view: View) -> tuple[Array, Array]:
 
     And those that owe nothing to gusts of any kind, which are in every reading of the air data; there may be none.
     """
-    (given, free), record = _deliberate(view), view.record
-    columns = [_lagged(given[:, i], lag, view.simulator.step) for i in range(given.shape[1]) for lag in _LAGS]
-    columns += [series for i in range(given.shape[1]) for series in (given[:, i] ** 2, given[:, i] ** 3)]
+    given, record = deliberate(view), view.record
+    if not given.all.size:
+        return np.empty((0, 0)), np.empty((0, 0))
     moved = {n: record[n] - record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
     even = [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
     late = record.time - record.time.mean()  # weather that does not change averages out of what is weighted by time
-    growing = [late * series for series in (*moved.values(), *given.T)]
-    return _standard([*columns, *even, *growing]), _standard(columns if free else [])
+    growing = [late * series for series in (*moved.values(), *given.all.T)]
+    return _standard([*_shaped(view, given.all), *even, *growing]), _standard(_shaped(view, given.steps))
+
+
+def _shaped(view: View, given: Array) -> list[Array]:
+    """Signals (N, m) through lags, and their squares and cubes."""
+    columns = [_lagged(series, lag, view.simulator.step) for series in given.T for lag in _LAGS]
+    return [*columns, *(series**power for series in given.T for power in (2, 3))]
 
 
 def _standard(columns: list[Array]) -> Array:
@@ -156,22 +205,6 @@ def _standard(columns: list[Array]) -> Array:
     table = table - table.mean(axis=0)
     spread = table.std(axis=0)
     return np.asarray(table[:, spread > 1e-12] / spread[spread > 1e-12])
-
-
-def _deliberate(view: View) -> tuple[Array, bool]:
-    """What a pilot or a test program does with the commands (N, m), and whether it is free of gusts.
-
-    Commands that step: their steps, forgotten after some seconds; between them they move with the autopilot, hence with
-    the gusts. Where none steps (a multisine), the commands themselves.
-    """
-    commands = view.commands
-    changes = np.diff(commands, axis=0, prepend=commands[:1])
-    kept = np.where(np.abs(changes) > _STEP * np.median(np.abs(changes), axis=0), changes, 0.0)
-    decay = np.exp(-view.simulator.step / _MEMORY)
-    steps = lfilter([1.0], [1.0, -decay], kept, axis=0)
-    usual = lfilter([1.0], [1.0, -decay], changes, axis=0)
-    stepped = steps.std(axis=0) > _STEPPED * usual.std(axis=0)
-    return (steps[:, stepped], True) if stepped.any() else (commands - commands.mean(axis=0), False)
 
 
 def _lagged(series: Array, lag: float, step: float) -> Array:

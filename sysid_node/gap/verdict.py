@@ -9,6 +9,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.admission import excitation
 from sysid_node.gap.attribute import NOTICED, Attribution, Cause, power_left
+from sysid_node.gap.deliberate import purposeful
 from sysid_node.gap.evidence import Evidence
 from sysid_node.gap.holdout import Check
 from sysid_node.gap.view import View
@@ -42,8 +43,8 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
     """One of gap.json's five words."""
     if max(excitation(view).max() for view in views) < _TELLING:
         return "unsupported"
-    if check.foreseen:
-        return "no_gap"
+    if check.foreseen or not any(purposeful(view) for view in views):
+        return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) else "no_gap"
     if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
@@ -83,8 +84,11 @@ def _motion(evidence: Evidence) -> Array:
 
 
 def probability(attribution: Attribution, cause: Cause) -> float:
-    """Of a cause, less by the share of the structure that is left and no listed effect explains."""
-    return cause.probability * explained(attribution)
+    """Of a cause, less by the share of the structure left where it works, which no listed effect explains."""
+    taken = cause.taken / _motion(attribution.chosen.evidence)
+    whole = taken + _structure_left(attribution)
+    credible = np.divide(taken, whole, out=np.zeros_like(taken), where=taken > 0.0)
+    return cause.probability * float(taken @ credible / taken.sum()) if taken.any() else 0.0
 
 
 def named(cause: Cause) -> list[str]:

@@ -78,6 +78,17 @@ def test_what_c172p_always_has_may_be_named_too() -> None:
     assert not judge(_label("one", {"mass_error": {"error": 0.2}}), _said("explained", inherent, true)).right
 
 
+def test_of_c172p_as_it_is_only_what_it_has_may_be_blamed() -> None:
+    """Its load sits 34 mm to the left; a centre of gravity elsewhere is none of its."""
+    label = _label("none", {}, "c172p")
+    for aside, there in ((-0.036, True), (0.02, False)):
+        shift = ("cg_shift", 0.9, {"x": [0.01, 0.03], "y": [aside, 0.003]}, [])
+        case = judge(label, _said("unknown_effect", shift))
+        assert case.right is there and case.stated == ((0.9, there),)
+    assert judge(label, _said("unknown_effect")).right
+    assert not judge(label, _said("unsupported")).right
+
+
 def test_an_onset_within_the_flight_is_measured() -> None:
     label = _label("one", {"control_effectiveness_loss": {"elevator": 0.5, "onset": 20.0}})
     found = {"elevator": [0.5, 0.02], "onset": [21.5, 0.3]}
