@@ -4,7 +4,10 @@ One process publishes 400 Hz IMU, 100 Hz air data and 100 Hz actuators, another 
 Latency is from the IMU message's header stamp to the estimate's publication, as DDS stamps it, and to its arrival here,
 one DDS hop and one callback later.
 Inputs are interpolated, so a sample waits until air data and actuators of its own time or later have come. Where all
-three are sampled together that takes no time; where they run free it takes up to their period, 10 ms here.
+three are sampled together that takes no time; where they are stamped apart, the freshest sample that is complete is an
+IMU interval old, 2.5 ms here.
+The bare node is what ROS itself takes: an rclpy node that hears the same messages and answers every eighth IMU message
+with an empty message of estimates at once.
 """
 
 import argparse
@@ -23,11 +26,13 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates  # found once sysid_node.ros is there
 
 from sysid_node.ros.conversion import stamp_message, stamp_ns
+from sysid_node.ros.spin import run_program, serve
 
 IMU_RATE, SLOW_EVERY = 400, 4
 PUBLISH_RATE = 50.0
@@ -82,11 +87,36 @@ def deflections(t):
     return JointState(name=["elevator", "aileron", "rudder", "throttle"], position=[*surfaces, 0.5])
 
 
+class BareNode(Node):
+    """Hears what the identifier hears, and answers as often, without doing anything."""
+
+    def __init__(self) -> None:
+        super().__init__("identifier")
+        self.heard = 0
+        self.answers = self.create_publisher(DerivativeEstimates, "~/derivatives", 10)
+        qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.create_subscription(Imu, "imu/data", self.answer, qos)
+        for kind, topic in ((AirData, "air_data"), (JointState, "actuators")):
+            self.create_subscription(kind, topic, lambda message: None, qos)
+
+    def answer(self, message) -> None:
+        """Every eighth message is answered."""
+        self.heard += 1
+        if self.heard % round(IMU_RATE / PUBLISH_RATE) == 0:
+            self.answers.publish(DerivativeEstimates(header=message.header))
+
+
+def run_bare() -> None:
+    """The bare node until it is told to stop."""
+    sys.exit(run_program(lambda: serve(BareNode())))
+
+
 @contextlib.contextmanager
-def identifier() -> Iterator[subprocess.Popen]:
-    """The node, in a process of its own."""
+def started(bare: bool) -> Iterator[subprocess.Popen]:
+    """The identifier, or the bare node, in a process of its own."""
     command = [sys.executable, "-m", "sysid_node.ros.identifier", "--ros-args", "--log-level", "warn"]
-    process = subprocess.Popen([*command, "-p", "aircraft:=cdrw", "-p", f"publish_rate:={PUBLISH_RATE}"])
+    command += ["-p", "aircraft:=cdrw", "-p", f"publish_rate:={PUBLISH_RATE}"]
+    process = subprocess.Popen([sys.executable, __file__, "--bare-node"] if bare else command)
     try:
         yield process
     finally:
@@ -134,31 +164,43 @@ def main() -> None:
     """Measure both kinds of sampling and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--bare-node", action="store_true", help="be the bare node (what the bench starts)")
+    options = parser.parse_args()
+    if options.bare_node:
+        run_bare()
+    seconds = options.seconds
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     rclpy.init()
     print(f"{seconds:g} s of {IMU_RATE} Hz IMU + 100 Hz air data + 100 Hz actuators, estimates at {PUBLISH_RATE:g} Hz")
     print(
-        f"{'sampling':<10}{'sent':>8}{'lost':>6}{'rejected':>10}{'estimates':>11}"
+        f"{'node':<12}{'sampling':<10}{'sent':>8}{'lost':>6}{'rejected':>10}{'estimates':>11}"
         f"{'published: p50 ms':>19}{'p99 ms':>8}{'arrived: p50 ms':>17}{'p99 ms':>8}{'CPU %':>7}"
     )
-    for together in (True, False):
-        node = rclpy.create_node("bench")
-        flight = get_context("spawn").Process(target=publish, args=(seconds, together))
-        with identifier() as process:
-            flight.start()
-            latencies, words, share = listen(node, flight, process.pid)
-        node.destroy_node()
-        ticks = int(seconds * IMU_RATE) + 1
-        sent = ticks + 2 * (1 + (ticks - 1) // SLOW_EVERY)
-        received = sum(int(words[f"{topic}: received"]) for topic in ("imu/data", "air_data", "actuators"))
-        rejected = sum(int(count) for key, count in words.items() if key.startswith("rejected"))
-        (out50, in50), (out99, in99) = 1e-6 * np.percentile(latencies, (50, 99), axis=0)
-        print(
-            f"{'together' if together else 'free':<10}{sent:>8}{sent - received:>6}{rejected:>10}{len(latencies):>11}"
-            f"{out50:>19.2f}{out99:>8.2f}{in50:>17.2f}{in99:>8.2f}{100 * share:>7.1f}"
-        )
+    for bare, together in ((True, True), (False, True), (False, False)):
+        measure(seconds, bare, together)
     rclpy.shutdown()
+
+
+def measure(seconds: float, bare: bool, together: bool) -> None:
+    """One node under one kind of sampling: a line of the table."""
+    node = rclpy.create_node("bench")
+    flight = get_context("spawn").Process(target=publish, args=(seconds, together))
+    with started(bare) as process:
+        flight.start()
+        latencies, words, share = listen(node, flight, process.pid)
+    node.destroy_node()
+    ticks = int(seconds * IMU_RATE) + 1
+    sent, lost, rejected = ticks + 2 * (1 + (ticks - 1) // SLOW_EVERY), "", ""
+    if not bare:
+        received = sum(int(words[f"{topic}: received"]) for topic in ("imu/data", "air_data", "actuators"))
+        lost = str(sent - received)
+        rejected = str(sum(int(count) for key, count in words.items() if key.startswith("rejected")))
+    (out50, in50), (out99, in99) = 1e-6 * np.percentile(latencies, (50, 99), axis=0)
+    print(
+        f"{'bare' if bare else 'identifier':<12}{'together' if together else 'apart':<10}"
+        f"{sent:>8}{lost:>6}{rejected:>10}{len(latencies):>11}"
+        f"{out50:>19.2f}{out99:>8.2f}{in50:>17.2f}{in99:>8.2f}{100 * share:>7.1f}"
+    )
 
 
 if __name__ == "__main__":

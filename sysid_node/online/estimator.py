@@ -3,7 +3,8 @@
 Morelli, "Real-time parameter estimation in the frequency domain", J. Guidance 23(5), 2000, as flown on the CDFP and
 CDRW by Subrahmanyam, Kim & Ghosh. ``init``, then ``update`` with every sample, and ``estimates.estimate`` whenever the
 derivatives are wanted. What changes slowly (the residuals' colour, the segments, the watch for changes) is renewed
-every second or half second of data, see ``renewal``: when the next sample comes, so that no estimate waits for it.
+every second or half second of data, see ``renewal``: when the next sample comes, or before it by ``renew_early``, so
+that no estimate waits for it.
 """
 
 from __future__ import annotations
@@ -101,17 +102,22 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     row, angles = state.model.signals(sample)
     row.insert(DRIFT, time)
     now = state.previous = (time, np.array(row), (*sample[3:6], *angles))
+    renew_early(state)
     if previous is None or time - previous[0] > state.model.settings.max_gap:
         interrupt(state, time)
         return
-    if state.transform.last >= state.renew_at:
-        renew(state)
     gain = state.model.momentum(previous[2], now[2])
     area, slant = over_interval(state.model.layout, time - previous[0], previous[1], now[1], gain)
     transform.add(state.transform, previous[0], time, area, slant)
     state.samples += 1
     state.intervals += sample[INTERVAL]
     state.recent.append(now[1])
+
+
+def renew_early(state: State) -> None:
+    """Renew what is due to be renewed before the next sample; whoever has time before that comes may do it then."""
+    if state.transform.last >= state.renew_at:
+        renew(state)
 
 
 def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[float]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator, reconstruction, signals, transform
 from sysid_node.online.estimates import estimates_at
-from sysid_node.online.renewal import renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
@@ -187,13 +186,12 @@ def _want(results: _Results, stops: deque[tuple[int, float]], begin: int) -> Non
 def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: deque[tuple[int, float]]) -> int:
     """Take in usable samples from ``begin`` to what ends the stretch, at most ``end`` (exclusive), and return that."""
     state = results.state
-    if np.isnan(chunk.begins[begin]):
+    if np.isnan(chunk.begins[begin]) or state.transform.last >= state.renew_at:
         results.finish()
+        estimator.renew_early(state)
+    if np.isnan(chunk.begins[begin]):
         estimator.interrupt(state, float(chunk.time[begin]))
         return begin + 1
-    if state.transform.last >= state.renew_at:
-        results.finish()
-        renew(state)
     # up to and including the sample after which is renewed, short of the next gap
     stop = min(int(np.searchsorted(chunk.time[begin:end], state.renew_at, side="left")) + 1 + begin, end)
     gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))

@@ -120,6 +120,7 @@ class Identifier(CarefulNode):
                 return
             for due in take(self._session, numbers, texts):
                 self._publish(self._session, due)
+            self._session.use_pause()
 
         overrides = QoSOverridingOptions.with_default_policies()
         return self.create_subscription(

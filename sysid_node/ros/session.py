@@ -65,6 +65,10 @@ class Session:
         """How far the flight is from the aircraft file where estimates fell due, before anything else comes."""
         return model_gap(self.state, due.current)
 
+    def use_pause(self) -> None:
+        """Do what would else be done when the next sample comes; called when all that fell due is published."""
+        estimator.renew_early(self.state)
+
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message that cannot be read."""
         intake.refuse(self.intake, topic, reason)
