@@ -4,6 +4,7 @@
 The monitor knows the aircraft from a file whose derivatives are off by draws from their tolerances; `--identified` has
 it know them to 2 %, as from an identifier. Surfaces are commands (`actuators` echoes them): no servo tells its
 position. Missed is what raises no alarm within 15 s, wrongly isolated what 5 s after its alarm is given another name.
+`--power` has faults grow from small to large and counts how many of them are found within which time.
 `--hours 4` flies hours in which nothing fails, half of them with 3-2-1-1s, half with a doublet a minute on each
 surface, and counts alarms. Results are kept in files as they come; those that are there are not flown again.
 """
@@ -130,6 +131,28 @@ CASES = (
 )
 
 
+def _aft(millimetres: float) -> Case:
+    effects = {"cg_shift": {"x": -1e-3 * millimetres}}
+    return Case(f"CG {millimetres:g} mm aft", (DAMAGE,), "longitudinal", effects=effects)
+
+
+def _undamped(share: float) -> Case:
+    return Case(
+        f"pitch damping {100 * share:.0f} % less", (DAMAGE,), "longitudinal", effects=_changed(Cm_q=1.0 - share)
+    )
+
+
+#: Each fault from hardly to easily found.
+GROWING = (
+    *(_lost("elevator", share) for share in (0.1, 0.2, 0.3, 0.4)),
+    *(_lost("aileron", share) for share in (0.1, 0.2, 0.3, 0.45, 0.6)),
+    *(_vane("beta", degrees) for degrees in (0.5, 1.0, 2.0, 3.0)),
+    *(_aft(millimetres) for millimetres in (5.0, 10.0, 20.0, 30.0)),
+    *(_undamped(share) for share in (0.25, 0.5, 0.75)),
+)
+WITHIN = (5.0, 15.0, 40.0)  # s
+
+
 def believed(seed: int) -> Aircraft:
     """The aircraft file, off by draws from its tolerances."""
     random = np.random.default_rng(1000 + seed)
@@ -176,9 +199,9 @@ def watch(state: State, time: Array, samples: Array, onset: float) -> Seen:
     return Seen(early, found - onset, named)
 
 
-def row(case: Case, turbulence: str, flights: int, identified: bool) -> list[str]:
-    """One line of the table."""
-    setting = Setting("", turbulence, seconds=END, later=case.effects, onset=ONSET)
+def watched(case: Case, turbulence: str, flights: int, identified: bool, end: float = END) -> list[Seen]:
+    """What the monitor sees in flights of ``end`` s."""
+    setting = Setting("", turbulence, seconds=end, later=case.effects, onset=ONSET)
     if not case.effects:
         setting = replace(setting, onset=math.inf)
     seeds = range(1, flights + 1)
@@ -189,6 +212,29 @@ def row(case: Case, turbulence: str, flights: int, identified: bool) -> list[str
             first = int(np.searchsorted(batch.time, ONSET))
             case.broken(samples[first:], samples[first - 1], np.random.default_rng(seed))
         seen.append(watch(monitored(seed, identified), batch.time, samples, ONSET))
+    return seen
+
+
+def power(flights: int, identified: bool, results: Path) -> str:
+    """How many faults of which size are found within which time."""
+    rows = _kept(results)
+    done = {one[0] for one in rows}
+    for case in GROWING:
+        if case.name in done:
+            continue
+        cells = [case.name]
+        for turbulence in BOUNDS:
+            seen = watched(case, turbulence, flights, identified, ONSET + WITHIN[-1])
+            cells += [str(sum(one.after <= within for one in seen)) for within in WITHIN]
+        rows.append(cells)
+        _keep(results, cells)
+    heads = [f"{turbulence}: {within:g} s" for turbulence in BOUNDS for within in WITHIN]
+    return table((f"found of {flights} within; turbulence", *heads), rows)
+
+
+def row(case: Case, turbulence: str, flights: int, identified: bool) -> list[str]:
+    """One line of the table."""
+    seen = watched(case, turbulence, flights, identified)
     found = [one for one in seen if math.isfinite(one.after)]
     right = [one.fault for one in found if one.fault and one.fault.kind in case.kinds and one.fault.part == case.part]
     after = sorted(one.after for one in found)
@@ -274,6 +320,7 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=10, help="of each fault and turbulence (default: 10)")
     parser.add_argument("--identified", action="store_true", help="derivatives known to 2 %% instead")
     parser.add_argument("--hours", type=float, default=0.0, help="fly so many in each turbulence without a fault")
+    parser.add_argument("--power", action="store_true", help="count what is found by size and time instead")
     parser.add_argument("--results", type=Path, default=Path("out/faults"), help="folder (default: out/faults)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
@@ -282,6 +329,10 @@ def main() -> None:
         return
     mode = " --identified" if args.identified else ""
     results = args.results / f"faults{mode.replace(' --', '_')}_{args.flights}.jsonl"
+    if args.power:
+        results = args.results / f"power{mode.replace(' --', '_')}_{args.flights}.jsonl"
+        publish(f"bench/faults.py --power{mode}", power(args.flights, args.identified, results), args.page)
+        return
     publish(f"bench/faults.py{mode}", faults(args.flights, args.identified, results), args.page)
 
 

@@ -123,7 +123,6 @@ class Loop:
             while time.monotonic() < min(begun + 0.1, end):
                 self.executor.spin_once(timeout_sec=0.002)
                 self.relay.flush()
-            self.watch.listen(0.001)
 
     def hear(self, message: Any) -> None:
         """Keep what nodes say of themselves."""
@@ -159,7 +158,7 @@ def flying() -> Iterator[Loop]:
     executor = EventsExecutor()
     executor.add_node(node)
     logs = Path(tempfile.mkdtemp(prefix="loop_stress_"))
-    loop = Loop(LoopWatch(), Relay(node), executor, logs)
+    loop = Loop(LoopWatch(executor), Relay(node), executor, logs)
     node.create_subscription(DiagnosticArray, "/diagnostics", loop.hear, 100)
     try:
         for name in NODES:

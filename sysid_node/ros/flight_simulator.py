@@ -23,6 +23,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.ros.conversion import NANOSECONDS, header, stamp_message
 from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
 from sysid_node.ros.monitor import Durations
+from sysid_node.ros.pace import Pace
 from sysid_node.ros.parameters import Parameter
 from sysid_node.ros.spin import run_program, serve
 from sysid_node.sim import Simulator, live, trim_flight
@@ -69,7 +70,6 @@ PARAMETERS = (
 )
 COMMAND_AGE = 0.2  # s without a command that are told
 LIVE = frozenset({"effects"})
-MOST_BEHIND = 0.5  # s of flight; what is late beyond it is not flown
 POSE_EVERY = 10  # samples
 ENU_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
@@ -87,13 +87,13 @@ class FlightSimulator(LoopNode):
         self._flight = live.start(self._simulator, self._trim, air, theta)
         self._command: list[float] = self._trim.command.tolist()
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
-        self._steps, self._skipped, self._commands, self._refused = Durations(), 0.0, 0, 0
+        self._steps, self._commands, self._refused = Durations(), 0, 0
         self._told = 0.0  # s not flown that were told
         self._commanded = -math.inf  # s, monotonic, when the last command came
         self._open_topics()
         live.step(self._simulator, self._flight, self._command)  # compiles
         self._start_ns = self.get_clock().now().nanoseconds if values["speed"] == 1.0 else time.time_ns()
-        self._begun, self._behind = time.monotonic(), 0.0
+        self._pace = Pace(time.monotonic(), self._simulator.step, values["speed"])
         self.every(0.5 / (values["rate"] * values["speed"]), self._on_time)
         self.get_logger().info(f"flies {self.aircraft.name!r} at {values['rate']:g} Hz")
 
@@ -123,9 +123,9 @@ class FlightSimulator(LoopNode):
             "step p99 (us)": 1e6 * p99,
             "commands": self._commands,
             "commands refused": self._refused,
-            "not flown (s)": self._skipped,
+            "not flown (s)": self._pace.skipped,
         }
-        skipped, self._told = self._skipped - self._told, self._skipped
+        skipped, self._told = self._pace.skipped - self._told, self._pace.skipped
         troubles = [f"{skipped:.1f} s were not flown, the machine is too slow"] if skipped else []
         silence = time.monotonic() - self._commanded
         if self._commands and silence > COMMAND_AGE:
@@ -144,12 +144,7 @@ class FlightSimulator(LoopNode):
 
     def _on_time(self) -> None:
         """Fly what is due."""
-        due = (time.monotonic() - self._begun) * self.values["speed"] - self._behind
-        late = due - self._flight.samples * self._simulator.step
-        if late > MOST_BEHIND:
-            self._behind, self._skipped = self._behind + late, self._skipped + late
-            return
-        while self._flight.samples * self._simulator.step < due:
+        for _ in range(self._pace.due(time.monotonic(), self._flight.samples)):
             start = time.perf_counter()
             self._publish(live.step(self._simulator, self._flight, self._command))
             self._steps.add(time.perf_counter() - start)

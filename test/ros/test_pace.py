@@ -1,0 +1,53 @@
+"""How many samples are due, by clocks that the test sets."""
+
+import pytest
+
+from sysid_node.ros.pace import AT_ONCE, MOST_BEHIND, Pace
+
+STEP = 0.005
+
+
+def flown(pace: Pace, samples: int, begin: float, end: float, every: float = 0.0025) -> tuple[int, int]:
+    """Calls from ``begin`` to ``end`` (s): samples in all, and the most of one call."""
+    most = 0
+    for k in range(round((end - begin) / every) + 1):
+        due = pace.due(begin + k * every, samples)
+        samples, most = samples + due, max(most, due)
+    return samples, most
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0, 0.5])
+def test_on_time_it_flies_as_fast_as_it_should(speed: float) -> None:
+    pace = Pace(100.0, STEP, speed)
+    samples, most = flown(pace, 0, 100.0, 110.0)
+    assert samples == pytest.approx(10.0 * speed / STEP, abs=1)
+    assert most <= 2
+    assert pace.skipped == 0.0
+
+
+def test_a_short_pause_is_made_up_for_in_small_pieces() -> None:
+    pace = Pace(0.0, STEP)
+    samples, _ = flown(pace, 0, 0.0, 1.0)
+    later, most = flown(pace, samples, 1.0 + 0.8 * MOST_BEHIND, 2.0)
+    assert later == pytest.approx(2.0 / STEP, abs=1)
+    assert most == round(AT_ONCE / STEP)
+    assert pace.skipped == 0.0
+
+
+def test_of_a_long_pause_the_rest_is_not_flown() -> None:
+    """Never more than some samples blindly, however long it was away."""
+    pace = Pace(0.0, STEP)
+    samples, _ = flown(pace, 0, 0.0, 1.0)
+    later, most = flown(pace, samples, 4.0, 5.0)
+    assert most == round(AT_ONCE / STEP)
+    assert pace.skipped == pytest.approx(3.0 - MOST_BEHIND, abs=2 * STEP)
+    assert later == pytest.approx((5.0 - pace.skipped) / STEP, abs=1)
+
+
+def test_a_machine_that_is_always_too_slow_flies_slower() -> None:
+    """It gets to look ten times a second: five times as long is needed, and nothing is late for ever."""
+    pace = Pace(0.0, STEP)
+    samples, most = flown(pace, 0, 0.0, 10.0, every=0.1)
+    assert most == round(AT_ONCE / STEP)
+    assert samples == pytest.approx(0.2 * 10.0 / STEP, rel=0.05)
+    assert pace.skipped == pytest.approx(8.0, abs=0.3)
