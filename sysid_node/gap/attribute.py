@@ -279,14 +279,15 @@ def _likelier(trial: Trial, other: Trial) -> bool:
 def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter.
 
-    In gusts it must do so by what the commands foretell: a gust can fake all else.
+    Also of what the commands foretell, having been picked from so many: gusts can fake the rest, and where the model is
+    not exact every manoeuvre repeats the last one's error.
     """
     if _trifling(trial) or not _likelier(trial, without):
         return False
     matters = _matters_in_gusts(without, trial) if _in_gusts(trial) else _matters(without, trial)
     if not np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)):
         return False
-    return not _in_gusts(trial) or advantage(trial.fit, without.fit) > _SURELY + _MANY
+    return advantage(trial.fit, without.fit) > _SURELY + _MANY
 
 
 def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
@@ -449,12 +450,10 @@ def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
 def _shares(sets: Sequence[Trial], others: Sequence[Trial]) -> Array:
     """Probabilities of sets of effects that hold a cause, then of others that do not.
 
-    In gusts the others are as probable as they are by prediction or by what the commands foretell, whichever is more,
-    but no more than the best of the sets: what either cannot exclude is not excluded.
+    The others are as probable as they are by prediction or by what the commands foretell, whichever is more, but no
+    more than the best of the sets: what either cannot exclude is not excluded.
     """
     shares = probabilities([t.evidence.scores for t in (*sets, *others)])
-    if not _in_gusts(sets[0]):
-        return shares
     best = sets[int(np.argmax(shares[: len(sets)]))]
     ahead = np.array([advantage(best.fit, t.fit) for t in others])
     most = shares[: len(sets)].max()

@@ -12,18 +12,26 @@ from __future__ import annotations
 
 import numpy as np
 
+from sysid_node.flight.record import Array
 from sysid_node.gap.fit import Fit
-from sysid_node.gap.structure import equations, priors, within_limits
+from sysid_node.gap.structure import equations, priors, structure_of, within_limits
 
 
 def advantage(fit: Fit, other: Fit) -> float:
-    """Nats by which a fit accounts better than another for what commands foretell, in the noise that it leaves."""
-    return _evidence(fit, fit) - _evidence(other, fit)
+    """Nats by which a fit accounts better than another for what commands foretell, in the noise that it leaves.
+
+    What stays beyond chance counts as noise by channel: a model that is not exact knows no better than it predicts
+    (quasi-likelihood: Burnham & Anderson (2002), Model Selection, sect. 2.5).
+    """
+    left = structure_of(fit)
+    scatter = 1.0 + left.coherent / (0.5 * left.chance**2)
+    powers = tuple(power * scatter for power in fit.power)
+    return _evidence(fit, powers) - _evidence(other, powers)
 
 
-def _evidence(fit: Fit, like: Fit) -> float:
-    """Log evidence, up to a constant, in the noise levels of ``like``."""
-    seen = equations(fit, like.power, readings=True)
+def _evidence(fit: Fit, powers: tuple[Array, ...]) -> float:
+    """Log evidence, up to a constant, in noise of these powers (L, 12) by flight."""
+    seen = equations(fit, powers, commanded=True)
     step = within_limits(seen, fit)
     squares = seen.constant - 2.0 * float(seen.right @ step) + float(step @ seen.information @ step)
     precision, _ = priors(fit)

@@ -93,21 +93,21 @@ class Equations:
     constant: float
 
 
-def equations(fit: Fit, powers: tuple[Array, ...], *, readings: bool = False) -> Equations:
+def equations(fit: Fit, powers: tuple[Array, ...], *, commanded: bool = False) -> Equations:
     """Those of a fit about where it stands, in noise of these powers (L, 12) by flight.
 
-    ``readings``: with all of air data and attitude, not only what the instruments see of them.
+    ``commanded``: of forces and moments with the commands alone for instruments, and with all of air data and attitude.
     """
-    basis, rows, slopes = _seen(fit, powers)
+    basis, rows, slopes = _seen(fit, powers, commanded=commanded)
     precision, pull = priors(fit)
     information, right, constant = np.diag(precision), -precision * pull, float(precision @ pull**2)
     parts = [
         (directions.T @ r[:, :, axis].ravel(), directions.T @ J[:, :, axis].reshape(-1, J.shape[3]))
         for U, r, J in zip(basis, rows, slopes, strict=True)
         for axis, directions in U.items()
-        if axis < len(COEFFICIENTS) or not readings
+        if axis < len(COEFFICIENTS) or not commanded
     ]
-    if readings:
+    if commanded:
         kept = [(r[:, :, len(COEFFICIENTS) :], J[:, :, len(COEFFICIENTS) :]) for r, J in zip(rows, slopes, strict=True)]
         parts += [(r.ravel(), J.reshape(-1, J.shape[3])) for r, J in kept]
     for series, seen in [*parts, *_means(fit, powers)]:
@@ -139,7 +139,9 @@ def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]
         yield mean.ravel(), slope.reshape(-1, J.shape[2])
 
 
-def _seen(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
+def _seen(
+    fit: Fit, powers: tuple[Array, ...], *, commanded: bool
+) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
     """By flight: the instruments' directions, residuals (W, 2 L, 12), slopes (W, 2 L, 12, unknowns), without means."""
     basis, rows, slopes = [], [], []
     for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
@@ -149,7 +151,7 @@ def _seen(fit: Fit, powers: tuple[Array, ...]) -> tuple[list[dict[int, Array]], 
         ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
         rows.append((r * ratio).reshape(r.shape[0], -1, len(CHANNELS)))
         slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2]))
-        basis.append(_basis(view, weight))
+        basis.append(_basis(view, weight, commanded=commanded))
     return basis, rows, slopes
 
 
@@ -160,9 +162,9 @@ def priors(fit: Fit) -> tuple[Array, Array]:
     return np.concatenate([sigma, spread]) ** -2.0, np.concatenate([fit.values - centre, now])
 
 
-def _basis(view: View, weight: Array) -> dict[int, Array]:
+def _basis(view: View, weight: Array, *, commanded: bool) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by coefficient that was measured."""
-    of_forces, of_readings = instruments(view)
+    of_forces, of_readings = instruments(view, commanded=commanded)
     found = {}
     for axis in np.flatnonzero(view.axes):
         table = of_forces if axis < len(COEFFICIENTS) else of_readings
@@ -177,19 +179,23 @@ def _basis(view: View, weight: Array) -> dict[int, Array]:
     return found
 
 
-def instruments(view: View) -> tuple[Array, Array]:
+def instruments(view: View, *, commanded: bool = False) -> tuple[Array, Array]:
     """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread.
 
     And those that owe nothing to gusts of any kind, which are in every reading of the air data; there may be none.
+    ``commanded``: the first of commands alone. What holds the motion owes nothing to gusts on average, but what the air
+    does in one flight is coherent with it.
     """
     given, record = deliberate(view), view.record
     if not given.all.size:
         return np.empty((0, 0)), np.empty((0, 0))
-    moved = {n: record[n] - record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
-    even = [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
     late = record.time - record.time.mean()  # weather that does not change averages out of what is weighted by time
-    growing = [late * series for series in (*moved.values(), *given.all.T)]
-    return _standard([*_shaped(view, given.all), *even, *growing]), _standard(_shaped(view, given.steps))
+    columns = [*_shaped(view, given.all), *(late * series for series in given.all.T)]
+    if not commanded:
+        moved = {n: record[n] - record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
+        columns += [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
+        columns += [late * series for series in moved.values()]
+    return _standard(columns), _standard(_shaped(view, given.steps))
 
 
 def _shaped(view: View, given: Array) -> list[Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.admission import excitation
@@ -47,7 +48,7 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
         return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) else "no_gap"
-    if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
+    if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED or unexplained(attribution):
         return "unknown_effect"
     if check.flown is not None and check.flown.ci95[1] < _CLOSED:
         return "unknown_effect"  # most of what the simulator is off by remains, whatever was found
@@ -57,8 +58,21 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
 
 def structured(attribution: Attribution) -> bool:
     """Whether what is left holds structure that matters."""
+    return bool(_structured(attribution).any())
+
+
+def unexplained(attribution: Attribution) -> bool:
+    """Whether on some channel structure that matters is left, and more of it than all causes take away there."""
+    more = _structure_left(attribution) > sum(cause.taken for cause in attribution.causes) / _motion(
+        attribution.chosen.evidence
+    )
+    return bool(np.any(_structured(attribution) & more))
+
+
+def _structured(attribution: Attribution) -> NDArray[np.bool_]:
+    """Channels (12,) on which structure that matters is left."""
     left, size = attribution.left, np.sqrt(_structure_left(attribution))
-    return bool(np.any((left.deviations > _DEVIATIONS) & (size > NOTICED)))
+    return np.asarray((left.deviations > _DEVIATIONS) & (size > NOTICED))
 
 
 def explained(attribution: Attribution) -> float:
