@@ -16,12 +16,12 @@ the generalised likelihood ratio of Willsky & Jones (IEEE Trans. Automatic Contr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Weighed:
 
 def marginal(J: Array, v: Array, precision: Array) -> tuple[Array, Array]:
     """J' and v' of the module's text; ``precision`` (D, D) is P^-1."""
-    solved = cho_solve(cho_factor(J + precision), np.column_stack([J, v]))
+    solved = np.linalg.solve(J + precision, np.column_stack([J, v]))
     return J - J @ solved[:, :-1], v - J @ solved[:, -1]
 
 
@@ -64,6 +64,9 @@ def weigh(J: Array, v: Array, shift: Shift, excess: float = 1.0) -> Weighed:
     return Weighed(factor, size, covariance)
 
 
+_IMPOSSIBLE = Weighed(-math.inf, np.empty(0), np.empty((0, 0)))
+
+
 class Shifts:
     """Many shifts: ``each``, and side by side those with one free direction, which can be weighed at once."""
 
@@ -74,11 +77,25 @@ class Shifts:
         self.several = [i for i, shift in enumerate(shifts) if shift.spread.size > 1]
         self.fixed = np.column_stack([shifts[i].fixed for i in single])  # (D, n)
         self.free = np.column_stack([shifts[i].free[:, 0] for i in single])  # (D, n)
+        self.freedom = np.array([shift.spread.size for shift in shifts])  # (H,)
         self.prior = np.array([shifts[i].spread[0] for i in single]) ** -2  # (n,)
 
 
-def weigh_each(J: Array, v: Array, shifts: Shifts, excess: Array) -> list[Weighed]:
-    """``weigh`` for many shifts, each by its own ``excess`` (H,)."""
+def most(shifts: Shifts, squares: Array, excess: Array) -> Array:
+    """(H,) what the factors of shifts without a fixed part cannot exceed, by their ``score_squares`` (H,).
+
+    The likelihood's own maximum, without the price for freedom.
+    """
+    return np.asarray(0.5 * shifts.freedom * squares / excess)
+
+
+def weigh_each(
+    J: Array, v: Array, shifts: Shifts, excess: Array, worth: NDArray[np.bool_] | None = None
+) -> list[Weighed]:
+    """``weigh`` for many shifts, each by its own ``excess`` (H,).
+
+    Those with several free directions are only weighed where it is ``worth`` it (H,), else taken for impossible.
+    """
     share = 1.0 / excess[shifts.single]
     JS = J @ shifts.fixed
     G = (shifts.free * (J @ shifts.free)).sum(axis=0) * share + shifts.prior
@@ -87,7 +104,9 @@ def weigh_each(J: Array, v: Array, shifts: Shifts, excess: Array) -> list[Weighe
     factor += 0.5 * g * g / G - 0.5 * np.log(G / shifts.prior)
     rows = zip(shifts.single.tolist(), factor.tolist(), (g / G)[:, None], (1.0 / G)[:, None, None], strict=True)
     found = {i: Weighed(f, size, covariance) for i, f, size, covariance in rows}
-    found |= {i: weigh(J, v, shifts.each[i], float(excess[i])) for i in shifts.several}
+    for i in shifts.several:
+        wanted = worth is None or worth[i]
+        found[i] = weigh(J, v, shifts.each[i], float(excess[i])) if wanted else _IMPOSSIBLE
     return [found[i] for i in range(len(shifts.each))]
 
 

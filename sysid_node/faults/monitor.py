@@ -35,6 +35,7 @@ from sysid_node.faults.weighing import (
     Stretch,
     excess,
     explained,
+    promising,
     statistics,
     stretch,
     stretches,
@@ -200,24 +201,24 @@ def _rebuild(state: State) -> None:
 def _watch(state: State) -> None:
     """Look for a fault in the spans that are due."""
     new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses)))
-    threshold = state.settings.threshold
     for row, span in enumerate(SPANS):
         if state.count % max(span // EVERY, 1) or span > len(state.pieces):
             continue
         over = stretch(state, span)
         usual = state.usual[-span - 1][row] if span < len(state.usual) else new[row]
-        factors = _proven(state, over, usual, threshold)
-        if factors > threshold:
+        squares = statistics(state, over)
+        if _proven(state, over, usual, squares) > state.settings.threshold:
             _alarm(state, over, usual)
             return
         share = max(span // EVERY, 1) * PERIOD / USUAL
-        new[row] += share * (np.minimum(statistics(state, over), OUTLIER) - new[row])
+        new[row] += share * (np.minimum(squares, OUTLIER) - new[row])
     state.usual.append(new)
 
 
-def _proven(state: State, over: Stretch, usual: Array, threshold: float) -> float:
+def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
     """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
-    found = weights(state, over, usual)
+    threshold = state.settings.threshold
+    found = promising(state, over, usual, squares, threshold)
     best = max(stuck_vanes(state, over).values(), default=0.0) if len(over.pieces) >= PATIENT else 0.0
     for place, weighed in enumerate(found):
         if weighed.factor > threshold:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import colour
-from sysid_node.faults.evidence import Shifts, Weighed, marginal, score_squares, weigh_each, weigh_loosely
+from sysid_node.faults.evidence import Shifts, Weighed, marginal, most, score_squares, weigh_each, weigh_loosely
 from sysid_node.faults.state import Piece, State
 from sysid_node.faults.vanes import stuck_factor
 from sysid_node.online.signals import OFFSET
@@ -24,6 +24,7 @@ VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index(
 
 
 LOOSE = 0.1  # share by which a fault may differ from its hypothesis
+MARGIN = 1.0  # of a logarithm, for the statistics' rounding
 LAST_RESORT = 0.1  # share by which damage of a whole axis, which can explain all, must explain more than what is simple
 
 
@@ -83,6 +84,13 @@ def statistics(state: State, over: Stretch) -> Array:
 def weights(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     """Each hypothesis; ``usual`` (H,) is the size of its statistic where nothing has failed."""
     return weigh_each(over.J, over.v, _shifts(state), np.maximum(usual, 1.0))
+
+
+def promising(state: State, over: Stretch, usual: Array, squares: Array, least: float) -> list[Weighed]:
+    """As ``weights``, where only factors beyond ``least`` matter; ``squares`` (H,) are the stretch's statistics."""
+    usual = np.maximum(usual, 1.0)
+    worth = most(_shifts(state), squares, usual) > least - MARGIN
+    return weigh_each(over.J, over.v, _shifts(state), usual, worth)
 
 
 def _shifts(state: State) -> Shifts:

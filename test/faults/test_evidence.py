@@ -52,6 +52,20 @@ def test_many_at_once_are_each_by_itself() -> None:
         np.testing.assert_allclose(one.covariance, alone.covariance, rtol=1e-9)
 
 
+def test_what_is_not_worth_it_could_not_have_reached_it() -> None:
+    """No factor exceeds what is told of it beforehand; what is left out is said to be impossible."""
+    for size in (0.1, 1.0, 5.0):
+        y = X @ (size * RANDOM.standard_normal(D)) + RANDOM.standard_normal(N)
+        J, v = evidence.marginal(*summed(y), np.linalg.inv(P))
+        excess = RANDOM.uniform(1.0, 3.0, 3)
+        found = evidence.weigh_each(J, v, SHIFTS, excess)
+        bound = evidence.most(SHIFTS, evidence.score_squares(J, v, SHIFTS), excess)
+        for i in (0, 2):  # those without a fixed part
+            assert found[i].factor <= bound[i] * (1.0 + 1e-5) + 1e-9
+        some = evidence.weigh_each(J, v, SHIFTS, excess, np.array([False, False, False]))
+        assert [one.factor for one in some] == [found[0].factor, found[1].factor, -np.inf]
+
+
 def test_without_a_fault_factors_are_as_rare_as_markov_says() -> None:
     """20,000 stretches: a factor beyond K comes with a chance of at most 1/K; the score's mean square is 1."""
     root = np.linalg.cholesky(P)
