@@ -27,7 +27,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.apart import make_folder, own_domain
 from sysid_node.errors import InputError
-from sysid_node.report.loop import Episode, write_loop
+from sysid_node.report.loop import Episode, Event, write_loop
 
 if TYPE_CHECKING:
     from sysid_node.ros.loop_watch import LoopWatch
@@ -104,8 +104,11 @@ def _fly(plan: Plan) -> Episode:
         rclpy.try_shutdown()
     times = [time for time, _ in watch.tracking]
     errors = {axis: [row[f"{axis} error"] for _, row in watch.tracking] for axis in ("pitch", "roll", "sideslip")}
+    asked = {axis: [row[axis] for _, row in watch.tracking] for axis in ("pitch", "roll")}
     estimates = dict(watch.estimates.derivatives) if watch.estimates else {}
-    return Episode(plan.aircraft.name, plan.fail, ONSET, plan.adapt, times, errors, estimates, events)
+    return Episode(
+        plan.aircraft.name, plan.fail, ONSET, plan.adapt, times, errors, asked, estimates, events, watch.troubles()
+    )
 
 
 def _check_effects(plan: Plan) -> None:
@@ -141,10 +144,11 @@ def _node(plan: Plan, name: str) -> Iterator[subprocess.Popen[bytes]]:
         raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
 
 
-def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[tuple[float, str]]:
+def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[Event]:
     """Ask for set-points, begin excitation, let something fail, show it all; returns what happened when."""
-    console, seen = Console(), ""
-    events: list[tuple[float, str]] = []
+    console = Console()
+    events: list[Event] = []
+    news: dict[str, str] = {}
     waited, excite_at = 0.0, EXCITE_AT
     with Live(console=console, auto_refresh=False) as live:
         while watch.time < plan.seconds and all(process.poll() is None for process in processes):
@@ -154,10 +158,10 @@ def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[by
                 if waited > START_UP:
                     raise RuntimeError(f"no command came within {START_UP:g} s; the logs in {plan.out} may say why")
             watch.ask_for(set_points(watch.time))
-            done = [text for _, text in events]
+            done = [event.text for event in events]
             if watch.time >= excite_at:
                 watch.excite()
-                events.append((watch.time, "excitation asked for"))
+                events.append(Event(watch.time, "loop", "excitation asked for"))
                 excite_at = math.inf
             if excite_at == math.inf and watch.value("exciter", "last event").startswith("aborted"):
                 excite_at = watch.time + PAUSE
@@ -165,11 +169,11 @@ def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[by
                 refused = watch.set_effects(_effects(plan, failed=True))
                 if refused:
                     raise InputError(f"--fail {plan.fail}: {refused}")
-                events.append((watch.time, plan.fail))
-            said = f"{watch.said('adaptive_controller')}; exciter: {watch.value('exciter', 'last event')}"
-            if said != seen:
-                seen = said
-                events.append((watch.time, said))
+                events.append(Event(watch.time, "loop", plan.fail))
+            events += [
+                Event(watch.time, node, text) for node, text in watch.news().items() if text and text != news.get(node)
+            ]
+            news |= watch.news()
             live.update(_picture(plan, watch), refresh=True)
     console.print()
     return events
@@ -218,4 +222,5 @@ def _summary(plan: Plan, episode: Episode) -> str:
     for name, start, stop in episode.spans(SETTLED):
         errors = (math.degrees(episode.rms(axis, start, stop)) for axis in ("pitch", "roll"))
         lines.append(f"  {name}: " + ", ".join(f"{error:.2f} deg" for error in errors))
+    lines += [f"  fault said at {alarm.time:.1f} s: {alarm.text}" for alarm in episode.alarms]
     return "\n".join([*lines, f"report: {plan.out / 'report.html'}"])

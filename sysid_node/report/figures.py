@@ -98,6 +98,12 @@ def moment(time: float, colour: str = INK) -> dict[str, Any]:
     return {**position, "line": {"color": colour, "dash": "dot", "width": 1.2}}
 
 
+def stretch(begin: float, end: float, colour: str = GREY_BAND) -> dict[str, Any]:
+    """The background between two times (s)."""
+    position = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": begin, "x1": end}
+    return {**position, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
+
+
 def axis(title: str, **more: Any) -> dict[str, Any]:
     """An axis with its quantity and unit."""
     return {**_AXIS, "title": {"text": title, "standoff": 6, "font": {"size": 12}}, **more}

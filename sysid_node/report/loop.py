@@ -6,19 +6,30 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sysid_node.online.types import DerivativeEstimate
-from sysid_node.report.figures import BLUE, Figure, line
+from sysid_node.report.figures import BLUE, MUTED, VERMILION, Figure, line, moment, stretch
+from sysid_node.report.figures import axis as axis_of
 from sysid_node.report.page import render_page
 from sysid_node.report.sections import Section
+
+EXCITER, FAULT_MONITOR = "exciter", "fault_monitor"
+
+
+class Event(NamedTuple):
+    """Who said what, and when (s of the flight)."""
+
+    time: float
+    node: str
+    text: str
 
 
 @dataclass(frozen=True)
 class Episode:
-    """A flight in closed loop; times in s of the flight, errors in rad."""
+    """A flight in closed loop; times in s of the flight, angles in rad."""
 
     aircraft: str
     failure: str  # the effect that set in; "" = none
@@ -26,8 +37,10 @@ class Episode:
     adapted: bool
     time: Sequence[float]
     errors: Mapping[str, Sequence[float]]  # pitch, roll, sideslip from what was asked for
+    asked: Mapping[str, Sequence[float]]  # pitch, roll
     estimates: Mapping[str, DerivativeEstimate]
-    events: Sequence[tuple[float, str]]
+    events: Sequence[Event]
+    troubles: Mapping[str, int]  # by topic: how often its messages were late, lost or silent
 
     def rms(self, axis: str, start: float, stop: float) -> float:
         """Of an error between two times, rad; NaN where there is none."""
@@ -57,7 +70,7 @@ class Episode:
             name: {"value": _known(d.value), "lower": _known(d.lower), "upper": _known(d.upper), "status": d.status}
             for name, d in self.estimates.items()
         }
-        events = [{"time": time, "what": text} for time, text in self.events]
+        events = [{"time": event.time, "node": event.node, "what": event.text} for event in self.events]
         return {
             "aircraft": self.aircraft,
             "failure": self.failure,
@@ -65,7 +78,27 @@ class Episode:
             "tracking_error": parts,
             "derivatives": derivatives,
             "events": events,
+            "message_troubles": dict(self.troubles),
         }
+
+    @property
+    def excited(self) -> list[tuple[float, float]]:
+        """Spans (s) in which the exciter moved the surfaces."""
+        spans, begun = [], math.nan
+        for event in self.events:
+            if event.node != EXCITER:
+                continue
+            if event.text.startswith("begun"):
+                begun = event.time
+            elif event.text.startswith(("known", "aborted", "stopped")) and math.isfinite(begun):
+                spans.append((begun, event.time))
+                begun = math.nan
+        return [*spans, (begun, self.time[-1])] if math.isfinite(begun) and self.time else spans
+
+    @property
+    def alarms(self) -> list[Event]:
+        """Where the fault monitor began to speak of a fault."""
+        return [event for event in self.events if event.node == FAULT_MONITOR and ": " in event.text]
 
 
 def write_loop(folder: Path, episode: Episode) -> None:
@@ -75,20 +108,37 @@ def write_loop(folder: Path, episode: Episode) -> None:
 
 
 def _context(episode: Episode) -> dict[str, Any]:
-    time = np.asarray(episode.time, dtype=float)
-    thin = max(time.size // 3000, 1)
-    figures = [
-        Figure(
-            f"{axis} error, deg",
-            [line(time[::thin], np.rad2deg(np.asarray(errors, dtype=float)[::thin]), axis, colour=BLUE)],
-        )
-        for axis, errors in episode.errors.items()
-    ]
+    flown = [_flown(episode, axis) for axis in episode.asked]
+    errors = [_figure(episode, f"{axis} error, deg", [(axis, values, BLUE)]) for axis, values in episode.errors.items()]
     rows = [
         (name, [math.degrees(episode.rms(axis, start, stop)) for axis in episode.errors])
         for name, start, stop in episode.spans(10.0)
     ]
-    return {"episode": episode, "figures": figures, "rows": rows, "axes": list(episode.errors)}
+    return {"episode": episode, "figures": [*flown, *errors], "rows": rows, "axes": list(episode.errors)}
+
+
+def _flown(episode: Episode, axis: str) -> Figure:
+    """What was asked for and what was flown."""
+    asked = np.asarray(episode.asked[axis], dtype=float)
+    flown = asked + np.asarray(episode.errors[axis], dtype=float)
+    return _figure(
+        episode, f"{axis} flown, and asked for in grey, deg", [("flown", flown, BLUE), ("asked", asked, MUTED)]
+    )
+
+
+def _figure(episode: Episode, label: str, curves: Sequence[tuple[str, Any, str]]) -> Figure:
+    """Angles (rad) over time; with excitation, failure and alarms."""
+    time = np.asarray(episode.time, dtype=float)
+    thin = max(time.size // 3000, 1)
+    lines = [
+        line(time[::thin], np.rad2deg(np.asarray(values, dtype=float)[::thin]), name, colour=colour)
+        for name, values, colour in curves
+    ]
+    shapes = [stretch(start, stop) for start, stop in episode.excited]
+    if episode.failure and time.size and time[-1] > episode.onset:
+        shapes.append(moment(episode.onset))
+    shapes += [moment(alarm.time, VERMILION) for alarm in episode.alarms]
+    return Figure(label, lines, {"shapes": shapes, "xaxis": axis_of("time, s")}, height=200)
 
 
 def _known(value: float) -> float | None:

@@ -150,12 +150,12 @@ class AdaptiveController(LoopNode):
         self._fly(Sensed(now, p, q, r, phi, theta, V, alpha, beta, density))
 
     def _on_air_data(self, message: Any) -> None:
-        self._others[AIR_DATA].arrived(self._seconds(message.header.stamp))
+        self._others[AIR_DATA].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
         self._air = self._seconds(message.header.stamp), conversion.air_data_values(message)
 
     def _on_estimates(self, message: Any) -> None:
         estimates = conversion.estimates_from_message(message, self._start_ns)
-        self._others[DERIVATIVES].arrived(estimates.time)
+        self._others[DERIVATIVES].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
         controller.hear(self._state, estimates.time, beliefs_of(estimates))
 
     def _on_excitation(self, message: Any) -> None:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from dataclasses import dataclass, field
 
 STEP_BACK, STEP_AHEAD = 1.0, 5.0  # s of the stamps that are a clock that was set
 SEVERAL = 1.6  # usual intervals between two stamps: at least one message is missing
-LEARNED = 0.02  # weight of an interval in what is usual
+KEPT, FEW = 40, 8  # intervals that are remembered; so many tell what is usual
 SHARE = 0.05  # of messages lost, beyond which it is told
 LATE = 0.03  # s later than the promptest, beyond which it is told
 RECENT = 5.0  # s: the promptest of so many, and of those before, is what later ones are compared with
@@ -26,7 +27,7 @@ class Arrivals:
     silent_after: float
     heard: float = -math.inf  # s, monotonic
     stamp: float = math.nan  # s, the newest
-    usual: float = math.nan  # s between stamps
+    steps: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))  # s between stamps
     prompt: float = math.inf  # s, the least of arrival less stamp of late
     before: float = math.inf  # s, that of the time before
     since: float = -math.inf  # s, when "of late" began
@@ -81,12 +82,12 @@ class Arrivals:
         self.count += 1
 
     def _count(self, step: float) -> None:
-        """How many are missing between two stamps."""
-        if math.isnan(self.usual):
-            self.usual = step
-        if step > SEVERAL * self.usual:
-            self.missing += round(step / self.usual) - 1
-        elif step < self.usual / SEVERAL:
-            self.usual = step  # what was taken for usual had gaps
-        else:
-            self.usual += LEARNED * (step - self.usual)
+        """How many are missing between two stamps.
+
+        The lower quartile of the last intervals is usual: it holds while up to three quarters of the messages are lost,
+        and an interval that was short by chance is forgotten.
+        """
+        self.steps.append(step)
+        if len(self.steps) >= FEW:
+            usual = sorted(self.steps)[len(self.steps) // 4]
+            self.missing += round(step / usual) - 1 if step > SEVERAL * usual else 0

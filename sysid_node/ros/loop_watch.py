@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -21,6 +22,9 @@ from sysid_node.ros.conversion import NANOSECONDS, estimates_from_message, stamp
 from sysid_node.ros.loop_node import DERIVATIVES, SET_POINTS, named, values_by_name
 
 TRACKING = "adaptive_controller/tracking"
+CONTROLLER, MONITOR = "adaptive_controller", "fault_monitor"
+TROUBLES = ": troubles so far"
+RUNNING = re.compile(r" for [\d.]+ s")  # in words of what is silent
 PATIENCE = 20.0  # s to wait for a service
 
 
@@ -78,6 +82,23 @@ class LoopWatch:
         """The last value of a key of a node on /diagnostics; empty where there is none."""
         pairs = self.words[node].values if node in self.words else ()
         return next((str(pair.value) for pair in pairs if pair.key == key), "")
+
+    def news(self) -> dict[str, str]:
+        """By node, what changes only when something happens: gains, excitation, faults; without numbers that run."""
+        gains = "; ".join(f"{axis}: {self.value(CONTROLLER, f'{axis}: gains')}" for axis in ("pitch", "lateral"))
+        known = CONTROLLER in self.words
+        faults = "; ".join(fault.partition(",")[0] for fault in self.said(MONITOR).split("; "))
+        return {
+            CONTROLLER: RUNNING.sub("", gains) if known else "",
+            "exciter": self.value("exciter", "last event"),
+            MONITOR: faults,
+        }
+
+    def troubles(self) -> dict[str, int]:
+        """By topic, how often the controller told of its messages."""
+        pairs = self.words[CONTROLLER].values if CONTROLLER in self.words else ()
+        counts = {pair.key.partition(": ")[0]: int(pair.value) for pair in pairs if pair.key.endswith(TROUBLES)}
+        return {topic: count for topic, count in counts.items() if count}
 
     def close(self) -> None:
         """Stop listening."""

@@ -29,6 +29,9 @@ def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
     assert summary["adapted"] is True
     assert summary["tracking_error"]["whole flight"]["pitch"] < 0.1
     assert any(event["what"] == "excitation asked for" for event in summary["events"])
+    learning = {"node": "fault_monitor", "what": "learns what sound flight is like"}
+    assert any(event | learning == event for event in summary["events"])
+    assert all(count > 0 for count in summary["message_troubles"].values())
     assert "What happened" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 

@@ -45,6 +45,18 @@ def test_losses_are_told_once(clock: Clock) -> None:
     assert topic.troubles() == []
 
 
+def test_an_interval_that_was_short_once_is_not_usual(clock: Clock) -> None:
+    """Nor is a rate that was higher before: what is usual follows."""
+    topic = Arrivals("identifier/derivatives", 1.0)
+    stamp = 1000.0
+    for k in range(400):
+        step = 0.01 if k in (30, 31) else 0.025 if k < 200 else 0.05
+        stamp, clock.now = stamp + step, clock.now + step
+        topic.arrived(stamp)
+        said = topic.troubles() if k % 100 == 99 else []
+    assert said == []
+
+
 def test_what_comes_late(clock: Clock) -> None:
     topic = Arrivals("imu/data", 0.2)
     fed(clock, topic, 2.0)
