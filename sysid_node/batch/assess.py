@@ -1,4 +1,4 @@
-"""From a converged search to a Fit: covariance for coloured residuals, intervals, and what deserves no trust."""
+"""From a converged search to a Fit: covariance, intervals, and what deserves no trust."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
 from sysid_node.batch.identifiability import Groups, sentences, status_of, undetermined
-from sysid_node.batch.likelihood import Problem
+from sysid_node.batch.likelihood import Problem, inverted
 from sysid_node.batch.result import Estimate, Fit, interval
 from sysid_node.batch.unknowns import Unknowns
 from sysid_node.flight.record import Array
@@ -26,10 +25,10 @@ def assess(
     information = _information(problem, sensitivities)
     count = len(unknowns.free)
     lost = undetermined(_condensed(information, count), unknowns.names)
-    inverse = np.asarray(np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=np.float64)
-    covariance = coloured_covariance(inverse, sensitivities, residuals)[:count, :count]
+    inverse = inverted(information)
+    whole, freedom = problem.covariance(information, sensitivities, residuals)
+    covariance = whole[:count, :count]
     white = np.sqrt(np.clip(np.diag(inverse)[:count], 0.0, None))
-    freedom = degrees_of_freedom([len(answer.time) for answer in answers])
     status = _status(unknowns, z, lost)
     bounded = [f"{name} ended {text}" for name, text in status.items() if text.startswith("at its")]
     estimates = {

@@ -21,6 +21,7 @@ import numpy as np
 
 from sysid_node.batch import kalman
 from sysid_node.batch.assess import assess
+from sysid_node.batch.jackknife import jackknife
 from sysid_node.batch.likelihood import Problem, Search, answer_with_own, maximise, whitened
 from sysid_node.batch.model import Dynamics, Manoeuvre, Model, check_manoeuvres
 from sysid_node.batch.result import Answer, Fit
@@ -130,6 +131,12 @@ class _FilterError(Problem):
         correlation = errors.T @ errors / len(errors)
         return np.asarray(independent @ np.linalg.cholesky(correlation + 1e-10 * np.eye(len(correlation))))
 
+    def covariance(
+        self, information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
+    ) -> tuple[Array, float]:
+        """By the jackknife: a filter's sensitivities are made of the noise, too."""
+        return jackknife(information, sensitivities, residuals)
+
     def noises(self, z: Array) -> dict[str, float]:
         """Standard deviations of process and measurement noise, scaled so that the filter expects its innovations."""
         model, manoeuvre = self.unknowns.model, self.unknowns.manoeuvres[0]
@@ -205,20 +212,22 @@ def _check_complete(unknowns: Unknowns) -> None:
 def _rough_noise(unknowns: Unknowns) -> Array:
     """Logarithms of noise start values (nx + ny,) from how rough the measured signals are.
 
-    Second differences of white noise have six times its variance. A state is given process noise that moves it by as
-    much as its sensor's noise from one sample to the next.
+    Second differences of white noise have six times its variance. A state of whose process noise nothing is known is
+    given one that moves it by as much as its sensor's noise from one sample to the next.
     """
     model, first = unknowns.model, unknowns.manoeuvres[0]
     second = np.concatenate([np.diff(m.outputs, 2, axis=0) for m in unknowns.manoeuvres])
     size = np.abs(first.outputs).max(axis=0)
     sensor = np.maximum(np.sqrt(np.mean(second**2, axis=0) / 6.0), 1e-6 * (1.0 + size))
-    moves = [
-        sensor[model.outputs.index(base)] if base in model.outputs else 1e-3 * (1.0 + abs(x))
-        for base, x in (
-            (name.removeprefix("gust_"), first.initial_state[model.states.index(name)]) for name in model.driven_states
-        )
-    ]
-    return np.asarray(np.log(np.concatenate([np.array(moves) / np.sqrt(first.step), sensor])))
+
+    def process(state: str) -> float:
+        if model.driven is not None and model.driven[state]:
+            return model.driven[state]
+        start = first.initial_state[model.states.index(state)]
+        moves = sensor[model.outputs.index(state)] if state in model.outputs else 1e-3 * (1.0 + abs(start))
+        return float(moves / np.sqrt(first.step))
+
+    return np.asarray(np.log(np.concatenate([[process(state) for state in model.driven_states], sensor])))
 
 
 def _driven(model: Model) -> tuple[int, ...]:

@@ -12,7 +12,6 @@ from sysid_node.batch.equation_error import equation_error
 from sysid_node.batch.filter_error import filter_error, predict_filter
 from sysid_node.batch.manoeuvres import manoeuvre, segments, with_forces_at_cg
 from sysid_node.batch.model import Manoeuvre, Model
-from sysid_node.batch.models.gusts import SOON_FORGOTTEN
 from sysid_node.batch.models.rigid_body import AT_CG, OUTPUTS, STATES, rigid_body
 from sysid_node.batch.output_error import output_error, predict
 from sysid_node.batch.result import Answer, Fit
@@ -53,14 +52,9 @@ class Integrated:
         flat = tuple(piece for several in pieces for piece in several)
         return replace(self, model=started, pieces=flat, remarks=(*self.remarks, *remark))
 
-    @property
-    def _started_states(self) -> tuple[str, ...]:
-        """States whose initial value is estimated: all but those that forget it within a fraction of a second."""
-        return tuple(name for name in self.model.states if name not in SOON_FORGOTTEN)
-
     def fit(self) -> Fit:
         """The estimation."""
-        states, biases = self._started_states, self.settings.biases
+        states, biases = self.model.states, self.settings.biases
         if self.method == "filter_error":
             fit = filter_error(self.model, self.pieces, initial_states=states, biases=biases, correlated=True)
         else:
@@ -70,7 +64,7 @@ class Integrated:
     def answers(self, fit: Fit, record: FlightRecord) -> list[Answer]:
         """The fit's answer to another flight: open loop with its own initial states, or one sample ahead."""
         pieces = _pieces(self.method, self.model, self.aircraft, record, self.settings)
-        own = {"initial_states": self._started_states, "biases": self.settings.biases}
+        own = {"initial_states": self.model.states, "biases": self.settings.biases}
         if self.method == "filter_error":
             return _joined(predict_filter(self.model, pieces, fit.values, fit.extras, **own))
         return _joined(predict(self.model, pieces, fit.values, **own))

@@ -8,6 +8,7 @@ neither moves (Jategaonkar, 2015, sec. 4.6).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
+from sysid_node.batch.colour import coloured_covariance, degrees_of_freedom
 from sysid_node.batch.result import Answer
 from sysid_node.batch.unknowns import Priors, Unknowns
 from sysid_node.errors import InputError
@@ -85,6 +87,15 @@ class Problem(ABC):
         residuals = [whitened(_measured_only(answer), noise) for answer in self.answers(z)]
         return residuals, [whitened(block, noise) for block in self.sensitivities(z)]
 
+    def covariance(
+        self, information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
+    ) -> tuple[Array, float]:
+        """Covariance (n, n) of the estimates, and its degrees of freedom, from what ``weighted`` gives: here with
+        sensitivities that owe nothing to the noise, whatever its colour.
+        """
+        freedom = degrees_of_freedom([len(errors) for errors in residuals])
+        return coloured_covariance(inverted(information), sensitivities, residuals), freedom
+
     def residuals(self, z: Array, noise: Array) -> Array:
         """Measured minus modelled in units of the noise, zero where nothing was measured, then the priors."""
         index, mean, sigma = self.priors()
@@ -117,6 +128,11 @@ class Problem(ABC):
                     f"{answer.names[column]} is beyond all measure from {answer.time[row]:.2f} s on; start nearer "
                     "to the aircraft (equation_error finds start values) or cut the flight into shorter manoeuvres"
                 )
+
+
+def inverted(information: Array) -> Array:
+    """Inverse (n, n) of an information matrix; what has no information has no variance either."""
+    return np.asarray(np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=np.float64)
 
 
 def _measured_only(answer: Answer) -> Array:

@@ -76,7 +76,8 @@ class Model:
     derivative: Equations
     output: Equations
     units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
-    driven: tuple[str, ...] | None = None  # the states that process noise moves; None: all of them
+    driven: Mapping[str, float] | None = None  # the states that process noise moves (None: all), with its rough size:
+    # unit per root second, 0 where nothing is known of it
 
     def __post_init__(self) -> None:
         for kind in ("states", "inputs", "outputs", "names"):
@@ -98,7 +99,7 @@ class Model:
     @property
     def driven_states(self) -> tuple[str, ...]:
         """The states that process noise moves."""
-        return self.states if self.driven is None else self.driven
+        return self.states if self.driven is None else tuple(self.driven)
 
     @property
     def start(self) -> Array:

@@ -1,9 +1,11 @@
 """Turbulence as further states, for filters that follow the aircraft through it.
 
-Each gust is white noise through a first-order filter, after the Dryden spectra of MIL-F-8785C (1980), sec. 3.7: along
-the path, vertical and lateral (as angles), and rolling. Vertical and lateral gusts that change along the body act
+Each gust is white noise through a first-order filter, after the Dryden spectra of MIL-F-8785C (1980), sec. 3.7: the
+air's velocity along the body axes, and its rolling. Vertical and lateral gusts that change along the body act
 like a pitching and a yawing motion of the air (frozen turbulence), low-passed by the size of the aircraft. How much of
 that turning there is, the flight must say: it depends on how the gusts lie to the body, and on what the air is like.
+Small eddies drift with the large ones, so that what counts is the speed relative to the gusting air (Tennekes,
+"Eulerian and Lagrangian time microscales in isotropic turbulence", J. Fluid Mech. 67, 1975).
 """
 
 from __future__ import annotations
@@ -18,23 +20,20 @@ from sysid_node.batch.model import Parameter
 
 Signals = Mapping[str, jax.Array]
 
-#: Gust states by the state that they act through: along the path m/s; angles rad, and as the size of the aircraft
-#: sees them; roll rate rad/s.
-GUSTS = {"V": ("gust_V",), "alpha": ("gust_alpha", "seen_alpha"), "beta": ("gust_beta", "seen_beta"), "p": ("gust_p",)}
+#: Gust states by the state of the aircraft that they act through: the air's velocity along body axes, and as the size
+#: of the aircraft sees it, m/s; its roll rate, rad/s.
+GUSTS = {"V": ("gust_u",), "alpha": ("gust_w", "seen_w"), "beta": ("gust_v", "seen_v"), "p": ("gust_p",)}
 
-#: The states that random noise drives; the others follow. Pitch and yaw are driven beside the gusts by what moments the
-#: gusts' model leaves over.
-DRIVEN = ("q", "r", "gust_V", "gust_alpha", "gust_beta", "gust_p")
-
-#: Gust states whose start is of no account after a span or two of flight.
-SOON_FORGOTTEN = ("gust_p", "seen_alpha", "seen_beta")
+#: The states that random noise drives, with its size in light turbulence (unit per root second; 0: unknown); the others
+#: follow. Pitch and yaw are driven beside the gusts by what moments the gusts' model leaves over.
+DRIVEN = {"q": 0.0, "r": 0.0, "gust_u": 0.5, "gust_v": 0.5, "gust_w": 0.5, "gust_p": 0.5}
 
 #: s: memory of the gusts. Dryden's is length over airspeed, 1 to 30 s, but height and air decide it: with a long one,
 #: what a gust does within a manoeuvre is free, and nothing is claimed of the mean of minutes.
 _MEMORY = 20.0
 
 #: Shares of the turning that frozen turbulence would have, by the state that brings it about.
-_TURNING = {"seen_alpha": "gust_pitching", "seen_beta": "gust_yawing"}
+_TURNING = {"seen_w": "gust_pitching", "seen_v": "gust_yawing"}
 
 
 def gust_states(states: Sequence[str]) -> tuple[str, ...]:
@@ -52,40 +51,47 @@ def air_relative(s: Signals, span: float) -> dict[str, jax.Array]:
 
     ``s`` holds the states and the shares of turning; ``span`` m.
     """
-    relative = dict(s)
-    for name in ("V", "alpha", "beta", "p"):
-        if f"gust_{name}" in s:
-            relative[name] = s[name] + s[f"gust_{name}"]
-    if "seen_alpha" in s:
-        relative["q"] = s["q"] - s["gust_pitching"] * (_across(s, "alpha") - s["seen_alpha"]) / _pitch_time(s, span)
-    if "seen_beta" in s:
-        relative["r"] = s["r"] + s["gust_yawing"] * (_across(s, "beta") - s["seen_beta"]) / _yaw_time(s, span)
+    flow = _flow(s)
+    relative = dict(s) | {name: flow[name] for name in flow if GUSTS[name][0] in s}
+    if "gust_p" in s:
+        relative["p"] = s["p"] - s["gust_p"]
+    if "seen_w" in s:
+        relative["q"] = s["q"] + s["gust_pitching"] * (s["gust_w"] - s["seen_w"]) / (
+            flow["V"] * _pitch_time(flow, span)
+        )
+    if "seen_v" in s:
+        relative["r"] = s["r"] - s["gust_yawing"] * (s["gust_v"] - s["seen_v"]) / (flow["V"] * _yaw_time(flow, span))
     return relative
 
 
 def gust_rates(s: Signals, span: float) -> dict[str, jax.Array]:
     """Derivatives of the gust states without their driving noise."""
-    rates = {name: -s[name] / _MEMORY for name in ("gust_V", "gust_alpha", "gust_beta") if name in s}
+    flow = _flow(s)
+    rates = {name: -s[name] / _MEMORY for name in ("gust_u", "gust_v", "gust_w") if name in s}
     if "gust_p" in s:
-        rates["gust_p"] = -s["gust_p"] / _pitch_time(s, span)
-    if "seen_alpha" in s:
-        rates["seen_alpha"] = (_across(s, "alpha") - s["seen_alpha"]) / _pitch_time(s, span)
-    if "seen_beta" in s:
-        rates["seen_beta"] = (_across(s, "beta") - s["seen_beta"]) / _yaw_time(s, span)
+        rates["gust_p"] = -s["gust_p"] / _pitch_time(flow, span)
+    if "seen_w" in s:
+        rates["seen_w"] = (s["gust_w"] - s["seen_w"]) / _pitch_time(flow, span)
+    if "seen_v" in s:
+        rates["seen_v"] = (s["gust_v"] - s["seen_v"]) / _yaw_time(flow, span)
     return rates
 
 
-def _across(s: Signals, angle: str) -> jax.Array:
-    """The gust across the body's axis over the airspeed: of a gust along the path, the flow angle's share is across."""
-    along = s["gust_V"] * jnp.sin(s[angle]) / s["V"] if "gust_V" in s else 0.0
-    return s[f"gust_{angle}"] + along
+def _flow(s: Signals) -> dict[str, jax.Array]:
+    """V, alpha, beta relative to the gusting air."""
+    forward, still = s["V"] * jnp.cos(s["beta"]), jnp.zeros_like(s["V"])
+    u = forward * jnp.cos(s["alpha"]) - s.get("gust_u", still)
+    v = s["V"] * jnp.sin(s["beta"]) - s.get("gust_v", still)
+    w = forward * jnp.sin(s["alpha"]) - s.get("gust_w", still)
+    speed = jnp.sqrt(u**2 + v**2 + w**2)
+    return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}
 
 
-def _pitch_time(s: Signals, span: float) -> jax.Array:
+def _pitch_time(flow: Signals, span: float) -> jax.Array:
     """Time constant, s, of pitching and rolling gusts: 4 b / (pi V)."""
-    return 4.0 * span / (math.pi * s["V"])
+    return 4.0 * span / (math.pi * flow["V"])
 
 
-def _yaw_time(s: Signals, span: float) -> jax.Array:
+def _yaw_time(flow: Signals, span: float) -> jax.Array:
     """Time constant, s, of yawing gusts: 3 b / (pi V)."""
-    return 3.0 * span / (math.pi * s["V"])
+    return 3.0 * span / (math.pi * flow["V"])

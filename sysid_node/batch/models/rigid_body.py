@@ -94,7 +94,7 @@ def rigid_body(
         derivative=motion.derivative,
         output=lambda x, u, theta: motion.output(outputs, x, u, theta),
         units=dict(OUTPUTS),
-        driven=tuple(name for name in all_states if name in DRIVEN) if gusts else None,
+        driven={name: DRIVEN[name] for name in all_states if name in DRIVEN} if gusts else None,
     )
 
 
