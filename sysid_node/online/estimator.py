@@ -24,7 +24,7 @@ from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
 from sysid_node.online.change import PIECE
 from sysid_node.online.experience import experiences
 from sysid_node.online.prior import beliefs
-from sysid_node.online.renewal import begin_segment, renew
+from sysid_node.online.renewal import begin_segment, reach, renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import NUISANCES, OUTPUTS, Layout
 from sysid_node.online.state import Model, State
@@ -36,6 +36,7 @@ DRIFT = OUTPUTS + NUISANCES.index("t")
 AIRSPEED, DENSITY = SAMPLE_COLUMNS.index("V"), SAMPLE_COLUMNS.index("rho")
 THRUST, INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
 LIMIT = 1e9  # nothing measured is as large in SI units
+JITTER = 1e-3  # s by which a stamp may be early and its sample still be the one that is meant
 SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorter steps would pass for acceleration
 
 
@@ -86,7 +87,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     """
     sample = reconstruction.complete(state.flow, time, sample, state.model.settings.max_gap)
     if math.isnan(state.begin) and abs(time) < LIMIT:
-        state.begin = time + state.model.settings.settle_time
+        state.begin = first_counted(time, state.model.settings)
     if not time >= state.begin:
         return
     if not (math.hypot(time, *sample) < LIMIT and sample[AIRSPEED] > AIRSPEED_LOW and sample[DENSITY] > DENSITY_LOW):
@@ -106,8 +107,9 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     if previous is None or time - previous[0] > state.model.settings.max_gap:
         interrupt(state, time)
         return
+    state.step = time - previous[0]
     gain = state.model.momentum(previous[2], now[2])
-    area, slant = over_interval(state.model.layout, time - previous[0], previous[1], now[1], gain)
+    area, slant = over_interval(state.model.layout, state.step, previous[1], now[1], gain)
     transform.add(state.transform, previous[0], time, area, slant)
     state.samples += 1
     state.intervals += sample[INTERVAL]
@@ -116,8 +118,13 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
 
 def renew_early(state: State) -> None:
     """Renew what is due to be renewed before the next sample; whoever has time before that comes may do it then."""
-    if state.transform.last >= state.renew_at:
+    if reach(state.transform.last, state.step) >= state.renew_at:
         renew(state)
+
+
+def first_counted(time: float, settings: Settings) -> float:
+    """Time (s) from which samples count, where the first comes at ``time``."""
+    return time + settings.settle_time - JITTER
 
 
 def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[float]:

@@ -6,6 +6,7 @@ And with every piece at first, with every other one later: measure the segment, 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def renew(state: State, last: bool = False) -> None:
     time = state.transform.last
     lines = transform.current(state.transform)
     _watch_piece(state, lines)
-    last = last or time - state.segment_start >= state.model.segment_time
+    last = last or reach(time, state.step) - state.segment_start >= state.model.segment_time
     state.pieces += 1
     if last or _is_due(state):
         _weigh_recent(state)
@@ -57,6 +58,11 @@ def renew(state: State, last: bool = False) -> None:
         begin_segment(state, lines, time)
     else:
         _begin_piece(state, lines, time)
+
+
+def reach(time: Any, step: Any) -> Any:
+    """How far a sample reaches (s) with a ``step`` (s) before it: stamps of one moment jitter, the nearest counts."""
+    return time + 0.5 * step
 
 
 def _is_due(state: State) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator, reconstruction, signals, transform
 from sysid_node.online.estimates import estimates_at
+from sysid_node.online.renewal import reach
 from sysid_node.online.settings import Settings
 from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
@@ -83,6 +84,7 @@ class _Chunk:
     missing: NDArray[np.intp]  # (N,) what ``leave_out`` counts, -1 where a sample is usable or too early to count
     time: Array  # (n,)
     begins: Array  # (n,) start of the interval; NaN where none leads to the sample
+    reach: Array  # (n,) see ``renewal.reach``
     values: Array  # (n, T) signals
     areas: Array  # (n, T), see ``transform``
     slants: Array  # (n, T)
@@ -103,7 +105,7 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     if not time.size:
         empty = np.empty((0, state.model.layout.transformed))
         kernels = np.empty((0, 2, grid.rows))
-        return _Chunk(given, kept, missing, time, time, empty, empty, empty, kernels, time, state.previous)
+        return _Chunk(given, kept, missing, time, time, time, empty, empty, empty, kernels, time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -121,13 +123,15 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     kernels = transform.weights_of_many(grid, begins + 0.5 * steps, steps)
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
     intervals = columns[estimator.INTERVAL]
-    return _Chunk(given, kept, missing, time, begins, values, areas, slants, kernels, intervals, last)
+    return _Chunk(
+        given, kept, missing, time, begins, reach(time, steps), values, areas, slants, kernels, intervals, last
+    )
 
 
 def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
     """(N,) which samples ``update`` takes in, and which column the others lack."""
     if np.isnan(state.begin) and time.size:
-        state.begin = float(time[0]) + state.model.settings.settle_time
+        state.begin = estimator.first_counted(float(time[0]), state.model.settings)
     possible = (samples > np.array(state.model.lowest)) & (samples < estimator.LIMIT)
     late = time >= state.begin
     if not state.thrust_known:
@@ -186,14 +190,15 @@ def _want(results: _Results, stops: deque[tuple[int, float]], begin: int) -> Non
 def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: deque[tuple[int, float]]) -> int:
     """Take in usable samples from ``begin`` to what ends the stretch, at most ``end`` (exclusive), and return that."""
     state = results.state
-    if np.isnan(chunk.begins[begin]) or state.transform.last >= state.renew_at:
+    if np.isnan(chunk.begins[begin]) or reach(state.transform.last, state.step) >= state.renew_at:
         results.finish()
         estimator.renew_early(state)
     if np.isnan(chunk.begins[begin]):
         estimator.interrupt(state, float(chunk.time[begin]))
         return begin + 1
     # up to and including the sample after which is renewed, short of the next gap
-    stop = min(int(np.searchsorted(chunk.time[begin:end], state.renew_at, side="left")) + 1 + begin, end)
+    far = np.flatnonzero(chunk.reach[begin:end] >= state.renew_at)
+    stop = begin + int(far[0]) + 1 if far.size else end
     gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
     stop = begin + int(gaps[0]) if gaps.size else stop
     inside = [count for count, _ in stops if begin < count < stop]
@@ -203,6 +208,7 @@ def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: de
         transform.add_many(state.transform, chunk.kernels[part], *intervals, chunk.areas[part], chunk.slants[part])
         if last < stop:
             _want(results, stops, last)
+    state.step = float(chunk.time[stop - 1] - chunk.begins[stop - 1])
     state.samples += stop - begin
     state.recent.extend(chunk.values[begin:stop])
     # one after the other, as ``update`` adds them

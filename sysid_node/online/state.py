@@ -101,6 +101,7 @@ class State:
     weighed_until: float = math.nan  # time up to which ``uneven`` counts
     uneven: Unevenness = field(default_factory=Unevenness)  # of the present segment
     renew_at: float = math.inf
+    step: float = 0.0  # s between the last two samples
     previous: tuple[float, Array, tuple[float, ...]] | None = None  # time, signals, (p, q, r, ca, sa)
     begin: float = math.nan  # time from which samples count
     samples: int = 0  # in the present segment

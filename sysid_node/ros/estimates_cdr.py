@@ -34,6 +34,7 @@ class EstimatesSerialiser:
 
     def __init__(self, aircraft: str, method: str) -> None:
         self._said = (aircraft, method)
+        type_store()  # takes a tenth of a second, which the first message need not wait for
         self._writers = lru_cache(_REMEMBERED)(self._writer)
 
     def many(self, history: Sequence[Estimates], stamps_ns: Stamps, frame_id: str) -> list[bytes]:

@@ -47,7 +47,8 @@ class CarefulNode(LifecycleNode):
             try:
                 callback(*arguments)
             except Exception as error:
-                self._record(callback.__name__, error)
+                if self.context.ok():  # otherwise something was asked of ROS while it shuts down
+                    self._record(callback.__name__, error)
 
         return call
 
