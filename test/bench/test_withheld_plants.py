@@ -7,12 +7,15 @@ other means.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from withheld.actuators import Actuators
 from withheld.cessna import Cessna, aircraft
 from withheld.instruments import Log, readings
+from withheld.mattering import inexplicable
 from withheld.motion import Effects, Instant
 from withheld.rigid import Rigid
 
@@ -21,6 +24,7 @@ from sysid_node.sim import Simulator
 
 RATE, SECONDS = 400.0, 5.0
 KNOWN = load_aircraft("cdrw")
+CM_DE = KNOWN.derivatives["Cm_de"].tolerance or 0.0
 SIMULATOR = Simulator(KNOWN, RATE)
 
 AIRFRAME = {
@@ -62,6 +66,10 @@ def _inputs() -> np.ndarray:
 
 
 def _plant(effects: Effects) -> np.ndarray:
+    return readings(_log(effects), KNOWN, effects)
+
+
+def _log(effects: Effects) -> Log:
     airframe = Rigid(KNOWN, effects, RATE)
     names = (*airframe.controls, "thrust")
     commands = _inputs() + [airframe.trim[n] for n in names]
@@ -71,8 +79,7 @@ def _plant(effects: Effects) -> np.ndarray:
         moments.append(now)
         now = airframe.step(dict(zip(names, row.tolist(), strict=True)), float(row[-1]), (0.0,) * 6, (k + 1) / RATE)
     parts = [np.array(part, float) for part in zip(*moments, strict=True)]
-    log = Log(np.arange(len(moments)) / RATE, *parts, commands[:-1], airframe.cg)
-    return readings(log, KNOWN, effects)
+    return Log(np.arange(len(moments)) / RATE, *parts, commands[:-1], airframe.cg)
 
 
 def _simulated(effects: Effects) -> np.ndarray:
@@ -155,3 +162,17 @@ def test_c172p_stays_in_its_trim() -> None:
         now = plant.step({n: plant.trim[n] for n in plant.controls}, plant.trim["thrust"], (0.0,) * 6, k / RATE)
     assert np.abs(now.rates).max() < 1e-3
     assert np.hypot(now.flow[0], now.flow[2]) == pytest.approx(52.0, abs=0.05)
+
+
+def test_derivatives_excuse_what_lies_within_three_tolerances_of_the_file() -> None:
+    """A file off by two tolerances explains the flight; of one off by six at least three are left to the other derivatives,
+    which can mimic the elevator only in part."""
+    log = _log({})
+    seen = readings(log, KNOWN, {})
+    left = {}
+    for off in (2.0, 6.0):
+        wrong = replace(KNOWN.derivatives["Cm_de"], value=KNOWN.derivatives["Cm_de"].value + off * CM_DE)
+        file = replace(KNOWN, derivatives={**KNOWN.derivatives, "Cm_de": wrong})
+        left[off] = inexplicable(log, seen, file, {}, RATE)[:, 4].std()
+    deflected = CM_DE * log.commands[:, 0].std()
+    assert left[2.0] < 0.1 * deflected and left[6.0] > 0.5 * deflected
