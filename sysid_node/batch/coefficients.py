@@ -21,14 +21,17 @@ from sysid_node.flight.record import Array, FlightRecord
 _AXES = ("x", "y", "z")
 _ALWAYS = ("ax", "ay", "az", "p", "q", "r", "V")
 
+#: Share of the reference airspeed below which nothing flies: on the ground, coefficients would divide by nothing.
+_SLOWEST = 0.2
+
 
 @dataclass(frozen=True)
 class Equations:
     """Both sides of the six equations at each time of a flight.
 
     ``coefficients`` CL CD CY Cl Cm Cn as far as they can be formed, besides CX and CZ (body axes); ``regressors`` by
-    the names of derivatives ("0", "alpha", "q", "de", ...); each (N,), finite. ``left_out`` samples lacked a value;
-    ``noise`` holds the sensors' 1 sigma in those regressors that have one.
+    the names of derivatives ("0", "alpha", "q", "de", ...); each (N,), finite. ``left_out`` samples lacked a value or
+    did not fly; ``noise`` holds the sensors' 1 sigma in those regressors that have one.
     """
 
     name: str
@@ -51,7 +54,10 @@ def equations(aircraft: Aircraft, record: FlightRecord) -> Equations:
     coefficients, remarks = _coefficients(aircraft, s)
     regressors = _regressors(aircraft, s, coefficients["CL"])
     if left_out:
-        remarks.append(f"{record.name or 'flight'}: {left_out} of {len(record)} samples lack a value and were left out")
+        remarks.append(
+            f"{record.name or 'flight'}: {left_out} of {len(record)} samples lack a value or are slower than "
+            f"{_SLOWEST * aircraft.reference.airspeed:.3g} m/s, and were left out"
+        )
     noise = _noise(aircraft, float(s["V"].mean()))
     return Equations(record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks), noise)
 
@@ -148,12 +154,19 @@ def _check_measured(aircraft: Aircraft, record: FlightRecord) -> None:
 
 
 def _complete_samples(aircraft: Aircraft, record: FlightRecord) -> tuple[FlightRecord, int]:
-    """The samples with every needed value, and how many others there were; density from the reference if unknown."""
+    """The samples in flight with every needed value, and how many others there were.
+
+    Density is the reference's if unknown.
+    """
     optional = [name for name in ("alpha", "beta", "rho", "thrust") if record.measured(name)]
     names = list(dict.fromkeys([*_needed(aircraft), *optional]))
-    kept = np.all([np.isfinite(record[name]) for name in names], axis=0)
+    slowest = _SLOWEST * aircraft.reference.airspeed
+    kept = np.all([np.isfinite(record[name]) for name in names], axis=0) & (record["V"] > slowest)
     if kept.sum() < 10:
-        raise InputError(f"flight {record.name!r}: only {int(kept.sum())} samples hold all of {', '.join(names)}")
+        raise InputError(
+            f"flight {record.name!r}: only {int(kept.sum())} of {len(record)} samples hold all of {', '.join(names)} "
+            f"at more than {slowest:.3g} m/s; give a longer flight, or one in which the aircraft flies"
+        )
     columns = {name: record[name][kept] for name in names}
     columns.setdefault("rho", np.full(int(kept.sum()), aircraft.reference.air_density))
     return FlightRecord(record.time[kept], columns, record.name, record.start_ns), int((~kept).sum())

@@ -87,6 +87,16 @@ def test_gaps_are_left_out_and_counted():
     assert np.isfinite(list(fit.values.values())).all()
 
 
+def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
+    record = flight(5)
+    parked = {**record.columns, "V": np.where(record.time < 2.0, 0.1, record["V"])}
+    found = equations(KESTREL, FlightRecord(record.time, parked, "taxi"))
+    assert found.left_out == np.count_nonzero(record.time < 2.0)
+    assert any("slower than" in remark for remark in found.remarks)
+    with pytest.raises(InputError, match=r"only 0 of \d+ samples .* in which the aircraft flies"):
+        equations(KESTREL, FlightRecord(record.time, {**record.columns, "V": 0.0 * record["V"]}, "parked"))
+
+
 def test_a_signal_never_measured_is_named():
     record = clean()
     columns = {name: values for name, values in record.columns.items() if name != "beta"}
