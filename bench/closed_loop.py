@@ -33,7 +33,10 @@ FAILURES: dict[str, tuple[str, ...]] = {
     "ice all over (Bragg)": icing(1.0),
     "ice, 2.5 times that": icing(2.5),
 }
+#: Of pitch, roll and sideslip, the one that a failure disturbs most.
+STRUCK = dict(zip(FAILURES, (None, 0, 0, 1, None, None), strict=True))
 ONSET, SETTLED, END = 30.0, 40.0, 60.0  # s
+LEAST_CALM = 2.0  # s without excitation, for a flight's errors to count
 DRAW = (20.0, 45.0)  # s, onset and end of a random flight
 FIXED = 60.0  # s of excitation when nobody looks
 ASKED = ("Cm_de", "Cm_alpha")
@@ -44,27 +47,55 @@ def failures(turbulence: str, flights: int) -> str:
     rows = []
     for name, effects in FAILURES.items():
         pairs = [both(Sortie(effects, ONSET, END, Air(turbulence, seed=seed + 1))) for seed in range(flights)]
-        quiet = np.array([[flown.error(SETTLED, END, excited(*pair)) for flown in pair] for pair in pairs])
         whole = np.array([[flown.error(SETTLED, END) for flown in pair] for pair in pairs])
-        cells = [f"{b:.2f} / {a:.2f}" for b, a in np.rad2deg(quiet.mean(axis=0)).T]
+        rest = [pair for pair in pairs if calm(*pair) >= LEAST_CALM]
+        quiet = np.array(
+            [[flown.error(SETTLED, END, excited(*pair)[: flown.time.size]) for flown in pair] for pair in rest]
+        )
+        quiet = quiet.reshape(-1, 2, 3)
+        cells = [f"{b:.2f} / {a:.2f}" for b, a in np.rad2deg(quiet.mean(axis=0)).T] if rest else ["-"] * 3
         seconds = np.mean([spent(adapted) for _, adapted in pairs])
-        rows.append([name, *cells, *shares(quiet), shares(whole)[0], f"{seconds:.1f}"])
-    heads = ("pitch: baseline / adapted, deg", "roll", "sideslip", "adapted over baseline", "worst")
-    tail = ("... excitation included", "excitation after the failure, s")
+        judged = [*shares(quiet), struck(quiet, STRUCK[name]), f"{len(rest)} of {flights}"]
+        rows.append([name, *cells, *judged, shares(whole)[0], f"{seconds:.1f}"])
+    heads = (
+        "pitch: baseline / adapted, deg",
+        "roll",
+        "sideslip",
+        "adapted over baseline",
+        "worst",
+        "of what failed: worst",
+    )
+    tail = ("flights with a calm", "... excitation included", "excitation after the failure, s")
     return table((f"turbulence: {turbulence}", *heads, *tail), rows)
 
 
 def excited(fixed: Flown, adapted: Flown) -> NDArray[np.bool_]:
-    """(N,) whether either flight is being excited, or was within the last second."""
-    lasting = np.ones(round(RATE) + 1)
-    return np.asarray(np.convolve(fixed.exciting | adapted.exciting, lasting)[: fixed.time.size] > 0.0)
+    """(N,) whether either flight is being excited, or was within the last second; N of the longer one."""
+    either = np.zeros(max(fixed.time.size, adapted.time.size))
+    for flown in (fixed, adapted):
+        either[: flown.time.size] += flown.exciting
+    return np.asarray(np.convolve(either, np.ones(round(RATE) + 1))[: either.size] > 0.0)
+
+
+def calm(fixed: Flown, adapted: Flown) -> float:
+    """Seconds of the time that counts in which neither flight is excited."""
+    time = max(fixed.time, adapted.time, key=len)
+    counts = (time >= SETTLED) & (time < END) & ~excited(fixed, adapted)
+    return float(np.count_nonzero(counts) / RATE)
 
 
 def shares(errors: Array) -> tuple[str, str]:
     """Mean and largest of adapted over baseline, pitch and roll together, of errors (flights, 2, 3)."""
+    if not len(errors):
+        return "-", "-"
     size = np.hypot(errors[..., 0], errors[..., 1])
     share = size[:, 1] / size[:, 0]
     return f"{share.mean():.2f}", f"{share.max():.2f}"
+
+
+def struck(errors: Array, axis: int | None) -> str:
+    """Largest of adapted over baseline of one axis alone."""
+    return "-" if axis is None or not len(errors) else f"{(errors[:, 1, axis] / errors[:, 0, axis]).max():.2f}"
 
 
 def spent(flown: Flown) -> float:
