@@ -1,6 +1,7 @@
 """What the estimator does with every piece of data, half a second: look for changes.
 
-And with every piece at first, with every other one later: measure the segment, and renew what all estimates rest on.
+And with every piece at first, the more seldom the more is known: measure the segment, and renew what all estimates rest
+on.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 RECENT = 8  # pieces about whose mean motion is counted
-SOON = 20.0  # s of data up to which everything is renewed with every piece
-SOLVE_EVERY = 2  # pieces, later: the noise's colour is known better, and changes more slowly
-TIMING_EVERY = 4  # pieces between looks at the controls' timing, which changes more slowly still
+SOON = 20.0  # s of data up to which everything is renewed with every piece, then with every second, third, ...
+SELDOM = 6  # pieces between renewals at most
+TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which changes more slowly still
 
 
 def renew(state: State, last: bool = False) -> None:
@@ -68,7 +69,7 @@ def reach(time: Any, step: Any) -> Any:
 def _is_due(state: State) -> bool:
     """Whether it is time to solve for everything again."""
     renewed = state.renewed
-    return renewed is None or renewed.total.energy < SOON or state.pieces % SOLVE_EVERY == 0
+    return renewed is None or state.pieces - renewed.pieces >= min(1 + int(renewed.total.energy / SOON), SELDOM)
 
 
 def begin_segment(state: State, lines: Array, time: float) -> None:
@@ -164,15 +165,18 @@ def _solve_all(state: State, segment: Information) -> None:
     variance = exogeneity.inflation(spread, gusts) * spread.covariance.diagonal(axis1=1, axis2=2).T
     mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
     none = np.zeros(len(plan.coefficients), dtype=bool)
+    timing, timed = _timing(state, solution, spread, gram)
     state.renewed = Renewed(
         time=now,
+        pieces=state.pieces,
+        timed=timed,
         total=total,
         solution=solution,
         uncertainty=spread,
         compensation=compensation,
         base=past.grams.sum(axis=0),
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
-        timing=_timing(state, solution, spread, gram),
+        timing=timing,
         hold=hold,
         prudence=prudence(plan, solution, spread, hold, gram, *state.model.believed),
         bend=interval.bend(plan, table, solution, gram, spread, noise_alone, mean, gusts),
@@ -197,11 +201,11 @@ def _solve(state: State, total: Information, gram: Array) -> tuple[Hold, Solutio
     return hold, solution, compensation
 
 
-def _timing(state: State, solution: Solution, spread: Uncertainty, gram: Array) -> Timing:
-    """Whether controls are felt when they are measured, looked at now and then."""
-    if state.renewed is None or state.pieces % TIMING_EVERY == 0:
-        return timing.examine(state.plan, state.model.layout, solution, spread, gram)
-    return state.renewed.timing
+def _timing(state: State, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[Timing, int]:
+    """Whether controls are felt when they are measured, looked at now and then, and with which piece it was."""
+    if state.renewed is None or state.pieces - state.renewed.timed >= TIMING_EVERY:
+        return timing.examine(state.plan, state.model.layout, solution, spread, gram), state.pieces
+    return state.renewed.timing, state.renewed.timed
 
 
 def _doubt(state: State, solution: Solution, total: Information) -> Array:
@@ -227,7 +231,9 @@ def _look_for_changes(state: State, lines: Array) -> None:
         return
     looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, now, _memory(state))
     finding = change.examine(looking, state.experiences)
-    renewed.lost, renewed.doubted, renewed.grounds = finding.lost, finding.doubted, None
+    same = np.array_equal(finding.lost, renewed.lost) and np.array_equal(finding.doubted, renewed.doubted)
+    if state.flow.active or not same:
+        renewed.lost, renewed.doubted, renewed.grounds = finding.lost, finding.doubted, None
     if finding.since is not None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:

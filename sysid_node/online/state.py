@@ -65,6 +65,8 @@ class Renewed:
     """What ``renew`` last found; per-sample estimates lean on it until the next time."""
 
     time: float  # s, when it was found
+    pieces: int  # of the watch, finished by then
+    timed: int  # ... when ``timing`` was looked at
     total: Information
     solution: Solution
     uncertainty: Uncertainty
