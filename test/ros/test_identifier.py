@@ -110,7 +110,9 @@ def test_silence_makes_estimates_stale(probe: Probe) -> None:
 
 
 def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
-    """NaN, degrees, repeated, reversed and absent stamps, a clock that leaps: each is named, and the flight goes on."""
+    """NaN, degrees, broken messages, stamps repeated, reversed and absent, a clock that leaps: each is named, and the
+    flight goes on.
+    """
     flight = made_up_streams(4.0)
     with identifier() as process:
         probe.await_identifier()
@@ -118,6 +120,7 @@ def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
         now = START_NS + 10**9
         for values in ((np.nan,) * 6, (1e9, 0, 0, 0, 0, 0), (0, 0, 9.8, 200.0, 0, 0)):
             probe.say_imu(now + 1, values)
+        probe.imu.publish(b"\x00\x01\x00\x00 cut short")
         good = (0.0, 0.0, 9.8, 0.0, 0.0, 0.0)
         for stamp in (now, now, now - 500_000_000, 0, now - 100 * 10**9):
             probe.say_imu(stamp, good)
@@ -128,6 +131,7 @@ def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
         probe.speak(flight, start=1.0)
         probe.until(lambda: probe.said("input", "rejected, actuators: joint 'elevator' missing or not finite"))
         for reason in (
+            "imu/data: not a message of this type",
             "imu/data: not finite",
             "imu/data: specific force over 300 m/s^2",
             "imu/data: angular rate over 35 rad/s (deg/s?)",
