@@ -165,7 +165,7 @@ def test_c172p_stays_in_its_trim() -> None:
 
 
 def test_derivatives_excuse_what_lies_within_three_tolerances_of_the_file() -> None:
-    """A file off by two tolerances explains the flight; of one off by six, three are left to the other derivatives, which
+    """A file off by two tolerances explains the flight; of one off by six, three are left to others, which
     mimic the elevator only in part."""
     log = _log({})
     seen = readings(log, KNOWN, {})
