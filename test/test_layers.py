@@ -91,3 +91,14 @@ def test_online_imports_numpy_and_scipy_only() -> None:
     )
     foreign = {name for name in loaded if name not in sys.stdlib_module_names and not name.startswith("_")}
     assert foreign <= {"sysid_node", *ONLINE_PACKAGES}
+
+
+def test_the_live_node_needs_no_library_beyond_ros_numpy_scipy_and_yaml() -> None:
+    """What apt and rosdep install is enough to identify in flight."""
+    code = (
+        "import sys, json, sysid_node.ros.identifier; print(json.dumps(sorted({m.split('.')[0] for m in sys.modules})))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"rosbags", "jax", "rich", "plotly", "jinja2", "pyulog", "lz4", "zstandard"} & set(
+        json.loads(done.stdout)
+    )

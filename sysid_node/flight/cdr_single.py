@@ -1,7 +1,7 @@
 """CDR messages one at a time, in flight: where a layout's numbers lie is remembered from the messages before.
 
 What a node hears is laid out as the message before nearly always, and what it tells as well; then reading and writing
-is a comparison of the bytes that decide the layout (see ``cdr``) and one call, without an object for every part.
+is a comparison of the bytes that decide the layout (see ``cdr_layout``) and one call, without an object for every part.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.flight.cdr import Layout, layout_of
-from sysid_node.flight.messages import type_store
+from sysid_node.flight.cdr_layout import Definitions, Layout, layout_of
 
 _CODES = {"f8": "d", "f4": "f", "i8": "q", "u8": "Q", "i4": "i", "u4": "I", "i2": "h", "u2": "H", "i1": "b", "u1": "B"}
 #: Layouts remembered; messages that vary more are slower to read, and as right.
@@ -41,19 +40,22 @@ class _Known(NamedTuple):
 class SingleReader:
     """Reads the numbers at ``numbers`` (dotted paths in the message's order) and the ``strings`` of single messages."""
 
-    def __init__(self, msgtype: str, numbers: Sequence[str], strings: Sequence[str] = ()) -> None:
-        self._type, self._numbers, self._strings = msgtype, tuple(numbers), tuple(strings)
+    def __init__(
+        self, definitions: Definitions, msgtype: str, numbers: Sequence[str], strings: Sequence[str] = ()
+    ) -> None:
+        self._definitions, self._type = definitions, msgtype
+        self._numbers, self._strings = tuple(numbers), tuple(strings)
         self._known: deque[_Known] = deque(maxlen=_REMEMBERED)
 
     def read(self, raw: bytes) -> tuple[tuple[Any, ...], tuple[Text, ...]]:
         """All numbers, those of sequences one after the other, and the strings, those of sequences as tuples.
 
-        Raises rosbags' SerdeError where it is no whole message of the type.
+        Raises ``cdr_layout.DamageError`` where it is no whole message of the type.
         """
         for known in self._known:
             if known.fits(raw):
                 return known.numbers.unpack_from(raw), known.texts
-        known = self._learn(layout_of(type_store(), self._type, raw, spare=True))
+        known = self._learn(layout_of(self._definitions, self._type, raw, spare=True))
         self._known.appendleft(known)
         return known.numbers.unpack_from(raw), known.texts
 

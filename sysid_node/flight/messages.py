@@ -6,11 +6,14 @@ import os
 import sys
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from sysid_node.errors import InputError
+from sysid_node.flight.cdr import definitions_of
+from sysid_node.flight.cdr_layout import Layout, layout_of
 
 
 @cache
@@ -21,6 +24,21 @@ def type_store() -> Typestore:
     for path in sorted(folder.glob("*.msg")):
         store.register(get_types_from_msg(path.read_text(encoding="utf-8"), f"sysid_msgs/msg/{path.stem}"))
     return store
+
+
+class StoreTypes:
+    """Messages of a store by the name of their type: ``sensor_msgs/msg/Imu``."""
+
+    def __init__(self, store: Typestore) -> None:
+        self._store = store
+
+    def make(self, msgtype: str, /, **fields: Any) -> Any:
+        """A message."""
+        return self._store.types[msgtype](**fields)
+
+    def layout(self, msgtype: str, message: Any) -> Layout:
+        """The layout of a message once it is serialised."""
+        return layout_of(definitions_of(self._store), msgtype, bytes(self._store.serialize_cdr(message, msgtype)))
 
 
 def message_folder() -> Path:

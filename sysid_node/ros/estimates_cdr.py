@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import lru_cache
 from operator import attrgetter
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.flight.bag_writer import header
-from sysid_node.flight.cdr import layout_of
+from sysid_node.flight.cdr_layout import Layout
 from sysid_node.flight.cdr_single import SingleWriter
-from sysid_node.flight.messages import type_store
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES_TYPE
 from sysid_node.online.rows import DerivativeRows, FitRows
@@ -29,12 +27,21 @@ _FIT_NUMBERS = ("r_squared", "residual_std", "degrees_of_freedom")
 _REMEMBERED = 64  # layouts
 
 
+class Types(Protocol):
+    """Messages by the name of their type: ``flight.messages.StoreTypes`` for bags, ``message_types.RosTypes`` live."""
+
+    def make(self, msgtype: str, /, **fields: Any) -> Any:
+        """A message."""
+
+    def layout(self, msgtype: str, message: Any) -> Layout:
+        """The layout of a message once it is serialised."""
+
+
 class EstimatesSerialiser:
     """Makes sysid_msgs/DerivativeEstimates of one ``aircraft`` and ``method``."""
 
-    def __init__(self, aircraft: str, method: str) -> None:
-        self._said = (aircraft, method)
-        type_store()  # takes a tenth of a second, which the first message need not wait for
+    def __init__(self, types: Types, aircraft: str, method: str) -> None:
+        self._types, self._said = types, {"aircraft": aircraft, "method": method}
         self._writers = lru_cache(_REMEMBERED)(self._writer)
 
     def many(self, history: Sequence[Estimates], stamps_ns: Stamps, frame_id: str) -> list[bytes]:
@@ -60,20 +67,30 @@ class EstimatesSerialiser:
 
     def _writer(self, frame_id: str, strings: tuple[tuple[str, ...], ...]) -> SingleWriter:
         """The writer of messages with these names, statuses, and coefficients."""
-        store = type_store()
-        derivative, fit = (store.types[f"sysid_msgs/msg/{name}"] for name in ("DerivativeEstimate", "FitQuality"))
         names, statuses, coefficients = strings
-        nothing = [0.0] * len(_NUMBERS)
-        rows = [derivative(n, *nothing, s == "ok", s) for n, s in zip(names, statuses, strict=True)]
-        fits = [fit(c, 0.0, 0.0, 0.0, 0) for c in coefficients]
-        message = store.types[DERIVATIVES_TYPE](header(store, frame_id), *self._said, rows, fits)
-        layout = layout_of(store, DERIVATIVES_TYPE, bytes(store.serialize_cdr(message, DERIVATIVES_TYPE)))
+        make, blank = self._types.make, dict.fromkeys(_NUMBERS, 0.0)
+        message = make(
+            DERIVATIVES_TYPE,
+            header=make(
+                "std_msgs/msg/Header", stamp=make("builtin_interfaces/msg/Time", sec=0, nanosec=0), frame_id=frame_id
+            ),
+            derivatives=[
+                make("sysid_msgs/msg/DerivativeEstimate", name=name, valid=status == "ok", status=status, **blank)
+                for name, status in zip(names, statuses, strict=True)
+            ],
+            fits=[
+                make("sysid_msgs/msg/FitQuality", coefficient=name, samples=0, **dict.fromkeys(_FIT_NUMBERS, 0.0))
+                for name in coefficients
+            ],
+            **self._said,
+        )
+        layout = self._types.layout(DERIVATIVES_TYPE, message)
         return SingleWriter(
             layout,
             *_STAMP,
             _paths("derivatives", len(names), _NUMBERS),
-            _paths("fits", len(fits), _FIT_NUMBERS),
-            _paths("fits", len(fits), ("samples",)),
+            _paths("fits", len(coefficients), _FIT_NUMBERS),
+            _paths("fits", len(coefficients), ("samples",)),
         )
 
 

@@ -15,13 +15,13 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rosbags.serde import SerdeError
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
+from sysid_node.flight.cdr_layout import DamageError
 from sysid_node.flight.cdr_single import SingleReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import conversion, inputs
@@ -31,6 +31,7 @@ from sysid_node.ros.estimates_cdr import EstimatesSerialiser
 from sysid_node.ros.inputs import UNREADABLE, Numbers, Texts
 from sysid_node.ros.lifecycle import CarefulNode
 from sysid_node.ros.loop_node import SENSOR_QOS
+from sysid_node.ros.message_types import RosTypes, fields_of
 from sysid_node.ros.monitor import Durations, TopicMonitor
 from sysid_node.ros.parameters import estimation_settings
 from sysid_node.ros.save import save_estimates
@@ -82,7 +83,7 @@ class Identifier(CarefulNode):
         self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
         self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
-        self._serialiser = EstimatesSerialiser(aircraft.name, self._session.settings.method)
+        self._serialiser = EstimatesSerialiser(RosTypes(), aircraft.name, self._session.settings.method)
         self._inputs = [
             self._listen(Imu, IMU, self._on_imu),
             self._listen(AirData, AIR_DATA, self._on_air_data),
@@ -107,7 +108,7 @@ class Identifier(CarefulNode):
 
         Messages come serialised: making objects of all their parts would take longer than the estimator does.
         """
-        monitor, reader = self._monitors[topic], SingleReader(INPUT_TOPICS[topic], *inputs.FIELDS[topic])
+        monitor, reader = self._monitors[topic], SingleReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic])
 
         def on_message(raw: bytes) -> None:
             monitor.arrived()
@@ -115,7 +116,7 @@ class Identifier(CarefulNode):
                 return
             try:
                 numbers, texts = reader.read(raw)
-            except SerdeError:
+            except DamageError:
                 self._session.refuse(topic, UNREADABLE)
                 return
             for due in take(self._session, numbers, texts):

@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.serde import SerdeError
 
-from sysid_node.flight.cdr import layout_of
+from sysid_node.flight.cdr import definitions_of
+from sysid_node.flight.cdr_layout import DamageError, layout_of
 from sysid_node.flight.cdr_single import SingleReader, SingleWriter
 from sysid_node.flight.messages import type_store
 
 STORE = type_store()
+FIELDS = definitions_of(STORE)
 JOINTS = "sensor_msgs/msg/JointState"
 STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 
@@ -24,7 +25,7 @@ def joints(names: list[str], positions: list[float], seconds: int = 7, big: bool
 
 
 def test_numbers_and_strings_are_those_that_were_written() -> None:
-    reader = SingleReader(JOINTS, (*STAMP, "position"), ("name", "header.frame_id"))
+    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"), ("name", "header.frame_id"))
     for seconds, names in ((1, ["elevator", "aileron"]), (2, ["a", "throttle"]), (3, ["elevator", "aileron"]), (4, [])):
         positions = [0.125 * seconds, -1e-300][: len(names)]
         numbers, strings = reader.read(joints(names, positions, seconds))
@@ -33,7 +34,7 @@ def test_numbers_and_strings_are_those_that_were_written() -> None:
 
 
 def test_other_byte_orders_and_more_layouts_than_are_remembered() -> None:
-    reader = SingleReader(JOINTS, (*STAMP, "position"), ("name",))
+    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"), ("name",))
     for i in range(60):
         names = [f"{'x' * (i % 25)}{i % 20}", "rudder"]
         numbers, strings = reader.read(joints(names, [i, -i], i, big=i % 3 == 0))
@@ -42,16 +43,16 @@ def test_other_byte_orders_and_more_layouts_than_are_remembered() -> None:
 
 @pytest.mark.parametrize("spoil", [lambda raw: raw[:-9], lambda raw: b"", lambda raw: b"\1" + raw])
 def test_what_is_no_whole_message_is_refused(spoil: Callable[[bytes], bytes]) -> None:
-    reader = SingleReader(JOINTS, (*STAMP, "position"))
+    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"))
     raw = joints(["elevator"], [0.5])
     reader.read(raw)
-    with pytest.raises(SerdeError):
+    with pytest.raises(DamageError):
         reader.read(spoil(raw))
 
 
 def test_what_is_written_is_read_by_rosbags() -> None:
     raw = joints(["elevator", "aileron"], [0.0, 0.0])
-    layout = layout_of(STORE, "sensor_msgs/msg/JointState", raw)
+    layout = layout_of(FIELDS, JOINTS, raw)
     writer = SingleWriter(layout, ["header.stamp.sec"], ["position"])
     found: list[Any] = writer.write(np.array([[5], [6]]), np.array([[0.1, 0.2], [np.nan, -3.0]]))
     read = [STORE.deserialize_cdr(data, JOINTS) for data in found]
@@ -63,6 +64,6 @@ def test_what_is_written_is_read_by_rosbags() -> None:
 
 def test_bytes_behind_a_message_mean_nothing() -> None:
     """ROS serialises into buffers that may be larger than the message."""
-    reader = SingleReader(JOINTS, (*STAMP, "position"))
+    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"))
     for extra in (b"", b"\1" * 8, b"\2" * 3):
         assert reader.read(joints(["elevator"], [0.5]) + extra)[0] == (7, 250, 0.5)

@@ -12,6 +12,7 @@ from sysid_msgs.msg import DerivativeEstimates
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.ros import conversion
 from sysid_node.ros.estimates_cdr import EstimatesSerialiser
+from sysid_node.ros.message_types import RosTypes
 
 
 def test_level_flight_in_either_frame() -> None:
@@ -37,7 +38,7 @@ def test_estimates_survive_to_the_last_bit() -> None:
         },
         {"Cm": FitQuality("Cm", 0.9, 1e-3, 7.5, 12)},
     )
-    raw = EstimatesSerialiser("cdrw", "sls_rft").one(estimates, START_NS + 100_000_000, "base_link")
+    raw = EstimatesSerialiser(RosTypes(), "cdrw", "sls_rft").one(estimates, START_NS + 100_000_000, "base_link")
     message = deserialize_message(raw, DerivativeEstimates)
     assert (message.header.frame_id, message.aircraft, message.method) == ("base_link", "cdrw", "sls_rft")
     assert conversion.estimates_from_message(message, START_NS) == estimates

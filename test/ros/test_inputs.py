@@ -11,13 +11,14 @@ from sysid_node.flight.cdr_single import SingleReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import inputs
 from sysid_node.ros.conversion import stamp_message
+from sysid_node.ros.message_types import fields_of
 
 STAMP = 1_700_000_000_123_456_789
 FRAMES = ("", "imu", "a/frame/of/another/length")
 
 
 def read(topic: str, message: object) -> tuple[inputs.Numbers, inputs.Texts]:
-    return SingleReader(INPUT_TOPICS[topic], *inputs.FIELDS[topic]).read(serialize_message(message))
+    return SingleReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic]).read(serialize_message(message))
 
 
 @pytest.mark.parametrize("frame", FRAMES)

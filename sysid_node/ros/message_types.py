@@ -1,0 +1,52 @@
+"""ROS's message classes, their fields and their serialised layout: what ``flight.messages`` is to bags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from rclpy.serialization import serialize_message
+from rosidl_parser.definition import AbstractNestedType, AbstractString, BasicType, NamespacedType
+from rosidl_parser.definition import Array as FixedArray
+
+from sysid_node.flight.cdr_layout import NUMBERS, Array, Kind, Layout, Part, String, layout_of
+
+#: IDL's names of what message definitions call otherwise.
+_IDL = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
+
+
+class RosTypes:
+    """Messages by the name of their type: ``sensor_msgs/msg/Imu``."""
+
+    def make(self, msgtype: str, /, **fields: Any) -> Any:
+        """A message."""
+        return _class_of(msgtype)(**fields)
+
+    def layout(self, msgtype: str, message: Any) -> Layout:
+        """The layout of a message once it is serialised."""
+        return layout_of(fields_of, msgtype, serialize_message(message), spare=True)
+
+
+@cache
+def fields_of(msgtype: str) -> Sequence[tuple[str, Kind]]:
+    """A type's fields, as ``cdr_layout.Definitions``."""
+    kind = _class_of(msgtype)
+    return [(name, _kind(slot)) for name, slot in zip(kind.get_fields_and_field_types(), kind.SLOT_TYPES, strict=True)]
+
+
+def _class_of(msgtype: str) -> Any:
+    package, _, name = msgtype.partition("/msg/")
+    return getattr(import_module(f"{package}.msg"), name)
+
+
+def _kind(slot: Any) -> Kind:
+    if isinstance(slot, AbstractNestedType):
+        return Array(_kind(slot.value_type), slot.size if isinstance(slot, FixedArray) else None)
+    if isinstance(slot, AbstractString):
+        return String()
+    if isinstance(slot, NamespacedType):
+        return Part("/".join(slot.namespaced_name()))
+    assert isinstance(slot, BasicType)
+    return NUMBERS[_IDL.get(slot.typename, slot.typename)]
