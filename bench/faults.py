@@ -144,13 +144,13 @@ def _undamped(share: float) -> Case:
 
 #: Each fault from hardly to easily found.
 GROWING = (
-    *(_lost("elevator", share) for share in (0.1, 0.2, 0.3)),
-    *(_lost("aileron", share) for share in (0.2, 0.3, 0.45, 0.6)),
-    *(_vane("beta", degrees) for degrees in (0.5, 1.0, 2.0)),
-    *(_aft(millimetres) for millimetres in (5.0, 10.0, 20.0)),
+    *(_lost("elevator", share) for share in (0.1, 0.2, 0.3, 0.4)),
+    *(_lost("aileron", share) for share in (0.1, 0.2, 0.3, 0.45, 0.6)),
+    *(_vane("beta", degrees) for degrees in (0.5, 1.0, 2.0, 3.0)),
+    *(_aft(millimetres) for millimetres in (5.0, 10.0, 20.0, 30.0)),
     *(_undamped(share) for share in (0.25, 0.5, 0.75)),
 )
-LATER, WITHIN = 90.0, (5.0, 15.0, 40.0)  # s: onset where faults grow, times within which they are found
+WITHIN = (5.0, 15.0, 40.0)  # s
 
 
 def believed(seed: int) -> Aircraft:
@@ -199,11 +199,9 @@ def watch(state: State, time: Array, samples: Array, onset: float) -> Seen:
     return Seen(early, found - onset, named)
 
 
-def watched(
-    case: Case, turbulence: str, flights: int, identified: bool, onset: float = ONSET, end: float = END
-) -> list[Seen]:
+def watched(case: Case, turbulence: str, flights: int, identified: bool, end: float = END) -> list[Seen]:
     """What the monitor sees in flights of ``end`` s."""
-    setting = Setting("", turbulence, seconds=end, later=case.effects, onset=onset)
+    setting = Setting("", turbulence, seconds=end, later=case.effects, onset=ONSET)
     if not case.effects:
         setting = replace(setting, onset=math.inf)
     seeds = range(1, flights + 1)
@@ -211,9 +209,9 @@ def watched(
     seen = []
     for seed, samples in zip(seeds, batch.samples, strict=True):
         if case.broken is not None:
-            first = int(np.searchsorted(batch.time, onset))
+            first = int(np.searchsorted(batch.time, ONSET))
             case.broken(samples[first:], samples[first - 1], np.random.default_rng(seed))
-        seen.append(watch(monitored(seed, identified), batch.time, samples, onset))
+        seen.append(watch(monitored(seed, identified), batch.time, samples, ONSET))
     return seen
 
 
@@ -226,7 +224,7 @@ def power(flights: int, identified: bool, results: Path) -> str:
             continue
         cells = [case.name]
         for turbulence in BOUNDS:
-            seen = watched(case, turbulence, flights, identified, LATER, LATER + WITHIN[-1])
+            seen = watched(case, turbulence, flights, identified, ONSET + WITHIN[-1])
             cells += [str(sum(one.after <= within for one in seen)) for within in WITHIN]
         rows.append(cells)
         _keep(results, cells)

@@ -3,7 +3,7 @@
     state = init(aircraft, Settings())
     fault = update(state, time, sample)        # as ``online.estimator.update`` takes it; None while nothing is wrong
 
-Ten times a second the last half second to half a minute are weighed against the model that is held (``evidence``). The first
+Ten times a second the last half to eight seconds are weighed against the model that is held (``evidence``). The first
 Bayes factor beyond the threshold is an alarm. From then on all that is learned is held, the fault's onset is where the
 evidence begins, and all that has come since is weighed anew: which fault, how large. When the last seconds no longer
 speak of it, the alarm ends.
@@ -27,7 +27,7 @@ from sysid_node.faults.held import Known
 from sysid_node.faults.hypotheses import hypotheses
 from sysid_node.faults.report import Found, fault_of
 from sysid_node.faults.settings import Settings
-from sysid_node.faults.state import SOON, SPANS, Alarm, Piece, State
+from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
 from sysid_node.faults.terms import Terms, terms
 from sysid_node.faults.types import VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
@@ -51,7 +51,6 @@ EVERY = 5  # a span of n times so many blocks is looked at with every n-th block
 EXPLAINED = 0.9  # share of a coefficient's motion, for it to be learned from
 PATIENT = 20  # blocks that a vane must have stood still
 LEAST = 3  # blocks that a fault must have lasted
-ONSETS = 80  # times of onset that are compared
 RENEWED = 10  # blocks after which hypotheses and whitening are made anew
 SETTLED = 0.5  # share of the learning, after which the residuals' colour is known well enough to learn by
 OFFSETS = 30.0  # s over which offsets are learned
@@ -131,9 +130,8 @@ def _judge(state: State, piece: Piece) -> None:
     if state.count % RENEWED == 0 or not state.hypotheses:
         _renew(state, piece.block)
     _watch(state)
-    lag = state.lag
-    if state.alarm is None and len(state.pieces) > lag and state.count - lag > state.learned:
-        old = state.pieces[-lag - 1]
+    if state.alarm is None and len(state.pieces) > LAG:
+        old = state.pieces[-LAG - 1]
         _learn(state, old.block, old.residual)
         _learn_model(state)
 
@@ -153,14 +151,12 @@ def _learn_model(state: State) -> None:
     In a closed loop surfaces answer to gusts, and where gusts make the motion least squares are biased by that (Ljung,
     "System Identification", 2nd ed. (1999), sect. 13.4).
     """
-    lag = state.lag
-    if len(state.pieces) <= lag or state.count - lag <= state.learned:
+    if len(state.pieces) <= LAG:
         return
     if state.count % RENEWED == 0 or not state.explained.size:
-        begin = len(state.pieces) - lag - 1
-        later = islice(state.pieces, begin, begin + SOON + 1)
-        state.explained = _explained(state.terms, [piece.block for piece in later])
-    old, state.learned = state.pieces[-lag - 1], state.count - lag
+        last = islice(state.pieces, len(state.pieces) - LAG - 1, None)
+        state.explained = _explained(state.terms, [piece.block for piece in last])
+    old = state.pieces[-LAG - 1]
     held.learn(state.held, old.J, old.v, state.explained)
 
 
@@ -205,9 +201,8 @@ def _rebuild(state: State) -> None:
 def _watch(state: State) -> None:
     """Look for a fault in the spans that are due."""
     new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses)))
-    within = min(len(state.pieces), state.lag)
     for row, span in enumerate(SPANS):
-        if state.count % max(span // EVERY, 1) or span > within:
+        if state.count % max(span // EVERY, 1) or span > len(state.pieces):
             continue
         over = stretch(state, span)
         usual = state.usual[-span - 1][row] if span < len(state.usual) else new[row]
@@ -235,8 +230,7 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
 
 def _alarm(state: State, over: Stretch, usual: Array) -> None:
     """Something has failed."""
-    reach = min(len(state.pieces), max(SOON, 2 * len(over.pieces)))
-    now, earliest = over.pieces[-1].block.time, state.pieces[-reach].block.time - PERIOD
+    now, earliest = over.pieces[-1].block.time, state.pieces[-min(len(state.pieces), LAG)].block.time - PERIOD
     state.alarm = Alarm(now, earliest, earliest, usual)
     _follow(state, state.alarm)
 
@@ -258,7 +252,7 @@ def _follow(state: State, alarm: Alarm) -> None:
         state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
     else:
         state.fault = Fault(VANE_STUCK, list(vanes)[place - len(found)], *(math.nan,) * 3, "", *times)
-    if now - alarm.found > SOON * PERIOD and _over(state, place, alarm):
+    if now - alarm.found > LAG * PERIOD and _over(state, place, alarm):
         state.alarm = state.fault = None
         state.pieces.clear()
         state.usual.clear()
@@ -284,8 +278,7 @@ def _onset(state: State, alarm: Alarm) -> float:
     """
     # the filter's memory of the blocks before the change ends shortly after it: none sets in later than that
     latest = max(_since(state, alarm.found) - ORDER - 1, LEAST)
-    first = max(_since(state, alarm.earliest), latest)
-    counts = range(latest, first + 1, max((first - latest) // ONSETS, 1))
+    counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
     spans = stretches(state, counts)
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
     if not factors.max() > 0.0:
@@ -306,6 +299,6 @@ def _left(state: State, over: Stretch, usual: Array) -> float:
 
 def _over(state: State, place: int, alarm: Alarm) -> bool:
     """Whether the last seconds speak against the fault."""
-    over = stretch(state, min(SOON, len(state.pieces)))
+    over = stretch(state, min(LAG, len(state.pieces)))
     factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over).values()]
     return factors[place] < 0.0

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults.blocks import PERIOD, Block, Blocks
+from sysid_node.faults.blocks import Block, Blocks
 from sysid_node.faults.colour import ORDER, Colour
 from sysid_node.faults.evidence import Shifts
 from sysid_node.faults.held import Belief, Held
@@ -21,10 +21,9 @@ from sysid_node.faults.types import Fault
 
 Array = NDArray[np.float64]
 
-SPANS = (5, 10, 20, 40, 80, 160, 320)  # blocks looked back over
-SOON = 80  # blocks that are looked back over from the beginning, and in which an alarm may end
-SHARE = 0.5  # of the blocks that were judged, that may wait to be learned
-LONGEST = SPANS[-1] + 120  # blocks of a fault that are weighed
+SPANS = (5, 10, 20, 40, 80)  # blocks looked back over
+LAG = SPANS[-1]  # blocks that must have shown nothing before what is older is learned
+LONGEST = 200  # blocks of a fault that are weighed
 
 
 class Piece(NamedTuple):
@@ -64,18 +63,7 @@ class State:
     shifts: Shifts | None = None  # the hypotheses'
     belief: Belief | None = None  # what the blocks are weighed against
     explained: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))  # (D,) terms that are learned
-    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))  # (S, H) by block
+    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block
     count: int = 0
-    learned: int = 0  # the newest block that the model was learned from
     alarm: Alarm | None = None
     fault: Fault | None = None
-
-    @property
-    def lag(self) -> int:
-        """Blocks that must have shown nothing before what is older is learned: the longest span that is looked over.
-
-        Small changes take long to show, and must not be learned meanwhile; but at first there is little to compare
-        with, and learning comes before patience.
-        """
-        judged = self.count - self.settings.learning / PERIOD
-        return max(span for span in SPANS if span <= max(SOON, SHARE * judged))

@@ -53,7 +53,7 @@ def _against(state: State, pieces: Sequence[Piece], J: Array, v: Array) -> Stret
 
 
 def stretches(state: State, counts: Sequence[int]) -> list[Stretch]:
-    """As many as there are counts, which rise."""
+    """As many as there are counts, which rise by one."""
     pieces = list(islice(state.pieces, len(state.pieces) - counts[-1], None))
     J = np.cumsum([piece.J for piece in reversed(pieces)], axis=0)
     v = np.cumsum([piece.v for piece in reversed(pieces)], axis=0)

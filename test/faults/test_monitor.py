@@ -129,38 +129,6 @@ def test_nothing_is_found_where_nothing_failed() -> None:
         assert fly(state, maker, 10.0) is None
 
 
-def test_memory_grows_with_the_flight_and_nothing_is_learned_twice() -> None:
-    """8 s at first, 32 s once twice as much has been judged; while it grows nothing is learned."""
-    state, maker = monitored(seed=13)
-    newest, lags = 0, {}
-    for _ in range(1000):
-        before = state.held.blocks[0, 0]
-        monitor.take(state, maker.block())
-        lags[state.count] = state.lag
-        if state.learned > newest:
-            assert state.learned == state.count - state.lag
-            newest = state.learned
-        else:
-            assert state.held.blocks[0, 0] == before
-    assert (lags[300], lags[519], lags[520], lags[839], lags[840]) == (80, 80, 160, 160, 320)
-    assert newest == 1000 - 320
-    assert state.fault is None
-
-
-def test_a_small_change_is_found_in_time() -> None:
-    """A seventh of the elevator's effect takes longer to show than the first spans are long."""
-    state, maker = monitored(seed=14)
-    for _ in range(10):
-        assert fly(state, maker, 10.0) is None
-    found = [fly(state, maker, 1.0, lost("de", 0.15)) for _ in range(40)]
-    after = next(i for i, fault in enumerate(found) if fault)
-    assert 8 < after < 38
-    last = found[-1]
-    assert last is not None
-    assert (last.kind, last.part) == (LOSS, "elevator"), last.text
-    assert last.lower <= 0.15 <= last.upper
-
-
 def test_rougher_air_is_no_fault() -> None:
     state, maker = monitored(seed=6)
     fly(state, maker, 60.0)
