@@ -41,15 +41,17 @@ def present_at(state: State, lines: Sequence[Array], times: Sequence[float]) -> 
     renewed, rate = state.renewed, state.model.spectrum.rate
     if renewed is None:
         return None
-    left = np.array([math.exp(0.5 * rate * (state.segment_start - time)) for time in times])
     part = np.array(lines)
-    part -= state.segment * left[:, None, None] if rate else state.segment
+    if rate:
+        left = np.array([math.exp(0.5 * rate * (state.segment_start - time)) for time in times])
+        part -= state.segment * left[:, None, None]
+    else:
+        part -= state.segment
     gram = products(part, state.model.auxiliary)
     gram += renewed.base
     # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
-    energy = renewed.total.energy
-    growth = np.array([(energy + max(time - renewed.time, 0.0)) / max(energy, 1e-9) for time in times])
-    growth = growth[:, None, None]
+    energy, since = renewed.total.energy, renewed.time
+    growth = np.array([[[(energy + max(time - since, 0.0)) / max(energy, 1e-9)]] for time in times])
     noise = renewed.compensation
     solution = regression.solve(state.plan, gram, None if noise is None else noise * growth)
     diagonal = np.abs(solution.inverse.diagonal(axis1=1, axis2=2))

@@ -53,6 +53,7 @@ class Plan:
     square: Index = field(init=False)  # (C,) of y'y
     counted: Array = field(init=False)  # (P + C, P) 1 where the entry lies in a block
     unit: Array = field(init=False)  # (P, P)
+    known: Array = field(init=False)  # (P + C, P) the unit matrix, and room for what is known
     instrumented: NDArray[np.bool_] = field(init=False)  # (C,) whether any of its regressors has an instrument
     least_squares: bool = field(init=False)  # whether every regressor is its own instrument
     kin: dict[tuple[int, ...], Plan] = field(init=False, default_factory=dict, repr=False)  # see ``without``
@@ -65,6 +66,7 @@ class Plan:
         object.__setattr__(self, "square", self.outputs * (self.width + 1))
         object.__setattr__(self, "counted", np.vstack([self.same, self.mine.T]))
         object.__setattr__(self, "unit", np.eye(self.columns.size))
+        object.__setattr__(self, "known", np.eye(both.size, self.columns.size))
         object.__setattr__(self, "instrumented", (self.mine.T @ (self.columns != self.instruments)) > 0.0)
         object.__setattr__(self, "least_squares", plain)
 
@@ -151,8 +153,10 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
 
 def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:
     """``_factorised`` of each of K moments."""
-    found = [_factorised(plan, one) for one in cross]
-    return np.array([solved for solved, _ in found]), np.array([fine for _, fine in found])
+    solved, usable = np.empty((len(cross), cross.shape[2], cross.shape[1])), np.empty(len(cross), dtype=bool)
+    for k, one in enumerate(cross):
+        solved[k], usable[k] = _factorised(plan, one)
+    return solved, usable
 
 
 def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
@@ -172,8 +176,7 @@ def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
 def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
     """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), and LAPACK's fault, 0 for none."""
     P = plan.columns.size
-    known = np.empty_like(cross)
-    known[:P] = plan.unit
+    known = plan.known.copy()
     known[P:] = cross[P:]
     solver = dposv if plan.least_squares else dgesv
     *_, solved, fault = solver(cross[:P].T, known.T, overwrite_b=True)
