@@ -76,7 +76,10 @@ def _findings(found: Diagnosis) -> str:
             f"{percent(found.size.noise_floor)}. No other effect is needed."
         )
     if found.verdict == "unsupported":
-        return ", but the flight moves too little to say why: fly a larger manoeuvre."
+        return (
+            ", but the flight cannot say why: too little is commanded, or only an autopilot that answers gusts moves the "
+            "controls. Fly larger manoeuvres."
+        )
     if not found.attribution.causes:
         return (
             ", by more than noise and tolerances allow, and none of the effects known here predicts it: "
