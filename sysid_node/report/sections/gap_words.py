@@ -77,8 +77,8 @@ def _findings(found: Diagnosis) -> str:
         )
     if found.verdict == "unsupported":
         return (
-            ", but the flight cannot say why: too little is commanded, or only an autopilot that answers gusts moves the "
-            "controls. Fly larger manoeuvres."
+            ", but the flight cannot say why: too little is commanded, or only an autopilot that answers gusts moves "
+            "the controls. Fly larger manoeuvres."
         )
     if not found.attribution.causes:
         return (
