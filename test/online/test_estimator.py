@@ -53,6 +53,11 @@ def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: st
     return state
 
 
+def left_out(state: State) -> int:
+    """Samples that were counted as left out."""
+    return sum(state.incomplete.values())
+
+
 @given(
     st.lists(st.tuples(st.integers(0, len(TIME) - 1), st.integers(0, WIDTH - 1), anything), max_size=40),
     st.sampled_from(METHODS),
@@ -62,7 +67,7 @@ def test_any_values(spoilt: list[tuple[int, int, float]], method: str) -> None:
     samples = SAMPLES.tolist()
     for row, column, value in spoilt:
         samples[row][column] = value
-    flown(samples, TIME.tolist(), method)
+    assert left_out(flown(samples, TIME.tolist(), method)) <= len({row for row, _, _ in spoilt})
 
 
 @given(st.lists(st.tuples(st.integers(0, len(TIME) - 1), anything), max_size=40))
@@ -73,20 +78,24 @@ def test_any_times(spoilt: list[tuple[int, float]]) -> None:
     times = TIME.tolist()
     for row, time in spoilt:
         times[row] = time
-    flown(SAMPLES.tolist(), times)
+    state = flown(SAMPLES.tolist(), times)
+    assert math.isnan(state.begin) or state.previous is None or abs(state.previous[0]) < estimator.LIMIT
 
 
 @given(st.permutations(range(60)), st.sampled_from(METHODS))
 @hypothesis_settings(max_examples=15, deadline=None)
 def test_any_order(order: list[int], method: str) -> None:
     rows = [*range(200), *(200 + i for i in order)]
-    flown(SAMPLES[rows].tolist(), TIME[rows].tolist(), method)
+    state = flown(SAMPLES[rows].tolist(), TIME[rows].tolist(), method)
+    newest = np.maximum.accumulate(TIME[rows])
+    assert left_out(state) == np.count_nonzero(newest[1:] == newest[:-1])
 
 
 @given(st.lists(st.lists(anything, min_size=WIDTH, max_size=WIDTH), max_size=30))
 @hypothesis_settings(max_examples=30, deadline=None)
 def test_nothing_but_nonsense(samples: list[list[float]]) -> None:
-    flown(samples, [0.1 * i for i in range(len(samples))])
+    state = flown(samples, [0.1 * i for i in range(len(samples))])
+    assert not any(d.valid for d in estimate(state).derivatives.values())
 
 
 @given(st.data())
