@@ -56,7 +56,7 @@ class EstimatesSerialiser:
             fits = np.array([_fits(estimates.fits) for estimates in some])
             columns = [derivatives, fits[:, :, :-1], fits[:, :, -1]]
             numbers = [column.reshape(len(some), -1) for column in columns]
-            found = self._writers(frame_id, strings).write(*_stamp_columns(stamps), *numbers)
+            found = self._writers(frame_id, strings).write(*divmod(stamps[:, None], 1_000_000_000), *numbers)
             for i, message in zip(places, found, strict=True):
                 messages[i] = message
         return messages
@@ -92,11 +92,6 @@ class EstimatesSerialiser:
             _paths("fits", len(coefficients), _FIT_NUMBERS),
             _paths("fits", len(coefficients), ("samples",)),
         )
-
-
-def _stamp_columns(stamps_ns: Stamps) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Seconds and nanoseconds (K, 1)."""
-    return stamps_ns[:, None] // 1_000_000_000, stamps_ns[:, None] % 1_000_000_000
 
 
 def _paths(field: str, count: int, names: Sequence[str]) -> list[str]:
