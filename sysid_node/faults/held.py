@@ -104,17 +104,13 @@ def learn(held: Held, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
     held.v = KEPT * held.v + chosen * v
 
 
-def noise_of(terms: Terms, colour: Colour, variances: Mapping[str, float]) -> Array:
-    """(D, D) what noise of these ``variances`` on regressors, by name, adds to the information of a block."""
-    total = np.zeros((len(terms.names), len(terms.names)))
-    for name, variance in variances.items():
-        noisy = np.flatnonzero(terms.of(name))
-        design = np.zeros((6, total.shape[0]))
-        design[terms.output[noisy], noisy] = 1.0
-        for taps in (np.ones(6), *colour.filter):
-            part = colour.unmix @ (taps[:, None] * design)
-            total += variance * part.T @ part
-    return total
+def noise_of(terms: Terms, colour: Colour, regressor: str, variance: float) -> Array:
+    """(D, D) what noise of a ``variance`` on a regressor adds to the information of a block."""
+    noisy = np.flatnonzero(terms.of(regressor))
+    design = np.zeros((6, len(terms.names)))
+    design[terms.output[noisy], noisy] = np.sqrt(variance)
+    parts = (colour.unmix @ (taps[:, None] * design) for taps in (np.ones(6), *colour.filter))
+    return np.asarray(sum(part.T @ part for part in parts))
 
 
 def belief(held: Held, noise: Array, slack: float) -> Belief:

@@ -179,8 +179,11 @@ def _renew(state: State, now: Block) -> None:
     colour.settle(state.colour)
     if held.ripen(state.held, now.time):
         _rebuild(state)
-    share = held.noise_of(state.terms, state.colour, vane_noise(state, now.samples)) * state.held.blocks
-    state.belief = held.belief(state.held, share, state.settings.slack)
+    variances = vane_noise(state, now.samples)
+    noise = {vane: held.noise_of(state.terms, state.colour, vane, variance) for vane, variance in variances.items()}
+    state.belief = held.belief(state.held, sum(noise.values()) * state.held.blocks, state.settings.slack)
+    believed = state.held.values + state.belief.shift
+    state.flattened = {vane: (variances[vane], added @ believed) for vane, added in noise.items()}
     state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held, state.belief.shift))
     state.shifts = Shifts([hypothesis.shift for hypothesis in state.hypotheses])
 
@@ -219,7 +222,7 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
     """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
     threshold = state.settings.threshold
     found = promising(state, over, usual, squares, threshold)
-    best = max(stuck_vanes(state, over).values(), default=0.0) if len(over.pieces) >= PATIENT else 0.0
+    best = float(stuck_vanes(state, over.pieces).max()) if len(over.pieces) >= PATIENT else 0.0
     for place, weighed in enumerate(found):
         if weighed.factor > threshold:
             left = max(excess(state, over, place, weighed), float(usual[place]), 1.0)
@@ -244,14 +247,13 @@ def _follow(state: State, alarm: Alarm) -> None:
         alarm.since = _onset(state, alarm)
     over = stretch(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)))
     found = explained(state, over, alarm.usual)
-    vanes = stuck_vanes(state, over)
-    factors = np.array([*(w.factor for w in found), *vanes.values()])
+    factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
     place = int(np.argmax(factors))
     times = Found(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
     if place < len(found):
         state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
     else:
-        state.fault = Fault(VANE_STUCK, list(vanes)[place - len(found)], *(math.nan,) * 3, "", *times)
+        state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
     if now - alarm.found > LAG * PERIOD and _over(state, place, alarm):
         state.alarm = state.fault = None
         state.pieces.clear()
@@ -281,8 +283,11 @@ def _onset(state: State, alarm: Alarm) -> float:
     counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
     spans = stretches(state, counts)
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
+    vanes = stuck_vanes(state, spans[-1].pieces, counts)
+    if vanes.max() > factors.max():
+        return state.pieces[-counts[int(vanes.max(axis=1).argmax())]].block.time - PERIOD
     if not factors.max() > 0.0:
-        return alarm.found - PATIENT * PERIOD  # only a vane that stands still speaks of a fault
+        return alarm.since
     much = factors.max(axis=0) > MUCH * factors.max()
     best = sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True)
     left = [_left(state, spans[i], alarm.usual) for i in best]
@@ -300,5 +305,5 @@ def _left(state: State, over: Stretch, usual: Array) -> float:
 def _over(state: State, place: int, alarm: Alarm) -> bool:
     """Whether the last seconds speak against the fault."""
     over = stretch(state, min(LAG, len(state.pieces)))
-    factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over).values()]
-    return factors[place] < 0.0
+    factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over.pieces)[0]]
+    return bool(factors[place] < 0.0)

@@ -62,6 +62,9 @@ class State:
     hypotheses: list[Hypothesis] = field(default_factory=list)
     shifts: Shifts | None = None  # the hypotheses'
     belief: Belief | None = None  # what the blocks are weighed against
+    flattened: dict[str, tuple[float, Array]] = field(
+        default_factory=dict
+    )  # by vane: its noise's variance, and (D,) ...
     explained: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))  # (D,) terms that are learned
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block
     count: int = 0

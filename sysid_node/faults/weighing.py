@@ -48,8 +48,22 @@ def stretch(state: State, count: int) -> Stretch:
 def _against(state: State, pieces: Sequence[Piece], J: Array, v: Array) -> Stretch:
     """Of what is believed by now."""
     assert state.belief is not None
-    v = v - J @ state.belief.shift
+    v = v - J @ state.belief.shift + _flattened(state, pieces)
     return Stretch(pieces, (J, v), *marginal(J, v, state.belief.precision))
+
+
+def _flattened(state: State, pieces: Sequence[Piece]) -> Array:
+    """(D,) what noise of the vanes takes off the score of a stretch.
+
+    Noise on a regressor flattens the slope that least squares find, and over a long stretch in which the angle hardly
+    moves that would look like a changed derivative (bias-compensated least squares: Soderstrom, Automatica 43, 2007,
+    sec. 5). A vane that reads less than its noise has none of that size: it has jammed, or is a good one.
+    """
+    total = np.zeros(len(state.terms.names))
+    for vane, (variance, score) in state.flattened.items():
+        read = np.array([piece.block.air[VANES[vane][0]] for piece in pieces])
+        total += min(1.0, float(read.var(ddof=1)) / variance) * len(pieces) * score
+    return total
 
 
 def stretches(state: State, counts: Sequence[int]) -> list[Stretch]:
@@ -123,20 +137,21 @@ def vane_noise(state: State, samples: float) -> dict[str, float]:
     return found
 
 
-def stuck_vanes(state: State, over: Stretch) -> dict[str, float]:
-    """Logarithms of the Bayes factors of jammed vanes."""
-    found = {}
-    for vane, (column, output) in VANES.items():
+def stuck_vanes(state: State, pieces: Sequence[Piece], counts: Sequence[int] = ()) -> Array:
+    """(N, 2) logarithms of the Bayes factors of jammed vanes over the last ``counts`` (N) pieces, or over all."""
+    counts = counts or [len(pieces)]
+    found = np.zeros((len(counts), len(VANES)))
+    for place, (vane, (column, output)) in enumerate(VANES.items()):
         terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
         if not terms.size:
-            found[vane] = 0.0
             continue
         slope = float(state.held.values[terms[0]])  # what flight has shown on top is too little to matter here
-        read = np.array([piece.block.air[column] for piece in over.pieces])
-        off = [(p.residual[output] / p.block.regressors[OFFSET] - state.held.offsets[output]) for p in over.pieces]
+        read = np.array([piece.block.air[column] for piece in pieces])
+        off = [(p.residual[output] / p.block.regressors[OFFSET] - state.held.offsets[output]) for p in pieces]
         asked = read + np.array(off) / slope
-        samples = float(np.mean([piece.block.samples for piece in over.pieces]))
+        samples = float(np.mean([piece.block.samples for piece in pieces]))
         noise = vane_noise(state, samples)[vane]
         difference = float(colour.scale(state.colour)[output] / slope) ** 2
-        found[vane] = stuck_factor(read, asked, state.colour.filter[:, output], noise, difference)
+        taps = state.colour.filter[:, output]
+        found[:, place] = [stuck_factor(read[-n:], asked[-n:], taps, noise, difference) for n in counts]
     return found
