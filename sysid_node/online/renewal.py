@@ -7,6 +7,7 @@ on.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,6 @@ from sysid_node.online.unevenness import Unevenness
 Array = NDArray[np.float64]
 RECENT = 8  # pieces about whose mean motion is counted
 SOON = 20.0  # s of data up to which everything is renewed with every piece, then with every second, third, ...
-SELDOM = 6  # pieces between renewals at most
 TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which changes more slowly still
 
 
@@ -69,7 +69,7 @@ def reach(time: Any, step: Any) -> Any:
 def _is_due(state: State) -> bool:
     """Whether it is time to solve for everything again."""
     renewed = state.renewed
-    return renewed is None or state.pieces - renewed.pieces >= min(1 + int(renewed.total.energy / SOON), SELDOM)
+    return renewed is None or state.pieces - renewed.pieces >= 1 + int(renewed.total.energy / SOON)
 
 
 def begin_segment(state: State, lines: Array, time: float) -> None:
@@ -233,7 +233,7 @@ def _look_for_changes(state: State, lines: Array) -> None:
     finding = change.examine(looking, state.experiences)
     same = np.array_equal(finding.lost, renewed.lost) and np.array_equal(finding.doubted, renewed.doubted)
     if state.flow.active or not same:
-        renewed.lost, renewed.doubted, renewed.grounds = finding.lost, finding.doubted, None
+        state.renewed = replace(renewed, lost=finding.lost, doubted=finding.doubted, grounds=None)
     if finding.since is not None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -55,7 +56,7 @@ def run(
 
 
 class _Results:
-    """Collects the moments at which estimates are wanted; all since the last renewal are solved for at once."""
+    """Collects the moments at which estimates are wanted; all that lean on the same renewal are solved for at once."""
 
     def __init__(self, state: State) -> None:
         self.state = state
@@ -68,11 +69,20 @@ class _Results:
         self._lines.append(transform.current(self.state.transform))
         self._times.append((self.state.transform.last, now))
 
-    def finish(self) -> None:
-        """Solve for what is wanted so far, before what the solution leans on changes."""
+    def finish(self, state: State | None = None) -> None:
+        """Solve for what is wanted so far, as the ``state`` stood then, if it is not what it was."""
         if self._lines:
-            self.estimates += estimates_at(self.state, self._lines, *zip(*self._times, strict=True))
+            self.estimates += estimates_at(state or self.state, self._lines, *zip(*self._times, strict=True))
             self._lines, self._times = [], []
+
+    def renew(self) -> None:
+        """Renew what is due to be; solve for what is wanted so far as it was before, where this changes anything."""
+        if self.state.flow.active:
+            self.finish()
+        before = copy(self.state)
+        estimator.renew_early(self.state)
+        if self.state.renewed is not before.renewed:
+            self.finish(before)
 
 
 @dataclass(frozen=True)
@@ -191,9 +201,9 @@ def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: de
     """Take in usable samples from ``begin`` to what ends the stretch, at most ``end`` (exclusive), and return that."""
     state = results.state
     if np.isnan(chunk.begins[begin]) or reach(state.transform.last, state.step) >= state.renew_at:
-        results.finish()
-        estimator.renew_early(state)
+        results.renew()
     if np.isnan(chunk.begins[begin]):
+        results.finish()
         estimator.interrupt(state, float(chunk.time[begin]))
         return begin + 1
     # up to and including the sample after which is renewed, short of the next gap
