@@ -44,8 +44,8 @@ class Maker:
         self.motion = dict.fromkeys(SIZES, 0.0)
         self.values = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
 
-    def block(self, truth: Truth = sound, rough: float = 1.0) -> Block:
-        """The next one; ``rough`` times the noise."""
+    def block(self, truth: Truth = sound, rough: float | Array = 1.0) -> Block:
+        """The next one; ``rough`` times the noise, of each coefficient (6,) or of all."""
         self.count += 1
         fresh = self.random.standard_normal(6) * NOISE * rough * np.sqrt(1.0 - MEMORY**2)
         self.noise = MEMORY * self.noise + fresh
