@@ -10,6 +10,7 @@ from typing import Any, get_type_hints
 from sysid_node.batch.equation_error import DEFAULT_LOWPASS
 from sysid_node.batch.frequency_equation_error import DEFAULT_FREQUENCIES, Frequencies
 from sysid_node.errors import InputError
+from sysid_node.setting import check_frequencies, parsed
 
 
 @dataclass(frozen=True)
@@ -28,9 +29,7 @@ class Settings:
     max_gap: float = 0.2  # s: the longest gap in a bag that is bridged by interpolation
 
     def __post_init__(self) -> None:
-        start, step, stop = self.frequencies
-        if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
-            raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected 0 < start < stop and step > 0, in Hz")
+        check_frequencies(self.frequencies)
         for name in ("low_pass", "rate", "segment"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -45,24 +44,8 @@ class Settings:
         for key in values:
             if key not in kinds:
                 raise InputError(f"setting {key!r} is not one of a batch method; those are {', '.join(kinds)}")
-        return cls(**{key: _parse(key, kinds[key], value) for key, value in values.items()})
+        return cls(**{key: parsed(key, kinds[key], value) for key, value in values.items()})
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values by name, for ``summary.json``."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-def _parse(key: str, kind: Any, value: Any) -> Any:
-    """One setting from a text or a plain value."""
-    try:
-        if key == "frequencies":
-            start, step, stop = (float(part) for part in (value.split(":") if isinstance(value, str) else value))
-            return start, step, stop
-        if key in ("states", "biases"):
-            return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
-        if kind is bool and isinstance(value, str):
-            return {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}[value.lower()]
-        return kind(value)
-    except (KeyError, TypeError, ValueError):
-        wanted = "START:STEP:STOP in Hz" if key == "frequencies" else f"a {kind.__name__}"
-        raise InputError(f"setting {key} = {value!r}: expected {wanted}") from None

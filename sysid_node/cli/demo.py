@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import signal
 import subprocess
-import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +15,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.apart import make_folder, own_domain
 from sysid_node.cli.live_table import Moment, Reference, live_table
+from sysid_node.cli.processes import node_process
 from sysid_node.errors import InputError
 from sysid_node.flight.align import why_nothing_aligned
 from sysid_node.flight.bag import read_streams
@@ -128,7 +125,7 @@ def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[Followe
         identifier = ["--ros-args", "-p", f"aircraft:={aircraft}", "-p", f"publish_rate:={PUBLISH_RATE}"]
         identifier += [word for override in RELIABLE for word in ("-p", override)]
         player = [str(flight.bag), "--rate", str(rate), "--wait", "20"]
-        with _node("identifier", identifier, out) as identifying, _node("player", player, out) as playing:
+        with node_process("identifier", identifier, out) as identifying, node_process("player", player, out) as playing:
             _watch(flight, follower, identifying, playing)
             history = list(follower.history)
             follower.listen(DIAGNOSTICS_PERIOD)
@@ -138,22 +135,6 @@ def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[Followe
     if not history:
         raise RuntimeError(f"no estimate came; {out / 'identifier.log'} may say why")
     return follower, history
-
-
-@contextlib.contextmanager
-def _node(name: str, arguments: list[str], out: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A node in a process of its own, its log in ``<out>/<name>.log``; interrupted at the end."""
-    with (out / f"{name}.log").open("wb") as log:
-        command = [sys.executable, "-m", f"sysid_node.ros.{name}", *arguments]
-        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
-        try:
-            yield process
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait()
-    if process.returncode:
-        lines = (out / f"{name}.log").read_text(encoding="utf-8").splitlines() or ["no word of why"]
-        raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
 
 
 def _watch(

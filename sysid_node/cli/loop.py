@@ -6,13 +6,10 @@ Simulator, identifier, exciter and controller run in processes of their own, thi
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import math
-import signal
 import subprocess
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +23,7 @@ from rich.text import Text
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.apart import make_folder, own_domain
+from sysid_node.cli.processes import node_process
 from sysid_node.errors import InputError
 from sysid_node.report.loop import Episode, Event, write_loop
 
@@ -97,7 +95,7 @@ def _fly(plan: Plan) -> Episode:
     watch = LoopWatch()
     try:
         with ExitStack() as stack:
-            processes = [stack.enter_context(_node(plan, name)) for name in NODES]
+            processes = [stack.enter_context(node_process(name, _arguments(plan, name), plan.out)) for name in NODES]
             events = _watch(plan, watch, processes)
     finally:
         watch.close()
@@ -122,26 +120,14 @@ def _effects(plan: Plan, failed: bool) -> str:
     return f"{ACTUATORS} {plan.fail}" if failed and plan.fail else ACTUATORS
 
 
-@contextlib.contextmanager
-def _node(plan: Plan, name: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A node in a process of its own, its log in ``<out>/<name>.log``; interrupted at the end."""
+def _arguments(plan: Plan, name: str) -> list[str]:
+    """What a node is started with."""
     own = [f"aircraft:={plan.name}", *NODES[name]]
     if name == "flight_simulator":
         own.append(f"turbulence:={plan.turbulence}")
     if name == "adaptive_controller":
         own.append(f"adapt:={str(plan.adapt).lower()}")
-    command = [sys.executable, "-m", f"sysid_node.ros.{name}", "--ros-args"]
-    command += [word for pair in own for word in ("-p", pair)]
-    with (plan.out / f"{name}.log").open("wb") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
-        try:
-            yield process
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait()
-    if process.returncode:
-        lines = (plan.out / f"{name}.log").read_text(encoding="utf-8").splitlines() or ["no word of why"]
-        raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
+    return ["--ros-args", *(word for pair in own for word in ("-p", pair))]
 
 
 def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[Event]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
 from sysid_node.errors import InputError
+from sysid_node.setting import check_frequencies, parsed
 
 METHODS = ("sls_rft", "iv_rft")
 MOST_LINES = 1000
@@ -30,9 +31,8 @@ class Settings:
     valid_fraction: float = 0.3  # a derivative is valid once its standard error is under this share of its size
 
     def __post_init__(self) -> None:
+        check_frequencies(self.frequencies)
         start, step, stop = self.frequencies
-        if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
-            raise InputError(f"frequencies {start}:{step}:{stop}: expected 0 < start < stop and step > 0, in Hz")
         if (stop - start) / step > MOST_LINES:
             raise InputError(f"frequencies {start}:{step}:{stop}: expected at most {MOST_LINES} lines; widen the step")
         if self.method not in METHODS:
@@ -57,23 +57,8 @@ class Settings:
         for key in values:
             if key not in types:
                 raise InputError(f"setting {key!r} is not known; known: {', '.join(types)}")
-        return cls(**{key: _parse(key, types[key], value) for key, value in values.items()})
+        return cls(**{key: parsed(key, types[key], value) for key, value in values.items()})
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values by name, for ``summary.json``."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-def _parse(key: str, kind: Any, value: Any) -> Any:
-    """One setting from a text or a plain value."""
-    try:
-        if key == "frequencies":
-            parts = value.split(":") if isinstance(value, str) else value
-            start, step, stop = (float(part) for part in parts)
-            return start, step, stop
-        if kind is bool and isinstance(value, str):
-            return {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}[value.lower()]
-        return kind(value)
-    except (KeyError, TypeError, ValueError):
-        wanted = "START:STEP:STOP in Hz" if key == "frequencies" else f"a {kind.__name__}"
-        raise InputError(f"setting {key} = {value!r}: expected {wanted}") from None

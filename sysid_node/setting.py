@@ -1,0 +1,37 @@
+"""One setting, from the text of ``--set key=value`` or from a plain value."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sysid_node.errors import InputError
+
+WORDS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
+
+
+def parsed(key: str, kind: Any, value: Any) -> Any:
+    """The value as a ``kind``: a plain type, or a tuple of frequencies (three numbers) or of names.
+
+    Raises InputError where it is not one.
+    """
+    numbers = kind == tuple[float, float, float]
+    try:
+        if numbers:
+            start, step, stop = (float(part) for part in (value.split(":") if isinstance(value, str) else value))
+            return start, step, stop
+        if kind == tuple[str, ...]:
+            return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
+        if kind is bool and isinstance(value, str):
+            return WORDS[value.lower()]
+        return kind(value)
+    except (KeyError, TypeError, ValueError):
+        wanted = "START:STEP:STOP in Hz" if numbers else f"a {kind.__name__}"
+        raise InputError(f"setting {key} = {value!r}: expected {wanted}") from None
+
+
+def check_frequencies(frequencies: tuple[float, float, float]) -> None:
+    """Raise InputError unless these are a first line, a step and a last line, in Hz."""
+    start, step, stop = frequencies
+    if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
+        raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected 0 < start < stop and step > 0, in Hz")
