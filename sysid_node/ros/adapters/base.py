@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 from sysid_node.errors import InputError
-from sysid_node.ros.adapters.attitude import Attitude
+from sysid_node.ros.adapters.attitude import Attitude, LastAttitude
 from sysid_node.ros.adapters.joints import joints_of
 
 #: Of dry air, J/(kg K); of the sea-level standard atmosphere, kg/m^3 (ICAO Doc 7488, 1993).
@@ -86,10 +86,16 @@ class Adapter(ABC):
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.joints = joints_of(settings.joints, self.outputs, self.example)
+        self.attitude = LastAttitude()
+        self.air_density = math.nan  # kg/m^3, held until the next; without it there is no true airspeed
 
-    @abstractmethod
     def hear(self, topic: str, message: Any) -> Sample | None:
         """What a message on one of ``topics`` gives, if anything by itself. Any object with the message's fields."""
+        return self.listeners()[topic](message)
+
+    @abstractmethod
+    def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
+        """What takes the messages of each of the ``topics``."""
 
     def air(self, stamp_ns: int, true_airspeed: float, density: float) -> AirSample:
         """Air data, stamped when they were measured."""

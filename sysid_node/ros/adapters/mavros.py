@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sysid_node.ros.adapters.attitude import LastAttitude, attitude_of, other_axes
+from sysid_node.ros.adapters.attitude import attitude_of, other_axes
 from sysid_node.ros.adapters.base import (
     SEA_LEVEL_DENSITY,
     Adapter,
@@ -51,41 +52,41 @@ class Mavros(Adapter):
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
-        self._attitude = LastAttitude()
-        self._density = math.nan
         self._last_imu_ns = 0
 
-    def hear(self, topic: str, message: Any) -> Sample | None:
-        """See ``Adapter``. The pressure is held until the next; without one there is no true airspeed."""
-        stamp_ns = header_ns(message)
-        if topic == IMU:
-            return self._imu(stamp_ns, message)
-        if topic == AIRSPEED:
-            return self._air(stamp_ns, message)
-        if topic == OUTPUTS:
-            return self._joints(stamp_ns, message)
-        if topic == ATTITUDE:
-            attitude = attitude_of(message.orientation)
-            self._attitude.heard(stamp_ns, None if attitude is None else other_axes(attitude))
-        elif topic == PRESSURE:
-            self._density = self.density(float(message.fluid_pressure))
-        return None
+    def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
+        """See ``Adapter``."""
+        return {
+            IMU: self._imu,
+            ATTITUDE: self._attitude,
+            PRESSURE: self._pressure,
+            AIRSPEED: self._air,
+            OUTPUTS: self._joints,
+        }
 
-    def _imu(self, stamp_ns: int, message: Any) -> ImuSample:
+    def _imu(self, message: Any) -> ImuSample:
         """Of data_raw: in data the force is that of the message before, at the attitude's time."""
-        self._last_imu_ns = stamp_ns
+        stamp_ns = self._last_imu_ns = header_ns(message)
         force, rate = message.linear_acceleration, message.angular_velocity
         rates = (float(rate.x), -float(rate.y), -float(rate.z))
-        attitude = self._attitude.at(stamp_ns, rates)
+        attitude = self.attitude.at(stamp_ns, rates)
         return ImuSample(stamp_ns, (float(force.x), -float(force.y), -float(force.z)), rates, attitude)
 
-    def _air(self, stamp_ns: int, message: Any) -> AirSample:
-        """ArduPlane's airspeed is the equivalent one: true by the root of the densities' ratio."""
-        true_airspeed = float(message.airspeed) * math.sqrt(SEA_LEVEL_DENSITY / self._density)
-        return self.air(stamp_ns, true_airspeed, self._density)
+    def _attitude(self, message: Any) -> None:
+        attitude = attitude_of(message.orientation)
+        self.attitude.heard(header_ns(message), None if attitude is None else other_axes(attitude))
 
-    def _joints(self, stamp_ns: int, message: Any) -> JointSample:
+    def _pressure(self, message: Any) -> None:
+        self.air_density = self.density(float(message.fluid_pressure))
+
+    def _air(self, message: Any) -> AirSample:
+        """ArduPlane's airspeed is the equivalent one: true by the root of the densities' ratio."""
+        true_airspeed = float(message.airspeed) * math.sqrt(SEA_LEVEL_DENSITY / self.air_density)
+        return self.air(header_ns(message), true_airspeed, self.air_density)
+
+    def _joints(self, message: Any) -> JointSample:
         """Stamped by a counter that wraps every 71.6 minutes: as many wraps on as bring it next to the IMU's stamp."""
+        stamp_ns = header_ns(message)
         wraps = round((self._last_imu_ns - stamp_ns) / WRAP_NS) if self._last_imu_ns else 0
         used = {
             output: pulse

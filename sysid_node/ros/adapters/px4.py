@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sysid_node.ros.adapters.attitude import Attitude, LastAttitude, unit
+from sysid_node.ros.adapters.attitude import Attitude, unit
 from sysid_node.ros.adapters.base import Adapter, AirSample, ImuSample, JointSample, Sample, Settings, numbered
 
 IMU = "/fmu/out/sensor_combined"
@@ -37,44 +38,52 @@ class Px4(Adapter):
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
-        self._attitude = LastAttitude()
-        self._density = math.nan
-        self._motors: dict[str, float] = {}
+        self._last_motors: dict[str, float] = {}
 
-    def hear(self, topic: str, message: Any) -> Sample | None:
-        """See ``Adapter``. Density and motors are held until the next."""
-        stamp_ns = 1000 * int(message.timestamp)
-        if topic == IMU:
-            return self._imu(stamp_ns, message)
-        if topic == AIRSPEED:
-            return self._air(stamp_ns, message)
-        if topic == SERVOS:
-            return self._joints(stamp_ns, message)
-        if topic == ATTITUDE:
-            attitude = Attitude(*(float(part) for part in message.q))
-            self._attitude.heard(1000 * int(message.timestamp_sample), unit(attitude))
-        elif topic == AIR:
-            self._density = float(message.rho)
-        elif topic == MOTORS:
-            self._motors = numbered("motor", message.control)
-        return None
+    def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
+        """See ``Adapter``."""
+        return {
+            IMU: self._imu,
+            ATTITUDE: self._attitude,
+            AIR: self._density,
+            AIRSPEED: self._air,
+            SERVOS: self._servos,
+            MOTORS: self._motors,
+        }
 
-    def _imu(self, stamp_ns: int, message: Any) -> ImuSample:
+    def _imu(self, message: Any) -> ImuSample:
         """Stamped when the rates were measured; no force where the accelerometer's time says that it is invalid."""
         rx, ry, rz = (float(rate) for rate in message.gyro_rad)
         fx, fy, fz = (float(force) for force in message.accelerometer_m_s2)
         if message.accelerometer_timestamp_relative == message.RELATIVE_TIMESTAMP_INVALID:
             fx = fy = fz = math.nan
         rates = rx, ry, rz
-        return ImuSample(stamp_ns, (fx, fy, fz), rates, self._attitude.at(stamp_ns, rates))
+        stamp_ns = _stamp_ns(message)
+        return ImuSample(stamp_ns, (fx, fy, fz), rates, self.attitude.at(stamp_ns, rates))
 
-    def _air(self, stamp_ns: int, message: Any) -> AirSample:
+    def _attitude(self, message: Any) -> None:
+        attitude = Attitude(*(float(part) for part in message.q))
+        self.attitude.heard(1000 * int(message.timestamp_sample), unit(attitude))
+
+    def _density(self, message: Any) -> None:
+        self.air_density = float(message.rho)
+
+    def _air(self, message: Any) -> AirSample:
         """No airspeed where it is ground speed minus wind, or synthetic: those are no measurements of the air."""
         source = getattr(message, "airspeed_source", None)
         if source is None:  # until 1.15
             source = message.selected_airspeed_index
         measured = 1 <= source <= 3
-        return self.air(stamp_ns, float(message.true_airspeed_m_s) if measured else math.nan, self._density)
+        airspeed = float(message.true_airspeed_m_s) if measured else math.nan
+        return self.air(_stamp_ns(message), airspeed, self.air_density)
 
-    def _joints(self, stamp_ns: int, message: Any) -> JointSample:
-        return self.deflections(stamp_ns, self._motors | numbered("servo", message.control))
+    def _motors(self, message: Any) -> None:
+        self._last_motors = numbered("motor", message.control)
+
+    def _servos(self, message: Any) -> JointSample:
+        """With the motors' last commands."""
+        return self.deflections(_stamp_ns(message), self._last_motors | numbered("servo", message.control))
+
+
+def _stamp_ns(message: Any) -> int:
+    return 1000 * int(message.timestamp)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sysid_node.ros.adapters.attitude import LastAttitude, attitude_of
+from sysid_node.ros.adapters.attitude import attitude_of
 from sysid_node.ros.adapters.base import (
     Adapter,
     AirSample,
     ImuSample,
+    JointSample,
     Sample,
-    Settings,
     header_ns,
     numbered,
 )
@@ -41,34 +42,34 @@ class Rosflight(Adapter):
     package = "rosflight_msgs"
     remedy = "build github.com/rosflight/rosflight_ros_pkgs, and source that workspace"
 
-    def __init__(self, settings: Settings) -> None:
-        super().__init__(settings)
-        self._attitude = LastAttitude()
-        self._density = math.nan
+    def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
+        """See ``Adapter``."""
+        return {
+            IMU: self._imu,
+            ATTITUDE: self._attitude,
+            PRESSURE: self._pressure,
+            AIRSPEED: self._air,
+            OUTPUTS: self._joints,
+        }
 
-    def hear(self, topic: str, message: Any) -> Sample | None:
-        """See ``Adapter``. The pressure is held until the next; without one there is no true airspeed."""
-        stamp_ns = header_ns(message)
-        if topic == IMU:
-            return self._imu(stamp_ns, message)
-        if topic == AIRSPEED:
-            return self._air(stamp_ns, message)
-        if topic == OUTPUTS:
-            return self.deflections(stamp_ns, numbered("out", message.values))
-        if topic == ATTITUDE:
-            self._attitude.heard(stamp_ns, attitude_of(message.attitude))
-        elif topic == PRESSURE:
-            self._density = self.density(float(message.pressure))
-        return None
-
-    def _imu(self, stamp_ns: int, message: Any) -> ImuSample:
+    def _imu(self, message: Any) -> ImuSample:
         """Its own orientation is an older attitude without a time; the stamped one is taken."""
+        stamp_ns = header_ns(message)
         force, rate = message.linear_acceleration, message.angular_velocity
         rates = (float(rate.x), float(rate.y), float(rate.z))
-        attitude = self._attitude.at(stamp_ns, rates)
+        attitude = self.attitude.at(stamp_ns, rates)
         return ImuSample(stamp_ns, (float(force.x), float(force.y), float(force.z)), rates, attitude)
 
-    def _air(self, stamp_ns: int, message: Any) -> AirSample:
+    def _attitude(self, message: Any) -> None:
+        self.attitude.heard(header_ns(message), attitude_of(message.attitude))
+
+    def _pressure(self, message: Any) -> None:
+        self.air_density = self.density(float(message.pressure))
+
+    def _joints(self, message: Any) -> JointSample:
+        return self.deflections(header_ns(message), numbered("out", message.values))
+
+    def _air(self, message: Any) -> AirSample:
         """By Bernoulli, 0.2 % high at 40 m/s; the firmware's own velocity depends on its probe's temperature."""
         pressure = max(float(message.differential_pressure), 0.0)
-        return self.air(stamp_ns, math.sqrt(2.0 * pressure / self._density), self._density)
+        return self.air(header_ns(message), math.sqrt(2.0 * pressure / self.air_density), self.air_density)
