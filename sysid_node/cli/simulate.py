@@ -34,7 +34,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser = commands.add_parser("simulate", help="fly a simulated aircraft into a bag", description=__doc__)
     add = parser.add_argument
     add("--aircraft", required=True, help="file or name")
-    add("--manoeuvre", action="append", default=[], metavar="SPEC", help="e.g. 3211:elevator:amplitude=0.05:start=2")
+    add("--manoeuvre", action="append", default=[], metavar="SPEC", help="e.g. 3211, or 3211:elevator:amplitude=0.05")
     add("--effect", action="append", default=[], metavar="NAME:KEY=VALUE", help="by which the aircraft differs")
     add("--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist")
     add("--seed", type=int, default=0, help="of turbulence, noise and jitter (default: 0)")

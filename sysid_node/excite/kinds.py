@@ -33,9 +33,10 @@ class Kind:
     keys: Mapping[str, Key]
     length: Callable[[Values], float]
     draw: Callable[[Array, Values, int], Array]
+    apart: bool = False  # whether controls that move at once can be told apart
 
 
-#: Keys of every kind, besides ``amplitude`` (needed; rad; one for all controls of the segment, or one each).
+#: Keys of every kind, besides ``amplitude`` (rad; one for all controls of the segment, or one each).
 COMMON_KEYS = {
     "start": Key(1.0, "s", "when it begins", positive=False),
     "repeat": Key(1.0, "", "how often it is flown"),
@@ -91,6 +92,7 @@ KINDS: Mapping[str, Kind] = {
         {**_BAND, "seed": Key(1.0, "", "of the random numbers", positive=False)},
         _length,
         _random,
+        apart=True,
     ),
-    "multisine": Kind("orthogonal multisines on all its controls at once", _BAND, _length, _multisine),
+    "multisine": Kind("orthogonal multisines on all its controls at once", _BAND, _length, _multisine, apart=True),
 }

@@ -1,4 +1,4 @@
-"""The text that describes a manoeuvre: ``kind:control[,control...]:key=value:...``, several joined by ``+``."""
+"""The text that describes a manoeuvre: ``kind[:control,...][:key=value...]``, several joined by ``+``."""
 
 from __future__ import annotations
 
@@ -14,17 +14,21 @@ from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.kinds import COMMON_KEYS, KINDS, Key
-from sysid_node.excite.manoeuvre import Manoeuvre, check_limits, control_limits
+from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, check_limits, control_limits
 
 Array = NDArray[np.float64]
 
 #: Seconds of free response after the last segment, where the caller gives no duration.
 TAIL = 3.0
+#: Seconds between controls that are moved in turn.
+PAUSE = 2.0
+#: Share of a control's limit that is its amplitude, where none is given.
+DEFAULT_SHARE = 0.15
 
 _MOST_SAMPLES = 5_000_000
 
 #: A plus sign joins segments where a kind follows it; in a number such as 1e+1 it does not.
-_JOIN = re.compile(rf"\+(?=\s*(?:{'|'.join(KINDS)})\s*:)")
+_JOIN = re.compile(rf"\+(?=\s*(?:{'|'.join(KINDS)})\s*(?::|\+|$))")
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,8 @@ def _time_base(spec: str, segments: Sequence[Segment], rate: float, duration: fl
 def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[Segment, ...]:
     """The segments of a spec or of several, checked. Raises InputError."""
     texts = [spec] if isinstance(spec, str) else list(spec)
-    return tuple(_segment(part.strip(), aircraft) for text in texts for part in _JOIN.split(text))
+    parts = (part.strip() for text in texts for part in _JOIN.split(text))
+    return tuple(segment for part in parts for segment in _term(part, aircraft))
 
 
 def moved(segment: Segment, start: float) -> Segment:
@@ -124,13 +129,18 @@ def moved(segment: Segment, start: float) -> Segment:
     return replace(segment, values={**segment.values, "start": start})
 
 
-def _segment(text: str, aircraft: Aircraft) -> Segment:
+def _term(text: str, aircraft: Aircraft) -> list[Segment]:
+    """Of one term: without controls it is of all surfaces, in turn where they cannot be told apart otherwise."""
     kind, _, rest = text.partition(":")
     kind = kind.strip()
     if kind not in KINDS:
         raise _error(text, f"{kind!r} is no kind of manoeuvre; expected one of {', '.join(KINDS)}", kind, KINDS)
-    names, _, settings = rest.partition(":")
-    controls = _controls(text, names, aircraft)
+    names, _, settings = ("", "", rest) if "=" in rest.partition(":")[0] else rest.partition(":")
+    segment = _segment(text, kind, _controls(text, names, aircraft), settings, aircraft)
+    return [segment] if names or KINDS[kind].apart else _in_turn(segment)
+
+
+def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, aircraft: Aircraft) -> Segment:
     given = _settings(text, settings)
     known = {**KINDS[kind].keys, **COMMON_KEYS}
     expected = dict.fromkeys(("amplitude", *known))
@@ -139,7 +149,22 @@ def _segment(text: str, aircraft: Aircraft) -> Segment:
             raise _error(text, f"{key!r} is no key of {kind}; expected {', '.join(expected)}", key, expected)
     values = {key: _number(text, key, given.get(key), default) for key, default in known.items()}
     _check(text, values)
-    return Segment(kind, controls, _amplitude(text, given.get("amplitude"), len(controls)), values)
+    return Segment(kind, controls, _amplitude(text, given.get("amplitude"), controls, aircraft), values)
+
+
+def _in_turn(segment: Segment) -> list[Segment]:
+    """One control after the other, and all of them before it is repeated."""
+    step = segment.length + PAUSE
+    every = segment.values["every"] or step * len(segment.controls)
+    return [
+        replace(
+            segment,
+            controls=(control,),
+            amplitude=(amplitude,),
+            values={**segment.values, "start": segment.values["start"] + i * step, "every": every},
+        )
+        for i, (control, amplitude) in enumerate(zip(segment.controls, segment.amplitude, strict=True))
+    ]
 
 
 def _error(text: str, problem: str, word: str = "", known: Mapping[str, object] | None = None) -> InputError:
@@ -148,6 +173,8 @@ def _error(text: str, problem: str, word: str = "", known: Mapping[str, object] 
 
 def _controls(text: str, names: str, aircraft: Aircraft) -> tuple[str, ...]:
     limits = control_limits(aircraft)
+    if not names:
+        return tuple(name for name in limits if name != THROTTLE)
     controls = tuple(name.strip() for name in names.split(","))
     for name in controls:
         if name not in limits:
@@ -188,15 +215,23 @@ def _number(text: str, key: str, value: str | None, known: Key) -> float:
     return number
 
 
-def _amplitude(text: str, value: str | None, count: int) -> tuple[float, ...]:
+def _amplitude(text: str, value: str | None, controls: tuple[str, ...], aircraft: Aircraft) -> tuple[float, ...]:
     if value is None:
-        raise _error(text, "amplitude is missing; expected e.g. amplitude=0.05 (rad)")
+        return tuple(_usual_amplitude(text, control, aircraft) for control in controls)
+    count = len(controls)
     amplitude = tuple(_float(text, "amplitude", part) for part in value.split(","))
     if len(amplitude) == 1:
         amplitude *= count
     if len(amplitude) != count:
         raise _error(text, f"{len(amplitude)} amplitudes for {count} controls; give one, or one each")
     return amplitude
+
+
+def _usual_amplitude(text: str, control: str, aircraft: Aircraft) -> float:
+    limit = control_limits(aircraft)[control]
+    if not math.isfinite(limit):
+        raise _error(text, f"amplitude is missing, and {aircraft.name} gives {control} no limit to take a share of")
+    return float(f"{DEFAULT_SHARE * limit:.3g}")
 
 
 def _check(text: str, values: Mapping[str, float]) -> None:

@@ -78,10 +78,9 @@ def test_limits_are_the_aircrafts():
 MISTAKES = [
     ("", "'' is no kind of manoeuvre"),
     ("321:elevator:amplitude=0.1", "did you mean '3211'?"),
-    ("doublet", "no control ''; expected one of elevator, aileron, rudder, throttle"),
+    ("doublet:wing", "no control 'wing'; expected one of elevator, aileron, rudder, throttle"),
     ("doublet:elvator:amplitude=0.1", "did you mean 'elevator'?"),
     ("doublet:elevator,elevator:amplitude=0.1", "named twice"),
-    ("doublet:elevator", "amplitude is missing"),
     ("doublet:elevator:amp=0.1", "'amp' is no key of doublet"),
     ("doublet:elevator:amplitude", "got 'amplitude', expected key=value"),
     ("doublet:elevator:amplitude=0.1:amplitude=0.2", "amplitude is given twice"),
@@ -106,6 +105,34 @@ def test_a_mistake_gets_one_line(spec, expected):
     assert message.startswith("manoeuvre ")
     assert expected in message
     assert "\n" not in message
+
+
+def test_without_an_amplitude_it_is_a_share_of_the_limit():
+    (segment,) = parse_segments("doublet:elevator,throttle:width=0.3", CDRW)
+    assert segment.amplitude == (0.0525, 0.15)
+    unlimited = replace(CDRW, throttle=replace(CDRW.throttle, max_thrust=None))
+    with pytest.raises(InputError, match=r"amplitude is missing, and cdrw gives throttle no limit"):
+        parse_segments("doublet:throttle", unlimited)
+
+
+@pytest.mark.parametrize("spec", ["3211", "3211:width=0.5", "3211:start=1:repeat=2"])
+def test_without_controls_all_surfaces_move_in_turn(spec):
+    segments = parse_segments(spec, CDRW)
+    assert [segment.controls for segment in segments] == [("elevator",), ("aileron",), ("rudder",)]
+    manoeuvre = parse_manoeuvre(spec, CDRW)
+    assert np.all((np.abs(manoeuvre.surfaces()) > 0.0).sum(axis=1) <= 1)
+    assert manoeuvre.moved == ("elevator", "aileron", "rudder")
+    assert parse_segments(manoeuvre.spec, CDRW) == segments
+
+
+@pytest.mark.parametrize("spec", ["multisine", "random:amplitude=0.04"])
+def test_kinds_that_keep_controls_apart_move_all_surfaces_at_once(spec):
+    (segment,) = parse_segments(spec, CDRW)
+    assert segment.controls == ("elevator", "aileron", "rudder")
+
+
+def test_terms_without_controls_are_joined():
+    assert len(parse_segments("3211 + multisine+doublet:rudder", CDRW)) == 5
 
 
 def test_too_short_a_flight():
