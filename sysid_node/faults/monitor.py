@@ -23,7 +23,7 @@ from sysid_node.faults import blocks, colour, held
 from sysid_node.faults.blocks import PERIOD, Block
 from sysid_node.faults.colour import ORDER
 from sysid_node.faults.evidence import Shifts
-from sysid_node.faults.held import Known
+from sysid_node.faults.held import Belief, Known
 from sysid_node.faults.hypotheses import hypotheses
 from sysid_node.faults.report import Found, fault_of
 from sysid_node.faults.settings import Settings
@@ -35,10 +35,11 @@ from sysid_node.faults.weighing import (
     Stretch,
     excess,
     explained,
+    onsets,
     promising,
+    since,
     statistics,
     stretch,
-    stretches,
     stuck_vanes,
     vane_noise,
     weights,
@@ -115,11 +116,13 @@ def _piece(state: State, block: Block, design: Array, residual: Array) -> Piece:
     """The block, whitened."""
     k = block.regressors[OFFSET]
     off = residual - k * state.held.offsets
+    designs = [design]
     for (earlier, before), share in zip(reversed(state.raw), state.colour.filter, strict=True):
-        design = design - share[:, None] * earlier
+        designs.append(designs[-1] - share[:, None] * earlier)
         off = off - share * (before - k * state.held.offsets)
-    A, b = state.colour.unmix @ design, state.colour.unmix @ off
-    return Piece(block, residual, A, b, A.T @ A, A.T @ b)
+    *begun, A = (state.colour.unmix @ one for one in designs)
+    b = state.colour.unmix @ off
+    return Piece(block, residual, A, tuple(begun), b, A.T @ A, A.T @ b)
 
 
 def _judge(state: State, piece: Piece) -> None:
@@ -234,7 +237,7 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
 def _alarm(state: State, over: Stretch, usual: Array) -> None:
     """Something has failed."""
     now, earliest = over.pieces[-1].block.time, state.pieces[-min(len(state.pieces), LAG)].block.time - PERIOD
-    state.alarm = Alarm(now, earliest, earliest, usual)
+    state.alarm = Alarm(now, earliest, earliest, usual, over.belief)
     _follow(state, state.alarm)
 
 
@@ -244,8 +247,8 @@ def _follow(state: State, alarm: Alarm) -> None:
         return  # after a gap
     now = state.pieces[-1].block.time
     if now - alarm.found <= DATED:
-        alarm.since = _onset(state, alarm)
-    over = stretch(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)))
+        alarm.since, alarm.belief = _onset(state, alarm)
+    over = since(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)), alarm.belief)
     found = explained(state, over, alarm.usual)
     factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
     place = int(np.argmax(factors))
@@ -272,27 +275,29 @@ def _since(state: State, time: float) -> int:
     return sum(piece.block.time > time + 0.5 * PERIOD for piece in state.pieces)
 
 
-def _onset(state: State, alarm: Alarm) -> float:
-    """Since when (s): the likelihood's maximum over the onset, of a hypothesis that explains what came then.
+def _onset(state: State, alarm: Alarm) -> tuple[float, Belief]:
+    """Since when (s), and what is believed then: the likelihood's maximum over the onset, of what explains the rest.
 
     One with much freedom explains the moment of the change, too, and so sets in too early: of the hypotheses that
     explain much, the earliest onset counts from which on little is left to be explained.
     """
-    # the filter's memory of the blocks before the change ends shortly after it: none sets in later than that
-    latest = max(_since(state, alarm.found) - ORDER - 1, LEAST)
+    latest = max(_since(state, alarm.found), LEAST)
     counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
-    spans = stretches(state, counts)
+    spans = onsets(state, counts, counts[-1])
+
+    def at(place: int) -> tuple[float, Belief]:
+        return state.pieces[-counts[place]].block.time - PERIOD, spans[place].belief
+
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
     vanes = stuck_vanes(state, spans[-1].pieces, counts)
     if vanes.max() > factors.max():
-        return state.pieces[-counts[int(vanes.max(axis=1).argmax())]].block.time - PERIOD
+        return at(int(vanes.max(axis=1).argmax()))
     if not factors.max() > 0.0:
-        return alarm.since
+        return alarm.since, alarm.belief
     much = factors.max(axis=0) > MUCH * factors.max()
     best = sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True)
     left = [_left(state, spans[i], alarm.usual) for i in best]
-    chosen = next(i for i, rest in zip(best, left, strict=True) if rest <= LITTLE * min(left))
-    return state.pieces[-counts[chosen]].block.time - PERIOD
+    return at(next(i for i, rest in zip(best, left, strict=True) if rest <= LITTLE * min(left)))
 
 
 def _left(state: State, over: Stretch, usual: Array) -> float:
@@ -304,6 +309,6 @@ def _left(state: State, over: Stretch, usual: Array) -> float:
 
 def _over(state: State, place: int, alarm: Alarm) -> bool:
     """Whether the last seconds speak against the fault."""
-    over = stretch(state, min(LAG, len(state.pieces)))
+    over = stretch(state, min(LAG, len(state.pieces)), alarm.belief)
     factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over.pieces)[0]]
     return bool(factors[place] < 0.0)

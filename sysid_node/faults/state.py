@@ -32,6 +32,7 @@ class Piece(NamedTuple):
     block: Block
     residual: Array  # (6,) without the learned offsets; raw
     design: Array  # (6, D) whitened
+    begun: tuple[Array, ...]  # (6, D) the same for what set in with this block, or with the one before
     whitened: Array  # (6,) residual
     J: Array  # (D, D)
     v: Array  # (D,)
@@ -45,6 +46,7 @@ class Alarm:
     earliest: float
     since: float
     usual: Array  # (H,) size of the statistics before it
+    belief: Belief  # what is weighed against
 
 
 @dataclass

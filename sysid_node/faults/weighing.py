@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import colour
+from sysid_node.faults.colour import ORDER
 from sysid_node.faults.evidence import Shifts, Weighed, marginal, most, score_squares, weigh_each, weigh_loosely
+from sysid_node.faults.held import Belief
 from sysid_node.faults.state import Piece, State
 from sysid_node.faults.vanes import stuck_factor
 from sysid_node.online.signals import OFFSET
@@ -24,36 +26,87 @@ VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index(
 
 
 LOOSE = 0.1  # share by which a fault may differ from its hypothesis
+ENOUGH = 3  # blocks of sound flight that say something of it
 MARGIN = 1.0  # of a logarithm, for the statistics' rounding
 LAST_RESORT = 0.1  # share by which damage of a whole axis, which can explain all, must explain more than what is simple
 
 
 class Stretch(NamedTuple):
-    """The last blocks, what they sum up to, and that without what the held model's errors allow; see ``evidence``."""
+    """The last blocks, what is believed, what they sum up to against it, and that without what its errors allow."""
 
     pieces: Sequence[Piece]
+    belief: Belief
     whole: tuple[Array, Array]
     J: Array
     v: Array
 
 
-def stretch(state: State, count: int) -> Stretch:
-    """The last ``count`` blocks."""
-    pieces = list(islice(state.pieces, len(state.pieces) - count, None))
-    J = np.sum([piece.J for piece in pieces], axis=0)
-    v = np.sum([piece.v for piece in pieces], axis=0)
-    return _against(state, pieces, J, v)
+def stretch(state: State, count: int, belief: Belief | None = None) -> Stretch:
+    """The last ``count`` blocks, against a belief; None: what is believed by now."""
+    belief = belief or state.belief
+    assert belief is not None
+    pieces = _last(state, count)
+    J, v = (np.sum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
+    return _against(state, pieces, (J, v), belief)
 
 
-def _against(state: State, pieces: Sequence[Piece], J: Array, v: Array) -> Stretch:
-    """Of what is believed by now."""
+def since(state: State, count: int, belief: Belief) -> Stretch:
+    """What set in ``count`` blocks ago.
+
+    What the first blocks' whitening takes from the blocks before them is of the sound aircraft: the moment of a change
+    shows more than what follows, and only so does it speak for what changed (the signature of Willsky & Jones 1976).
+    """
+    pieces = _last(state, count)
+    first = [_begun(piece, late, belief) for late, piece in enumerate(pieces[:ORDER])]
+    pieces = [*first, *pieces[ORDER:]]
+    J, v = (np.sum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
+    return _against(state, pieces, (J, v), belief)
+
+
+def onsets(state: State, counts: Sequence[int], sound: int) -> list[Stretch]:
+    """As ``since``, of each count, against what is believed together with what the blocks before it say of it.
+
+    They begin ``sound`` blocks ago. What was off before something failed was off by then, too: an offset that the held
+    model's errors would allow for does not come from one block to the next.
+    """
     assert state.belief is not None
-    v = v - J @ state.belief.shift + _flattened(state, pieces)
-    return Stretch(pieces, (J, v), *marginal(J, v, state.belief.precision))
+    pieces, prior = _last(state, sound), state.belief
+    read = _readings(pieces)
+    J, v = (np.cumsum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
+    found = []
+    for count in counts:
+        n = sound - count
+        before, belief = (np.zeros_like(J[0]), np.zeros_like(v[0])), prior
+        if n >= ENOUGH:
+            before = (J[n - 1], v[n - 1])
+            precision = prior.precision + before[0]
+            score = before[1] - before[0] @ prior.shift + _flattened(state, read[:n])
+            belief = Belief(prior.shift + np.linalg.solve(precision, score), precision)
+        first = [_begun(piece, late, belief) for late, piece in enumerate(pieces[n : n + ORDER])]
+        rest = [total[-1] - total[n + len(first) - 1] for total in (J, v)]
+        sums = [sum((getattr(piece, name) for piece in first), start) for name, start in zip("Jv", rest, strict=True)]
+        found.append(_against(state, [*first, *pieces[n + ORDER :]], (sums[0], sums[1]), belief))
+    return found
 
 
-def _flattened(state: State, pieces: Sequence[Piece]) -> Array:
-    """(D,) what noise of the vanes takes off the score of a stretch.
+def _last(state: State, count: int) -> list[Piece]:
+    return list(islice(state.pieces, len(state.pieces) - count, None))
+
+
+def _against(state: State, pieces: Sequence[Piece], sums: tuple[Array, Array], belief: Belief) -> Stretch:
+    """Pieces whose information (D, D) and score (D,) about the held values are ``sums``."""
+    J, v = sums
+    v = v - J @ belief.shift + _flattened(state, _readings(pieces))
+    return Stretch(pieces, belief, (J, v), *marginal(J, v, belief.precision))
+
+
+def _readings(pieces: Sequence[Piece]) -> Array:
+    """(N, 3) of the air data."""
+    return np.array([piece.block.air for piece in pieces])
+
+
+def _flattened(state: State, read: Array) -> Array:
+    """(D,) what noise of the vanes takes off the score of blocks that ``read`` (N, 3).
 
     Noise on a regressor flattens the slope that least squares find, and over a long stretch in which the angle hardly
     moves that would look like a changed derivative (bias-compensated least squares: Soderstrom, Automatica 43, 2007,
@@ -61,29 +114,27 @@ def _flattened(state: State, pieces: Sequence[Piece]) -> Array:
     """
     total = np.zeros(len(state.terms.names))
     for vane, (variance, score) in state.flattened.items():
-        read = np.array([piece.block.air[VANES[vane][0]] for piece in pieces])
-        total += min(1.0, float(read.var(ddof=1)) / variance) * len(pieces) * score
+        there = float(read[:, VANES[vane][0]].var()) * len(read) / max(len(read) - 1, 1)
+        total += min(1.0, there / variance) * len(read) * score
     return total
 
 
-def stretches(state: State, counts: Sequence[int]) -> list[Stretch]:
-    """As many as there are counts, which rise by one."""
-    pieces = list(islice(state.pieces, len(state.pieces) - counts[-1], None))
-    J = np.cumsum([piece.J for piece in reversed(pieces)], axis=0)
-    v = np.cumsum([piece.v for piece in reversed(pieces)], axis=0)
-    return [_against(state, pieces[-count:], J[count - 1], v[count - 1]) for count in counts]
+def _begun(piece: Piece, late: int, belief: Belief) -> Piece:
+    """A piece as of what set in ``late`` blocks before it."""
+    A = piece.begun[late]
+    b = piece.whitened + (A - piece.design) @ belief.shift
+    return piece._replace(design=A, whitened=b, J=A.T @ A, v=A.T @ b)
 
 
 def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     """Each hypothesis with what it leaves out (``evidence.weigh_loosely``), by the variance that the best leaves."""
-    assert state.belief is not None
     first = weights(state, over, usual)
     best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
     scale = max(float(usual.max()), best, 1.0)
     found = []
     for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
-        one = weigh_loosely(*over.whole, hypothesis.shift, state.belief.precision, LOOSE * moved, scale)
+        one = weigh_loosely(*over.whole, hypothesis.shift, over.belief.precision, LOOSE * moved, scale)
         if weighed.size.size > 1:
             one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
         found.append(one)
@@ -118,8 +169,7 @@ def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
     The largest of the six coefficients'.
     """
     shift = state.hypotheses[place].shift
-    assert state.belief is not None
-    moved = shift.fixed + shift.free @ weighed.size + state.belief.shift
+    moved = shift.fixed + shift.free @ weighed.size + over.belief.shift
     left = np.array([piece.whitened - piece.design @ moved for piece in over.pieces])
     return float((left**2).mean(axis=0).max())
 
