@@ -96,11 +96,17 @@ def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:
     )
 
 
+def there(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
+    """Whether a cause, or one of those named with it, is there."""
+    named = {cause["effect"], *cause["indistinguishable_from"][: TOGETHER - 1]}
+    return bool(named & set(label["effects"])) or _has(label, cause) or _one_of_its(label, cause)
+
+
 def _has(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
     """Whether a cause is one that the foreign plant always has, nothing added."""
     if label["plant"] != FOREIGN:
         return False
-    if cause["effect"] == "cg_shift" and "y" in cause["parameters"]:
+    if cause["effect"] == "cg_shift" and "y" in cause.get("parameters", {}):
         return _close("y", LOADED_ASIDE, *cause["parameters"]["y"])
     return cause["effect"] in INHERENT
 

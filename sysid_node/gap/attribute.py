@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.adequacy import adequacy_of
 from sysid_node.gap.candidates import BETWEEN, PER_CONTROL, TIMES, Candidate, bounds, candidates_of
+from sysid_node.gap.credence import LIKELY, Grounds
 from sysid_node.gap.evidence import Evidence, judged, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, with_candidates
 from sysid_node.gap.foretold import advantage
@@ -64,7 +66,7 @@ _WORTH_TRYING = 0.01
 #: Times that the causes stand against their rivals, at most.
 _SWEEPS = 3
 
-#: Nats by which another explanation must be better to take the place of one.
+#: Nats of both kinds by which another explanation must be better to take the place of one.
 _CLEARLY = 1.0
 
 Progress = Callable[[float, str], None]
@@ -90,10 +92,16 @@ class Cause:
     """An effect that is blamed, beside the alternatives to it."""
 
     candidate: Candidate
-    probability: float
+    share: float  # of the probability that it has with its rivals
     taken: Array  # power (12,) that it takes away on flight not fitted, the other causes given
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
+    grounds: Grounds
     rivals: tuple[Trial, ...] = ()  # what was tried in its stead
+
+    @property
+    def probability(self) -> float:
+        """That it is there."""
+        return self.share * self.grounds.credence
 
 
 @dataclass(frozen=True)
@@ -106,6 +114,7 @@ class Attribution:
     before: Structure  # of what the nuisances leave
     left: Structure  # of what the chosen effects leave
     causes: tuple[Cause, ...]
+    doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
     table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
 
@@ -144,11 +153,10 @@ def attribute(
         chosen, frontier = better[0], better
     progress(0.8, "whether another effect would do as well")
     late = [candidate for candidate in candidates if candidate.effect in BETWEEN]
-    chosen, places = _refined(trier, base, chosen, stages, late)
+    chosen, causes, doubted = _believed(trier, base, chosen, stages, late)
     before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
-    causes = tuple(sorted((_cause(trier, chosen, place) for place in places), key=lambda cause: -cause.probability))
-    corrected = unbiased(chosen.fit)
-    return Attribution(base, chosen, corrected, before, left, causes, _ranked(base, stages[0]), tuple(stages[0]))
+    ranked, corrected = _ranked(base, stages[0]), unbiased(chosen.fit)
+    return Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
 
 
 def _share_of(progress: Progress, count: int) -> Progress:
@@ -383,9 +391,14 @@ class Place:
 
 
 def _refined(
-    trier: Trier, base: Trial, chosen: Trial, stages: Sequence[list[Trial]], late: Sequence[Candidate]
+    trier: Trier,
+    base: Trial,
+    chosen: Trial,
+    stages: Sequence[list[Trial]],
+    late: Sequence[Candidate],
+    barred: frozenset[str] = frozenset(),
 ) -> tuple[Trial, tuple[Place, ...]]:
-    """The explanation after every cause has stood against its rivals, given the others.
+    """The explanation after every cause has stood against its rivals, given the others; some are ``barred`` by label.
 
     The first effect was chosen before the others were known: another may take its place now, or none may be needed.
     """
@@ -393,11 +406,27 @@ def _refined(
     pool = list({candidate.label: candidate for candidate in (*tried, *late)}.values())
     for _ in range(_SWEEPS):
         places = tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
-        better = _replacement(base, chosen, places)
+        better = _replacement(base, chosen, places, barred)
         if better is None:
             return chosen, places
         chosen = better
     return chosen, tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
+
+
+def _believed(
+    trier: Trier, base: Trial, chosen: Trial, stages: Sequence[list[Trial]], late: Sequence[Candidate]
+) -> tuple[Trial, tuple[Cause, ...], tuple[Cause, ...]]:
+    """The explanation without what is less likely to be there than not, and such causes, one after another."""
+    doubted: list[Cause] = []
+    while True:
+        barred = frozenset(cause.candidate.label for cause in doubted)
+        chosen, places = _refined(trier, base, chosen, stages, late, barred)
+        causes = sorted((_cause(trier, chosen, place) for place in places), key=lambda cause: -cause.probability)
+        worst = min(causes, key=lambda cause: cause.grounds.credence, default=None)
+        if worst is None or worst.grounds.credence >= LIKELY:
+            return chosen, tuple(causes), tuple(doubted)
+        doubted.append(worst)
+        chosen = next(place.without for place in places if place.candidate is worst.candidate)
 
 
 def _place(
@@ -415,14 +444,17 @@ def _place(
     return Place(candidate, without, tuple({**known, **rivals}.values()))
 
 
-def _replacement(base: Trial, chosen: Trial, places: Sequence[Place]) -> Trial | None:
-    """A better explanation: one effect less, or another in its place; None where there is none."""
+def _replacement(base: Trial, chosen: Trial, places: Sequence[Place], barred: frozenset[str]) -> Trial | None:
+    """A better explanation, by both kinds of evidence: one effect less, or another in its place; None where there is
+    none."""
     needless = [p.without for p in places if len(places) > 1 and not accepted(base, p.without, chosen)]
     if needless:
         return max(needless, key=lambda trial: trial.evidence.total)
-    rivals = [t for p in places for t in p.rivals if accepted(base, p.without, t)]
-    best = max(rivals, key=lambda trial: trial.evidence.total, default=chosen)
-    return best if best.evidence.total > chosen.evidence.total + _CLEARLY else None
+    new = [(p, t) for p in places for t in p.rivals if t.added is None or t.added.label not in barred]
+    rivals = [t for p, t in new if accepted(base, p.without, t)]
+    ahead = {id(t): t.evidence.total - chosen.evidence.total + advantage(t.fit, chosen.fit) for t in rivals}
+    best = max(rivals, key=lambda trial: ahead[id(trial)], default=None)
+    return best if best is not None and ahead[id(best)] > _CLEARLY else None
 
 
 def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
@@ -444,20 +476,23 @@ def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
     taken = np.maximum(power_left(place.without.evidence) - power_left(chosen.evidence), 0.0)
-    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), place.rivals)
+    grounds = Grounds.of(advantage(chosen.fit, place.without.fit), adequacy_of(chosen.fit, candidate))
+    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), grounds, place.rivals)
 
 
 def _shares(sets: Sequence[Trial], others: Sequence[Trial]) -> Array:
     """Probabilities of sets of effects that hold a cause, then of others that do not.
 
-    The others are as probable as they are by prediction or by what the commands foretell, whichever is more, but no
-    more than the best of the sets: what either cannot exclude is not excluded.
+    Each is as probable, beside the likeliest, as it is by prediction or by what the commands foretell, whichever is
+    more: what either cannot exclude is not excluded.
     """
-    shares = probabilities([t.evidence.scores for t in (*sets, *others)])
-    best = sets[int(np.argmax(shares[: len(sets)]))]
-    ahead = np.array([advantage(best.fit, t.fit) for t in others])
-    most = shares[: len(sets)].max()
-    shares[len(sets) :] = np.clip(shares[len(sets) :], most * np.exp(-np.maximum(ahead, 0.0)), None)
+    predicted = probabilities([t.evidence.scores for t in (*sets, *others)])
+    best = int(np.argmax(predicted[: len(sets)]))
+    ahead = np.array([advantage(sets[best].fit, t.fit) for t in others])
+    foretold = np.zeros(predicted.size)
+    lead = min(float(ahead.min(initial=0.0)), 0.0)
+    foretold[best], foretold[len(sets) :] = np.exp(lead), np.exp(lead - ahead)
+    shares = np.maximum(predicted / predicted.max(), foretold)
     return np.asarray(shares / shares.sum())
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
-
-import numpy as np
 
 from sysid_node.gap.attribute import Cause
 from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.errors import standard_errors
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.flown import WINDOW
-from sysid_node.gap.verdict import explained, named, probability, structured
+from sysid_node.gap.verdict import explained, named, structured, wanting
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS
 
 
@@ -32,9 +32,10 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "air_motion": found.air_motion if found.views[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
+        "doubted": [_doubted(cause) for cause in attribution.doubted],
         "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],
         "unexplained": {
-            "share": 1.0 - explained(attribution) if structured(attribution) else 0.0,
+            "share": 1.0 - explained(attribution) if structured(attribution) or wanting(attribution) else 0.0,
             "where": [w for w in found.where if w["station"] == "unexplained"][:3],
             "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
         },
@@ -61,16 +62,28 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "label": cause.candidate.label,
         "station": cause.candidate.station,
         "parameters": parameters(found.attribution.corrected, cause),
-        "probability": probability(found.attribution, cause),
+        "probability": cause.probability,
         "gap_after": found.size.after,
         "indistinguishable_from": named(cause),
+        "grounds": {"share": cause.share, **asdict(cause.grounds)},
+    }
+
+
+def _doubted(cause: Cause) -> dict[str, Any]:
+    """What predicts better, but is not named."""
+    return {
+        "effect": cause.candidate.effect,
+        "label": cause.candidate.label,
+        "probability": cause.probability,
+        "indistinguishable_from": named(cause),
+        "grounds": {"share": cause.share, **asdict(cause.grounds)},
     }
 
 
 def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:
     """Value and standard error of each of a cause's parameters, in the simulator's units."""
     simulator, places = fit.views[0].simulator, {index: place for place, index in enumerate(fit.indices)}
-    errors = np.sqrt(np.diag(fit.covariance))
+    errors = standard_errors(fit)
     if cause.candidate.indices:
         return {
             simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])]

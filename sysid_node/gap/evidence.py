@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.fit import Fit, amplitudes, moved, real_rows, residual_power, solve, weights
-from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.nuisance import WIDENED, Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, View
 
@@ -34,7 +34,8 @@ _GROUPS = 8
 class Evidence:
     """Scores (G,) of groups of windows not seen, and their residuals (W, L, 12) by flight.
 
-    ``points`` are the parameters (P,) that each group was predicted with, by flight and group.
+    ``points`` are the parameters (P,) of the model that each group was predicted with, by flight and group, as it is
+    written: a clock within a sample or a bias within the noise is the recording's, no simulator's.
     """
 
     scores: Array
@@ -78,7 +79,7 @@ def cross_validated(fit: Fit) -> Evidence:
             scores.append(score)
             unseen[group] = part
         residuals.append(unseen)
-        points.append(tuple(moved(fit, step).points[i] for step in steps))
+        points.append(tuple(_written(fit, moved(fit, step).points[i]) for step in steps))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views, tuple(points))
 
 
@@ -136,7 +137,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
             score, _ = _predictive(view, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
             scores.append(score)
         residuals.append(view.residual(point))
-        points.append((point,) * len(groups_of(view)))
+        points.append((_written(fit, point),) * len(groups_of(view)))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(views), tuple(points))
 
 
@@ -153,6 +154,14 @@ def carried(fit: Fit, view: View) -> Array:
     carried = [*fit.indices, *shared]
     point[carried] = fit.points[0][carried]
     return np.asarray(point)
+
+
+def _written(fit: Fit, point: Array) -> Array:
+    """The parameters (P,) of the model that is handed on: the nuisances neutral but for the derivatives' errors."""
+    simulator, kept = fit.views[0].simulator, point.copy()
+    own = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != WIDENED]
+    kept[own] = simulator.neutral()[own]
+    return np.asarray(kept)
 
 
 def _train_power(fit: Fit, view: View) -> Array:

@@ -30,9 +30,6 @@ _EXPLAINED = 0.8
 #: Percentage of what could be closed of short flights, not fitted, that they must be able to close.
 _CLOSED = 50.0
 
-#: Probability, with what is left over counted against it, below which no cause is said to explain.
-_LIKELY = 0.5
-
 #: A rival with this probability is named.
 _NAMED = 0.03
 
@@ -47,18 +44,23 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
     if check.foreseen or not any(purposeful(view) for view in views):
         return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
-        return "unknown_effect" if structured(attribution) else "no_gap"
-    if check.final.total <= check.base.total or explained(attribution) < _EXPLAINED or unexplained(attribution):
+        return "unknown_effect" if structured(attribution) or wanting(attribution) else "no_gap"
+    short = check.flown is not None and check.flown.ci95[1] < _CLOSED  # most remains, whatever was found
+    if short or check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
         return "unknown_effect"
-    if check.flown is not None and check.flown.ci95[1] < _CLOSED:
-        return "unknown_effect"  # most of what the simulator is off by remains, whatever was found
-    sure = [c.probability >= _TOLD_APART and probability(attribution, c) >= _LIKELY for c in attribution.causes]
-    return "explained" if all(sure) else "ambiguous"
+    if unexplained(attribution) or wanting(attribution):
+        return "unknown_effect"
+    return "explained" if all(cause.share >= _TOLD_APART for cause in attribution.causes) else "ambiguous"
 
 
 def structured(attribution: Attribution) -> bool:
     """Whether what is left holds structure that matters."""
     return bool(_structured(attribution).any())
+
+
+def wanting(attribution: Attribution) -> bool:
+    """Whether something is there that the likeliest effect accounts for by most, but not by its own law."""
+    return any(cause.grounds.wanting for cause in attribution.doubted)
 
 
 def unexplained(attribution: Attribution) -> bool:
@@ -95,14 +97,6 @@ def _motion(evidence: Evidence) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
     power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.views)
     return np.asarray(np.maximum(power, 1e-300))
-
-
-def probability(attribution: Attribution, cause: Cause) -> float:
-    """Of a cause, less by the share of the structure left where it works, which no listed effect explains."""
-    taken = cause.taken / _motion(attribution.chosen.evidence)
-    whole = taken + _structure_left(attribution)
-    credible = np.divide(taken, whole, out=np.zeros_like(taken), where=taken > 0.0)
-    return cause.probability * float(taken @ credible / taken.sum()) if taken.any() else 0.0
 
 
 def named(cause: Cause) -> list[str]:

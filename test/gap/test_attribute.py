@@ -33,7 +33,7 @@ def test_both_of_two_effects_are_named_with_their_sizes(weak_and_slow) -> None:
 
 def test_what_adds_up_is_no_alternative(weak_and_slow) -> None:
     """Each predicts much better beside the other, so that neither takes the other's probability away."""
-    assert all(cause.probability > 0.9 for cause in weak_and_slow.causes)
+    assert all(cause.share > 0.9 for cause in weak_and_slow.causes)
 
 
 def test_what_gives_no_numbers_is_no_explanation(plain_view, monkeypatch) -> None:

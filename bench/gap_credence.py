@@ -1,0 +1,93 @@
+"""How far a cause can be believed: the weights of ``sysid_node.gap.credence``, learned from flights of known truth.
+
+    python bench/gap_credence.py out/withheld/development out/withheld/final:36-59 [--page docs/gap.md]
+
+Reads what ``bench/gap_scoreboard.py`` has left of these sets (or of these seeds of them): the grounds of every cause
+that was named or doubted, and by the label whether it was there. A logistic regression by Firth's (1993) penalised
+likelihood (Biometrika 80(1)): few cases, nearly parted by their grounds, would send the likeliest weights to infinity
+(Heinze & Schemper (2002), Statistics in Medicine 21). Held against each case by weights learned from all the others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from evaluation.pages import publish, table
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from withheld import judging
+from withheld.scoreboard import calibration
+
+from sysid_node.gap.credence import WEIGHTS, Grounds
+
+Array = NDArray[np.float64]
+
+_NAMES = ("a constant", "logarithm of the nats", "misfit")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sets", nargs="+", help="folder of a set, or FOLDER:FIRST-LAST for some of its seeds")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    found = [row for text in args.sets for row in causes(text)]
+    X = np.array([grounds.regressors for _, grounds, _ in found])
+    right = np.array([there for _, _, there in found], float)
+    publish("bench/gap_credence.py", page([case for case, _, _ in found], X, right), args.page)
+
+
+def causes(text: str) -> Iterator[tuple[str, Grounds, bool]]:
+    """Case, grounds, and whether it was there, of every cause in a set."""
+    name, _, seeds = text.partition(":")
+    first, last = (int(part) for part in seeds.split("-")) if seeds else (0, 10**9)
+    for path in sorted(Path(name).glob("labels/*.json"), key=lambda path: int(path.stem)):
+        said = Path(name) / path.stem / "out" / "gap.json"
+        if first <= int(path.stem) <= last and said.exists():
+            label, document = (json.loads(p.read_text(encoding="utf-8")) for p in (path, said))
+            for cause in (*document["causes"], *document["doubted"]):
+                grounds = Grounds(cause["grounds"]["foretold"], cause["grounds"]["misfit"])
+                yield f"{name}/{path.stem}", grounds, judging.there(label, cause)
+
+
+def learned(X: Array, right: Array) -> Array:
+    """Weights (3,) of a logistic regression on regressors (n, 3), by Firth's penalised likelihood."""
+
+    def loss(weights: Array) -> float:
+        p = 1.0 / (1.0 + np.exp(-np.clip(X @ weights, -500.0, 500.0)))
+        p = np.clip(p, 1e-12, 1.0 - 1e-12)
+        _, volume = np.linalg.slogdet((X * (p * (1.0 - p))[:, None]).T @ X)
+        return -float(np.sum(right * np.log(p) + (1.0 - right) * np.log(1.0 - p)) + 0.5 * volume)
+
+    options = {"maxiter": 20000, "maxfev": 20000, "xatol": 1e-6, "fatol": 1e-9}
+    return np.asarray(minimize(loss, np.zeros(X.shape[1]), method="Nelder-Mead", options=options).x)
+
+
+def page(cases: Sequence[str], X: Array, right: Array) -> str:
+    """The section of the documentation."""
+    weights = learned(X, right)
+    rows = [[name, f"{w:.2f}", f"{used:.2f}"] for name, w, used in zip(_NAMES, weights, WEIGHTS, strict=True)]
+    unseen = [_of_others(cases, X, right, case) for case in dict.fromkeys(cases)]
+    stated = [(float(p), bool(r)) for some in unseen for p, r in some]
+    return "\n\n".join(
+        [
+            f"{len(set(cases))} cases with {len(right)} causes named or doubted, {int(right.sum())} of them there.",
+            table(("weight of", "learned", "in use"), rows),
+            "Each case by weights learned from all the others:",
+            table(("stated", "mean stated", "right", "causes"), calibration(stated)),
+        ]
+    )
+
+
+def _of_others(cases: Sequence[str], X: Array, right: Array, case: str) -> list[tuple[float, float]]:
+    """Probabilities of a case's causes by the other cases, and whether they were there."""
+    own = np.array([c == case for c in cases])
+    weights = learned(X[~own], right[~own])
+    return list(zip(1.0 / (1.0 + np.exp(-X[own] @ weights)), right[own], strict=True))
+
+
+if __name__ == "__main__":
+    main()

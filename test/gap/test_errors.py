@@ -1,0 +1,35 @@
+"""Errors that know of a model that is not right; truth: an aileron that loses half its effect in mid-flight."""
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.attribute import Trier
+from sysid_node.gap.errors import standard_errors
+from sysid_node.gap.fit import blank
+from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.steps import Steps
+from sysid_node.gap.structure import unbiased
+from sysid_node.gap.view import View, view_of
+from sysid_node.sim import Simulator
+
+
+def ratio(view: View, name: str) -> float:
+    """Standard error of a nuisance over that of a remainder that is noise."""
+    nuisances = nuisances_of(view.simulator.aircraft, view)
+    fit = unbiased(Trier(nuisances, Steps()).trial(blank([view], nuisances), []).fit)
+    errors, plain = standard_errors(fit), np.sqrt(np.diag(fit.covariance))
+    assert (errors >= plain).all()
+    order = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    place = order.index(view.simulator.names.index(name))
+    return float(errors[place] / plain[place])
+
+
+def test_of_the_right_model_they_are_those_of_noise(plain_view) -> None:
+    assert ratio(plain_view, "derivative_error.Cl_da") < 1.6
+
+
+@pytest.mark.parametrize("turbulence", ["none", "light"])
+def test_what_changes_in_flight_is_less_certain(aircraft, make_flight, turbulence) -> None:
+    effects = {"control_effectiveness_loss": {"aileron": 0.5, "onset": 13.0}}
+    view = view_of(Simulator(aircraft, 50.0), make_flight(effects, seed=4, turbulence=turbulence))
+    assert ratio(view, "derivative_error.Cl_da") > 2.0
