@@ -155,6 +155,11 @@ def section(folder: Path, flight: Flight) -> str:
     if found["causes"]:
         heads = ("cause", "probability", "parameters (s.e.)", "not told apart from")
         parts.append(table(heads, [_cause(cause) for cause in found["causes"]]))
+    if found["doubted"]:
+        said = ", ".join(f"{c['label']} {c['probability']:.2f}" for c in found["doubted"])
+        parts.append(f"Predicts better, but is doubted, with its probability: {said}.")
+    if found["next_flight"]:
+        parts.append(f"To fly next: {found['next_flight']}")
     best = found.get("candidates", [])[:6]
     if best:
         said = ", ".join(f"{c['effect']} {c['probability']:.2f}" for c in best)

@@ -38,7 +38,7 @@ _LONGITUDINAL = frozenset({"ax", "az", "q", "theta", "V", "alpha"})
 _MOVED = 4.0
 
 #: How much larger than foreseen an error may be by chance: the scatter of half a minute of turbulence is a quarter.
-_BY_CHANCE = 1.5
+BY_CHANCE = 1.5
 
 #: Bootstrap draws, and short flights in a row that are drawn together.
 _DRAWS, _BLOCK = 2000, 2
@@ -82,7 +82,7 @@ def foreseen(views: Sequence[View]) -> bool:
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
     _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
-    return bool((before <= _BY_CHANCE**2 * np.mean(floors, axis=0)).all())
+    return bool((before <= BY_CHANCE**2 * np.mean(floors, axis=0)).all())
 
 
 def shows(view: View) -> bool:

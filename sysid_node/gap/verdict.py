@@ -12,6 +12,7 @@ from sysid_node.gap.admission import excitation
 from sysid_node.gap.attribute import NOTICED, Attribution, Cause, power_left
 from sysid_node.gap.deliberate import purposeful
 from sysid_node.gap.evidence import Evidence
+from sysid_node.gap.flown import BY_CHANCE
 from sysid_node.gap.holdout import Check
 from sysid_node.gap.view import View
 
@@ -30,6 +31,9 @@ _EXPLAINED = 0.8
 #: Percentage of what could be closed of short flights, not fitted, that they must be able to close.
 _CLOSED = 50.0
 
+#: Percentage of what could be closed, below which derivatives within their tolerances surely do not close all of it.
+_ALL_BUT = 90.0
+
 #: A rival with this probability is named.
 _NAMED = 0.03
 
@@ -44,7 +48,7 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
     if check.foreseen or not any(purposeful(view) for view in views):
         return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
-        return "unknown_effect" if structured(attribution) or wanting(attribution) else "no_gap"
+        return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
     short = check.flown is not None and check.flown.ci95[1] < _CLOSED  # most remains, whatever was found
     if short or check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
         return "unknown_effect"
@@ -61,6 +65,12 @@ def structured(attribution: Attribution) -> bool:
 def wanting(attribution: Attribution) -> bool:
     """Whether something is there that the likeliest effect accounts for by most, but not by its own law."""
     return any(cause.grounds.wanting for cause in attribution.doubted)
+
+
+def far_off(check: Check) -> bool:
+    """Whether the simulator is further off than chance, noise and weather make it, with nothing found to blame."""
+    gap = check.flown
+    return gap is not None and gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT
 
 
 def unexplained(attribution: Attribution) -> bool:
