@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, qr
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import least_squares
 
 from sysid_node.flight.record import Array
@@ -206,7 +206,8 @@ class Projected:
     """What is left of the residual at the candidates' parameters when the nuisances do their best.
 
     Nuisances that would go beyond their limits at the fit's values are put there and stay: an active set, found anew
-    for each linearisation.
+    for each linearisation. Nuisances are in units of their sigmas here: their priors are then a unit matrix, and the
+    normal equations are sound however little the flight says of some.
     """
 
     def __init__(self, fit: Fit) -> None:
@@ -216,9 +217,9 @@ class Projected:
         for i, (view, point, weight) in enumerate(zip(fit.views, fit.points, self.weights, strict=True)):
             slopes = real_rows(view.slopes(point, own), weight)
             blocks.append(_placed(slopes.reshape(-1, len(own)), fit.nuisances, i, len(fit.views)))
-        self.now, spread, self.limit = fit.stacked
-        self.prior = np.diag(1.0 / spread)
-        self.matrix = np.vstack([*blocks, self.prior])
+        self.now, self.spread, self.limit = fit.stacked
+        self.matrix = np.vstack([*(block * self.spread for block in blocks), np.eye(self.now.size)])
+        self.gram = self.matrix.T @ self.matrix
         self.indices = list(fit.indices)
         self.centre, self.sigma = prior(fit.views[0].simulator, fit.indices)
         self._settle(np.ones(self.now.size, bool), np.zeros(self.now.size))
@@ -227,8 +228,14 @@ class Projected:
     def _settle(self, free: NDArray[np.bool_], shift: Array) -> None:
         """Which nuisances may move, and how far the others stand from where the residual is taken."""
         self.free, self.shift = free, shift
-        self.moved_rows = self.matrix @ shift
-        self.Q, self.R = qr(self.matrix[:, free], mode="economic")
+        self.moved_rows = self.matrix @ (shift / self.spread)
+        self.factor = cho_factor(self.gram[np.ix_(free, free)], check_finite=False)
+
+    def _best(self, rows: Array) -> Array:
+        """Nuisances (K, ...), in sigmas, that do most against rows (R, ...); those that may not move, zero."""
+        best = np.zeros((self.now.size, *rows.shape[1:]))
+        best[self.free] = cho_solve(self.factor, (self.matrix.T @ rows)[self.free], check_finite=False)
+        return best
 
     def _bind(self, values: Array) -> None:
         """Puts at their limits those that would go beyond, until none would."""
@@ -242,9 +249,7 @@ class Projected:
 
     def _step(self, values: Array) -> Array:
         """How far the nuisances' best at these values lies from where the residual is taken."""
-        step = self.shift.copy()
-        step[self.free] = np.linalg.solve(self.R, self.Q.T @ self._rows(values))
-        return step
+        return np.asarray(self.shift + self.spread * self._best(self._rows(values)))
 
     def looking(self, candidate: Candidate) -> Projected:
         """The same nuisances but for those that the candidate is or replaces; its parameters move with the others."""
@@ -270,12 +275,12 @@ class Projected:
             there = point.copy()
             there[self.indices] = values
             rows.append(real_rows(view.residual(there), weight).ravel())
-        return np.concatenate([*rows, -self.prior @ self.now]) - self.moved_rows
+        return np.concatenate([*rows, -self.now / self.spread]) - self.moved_rows
 
     def residual(self, values: Array) -> Array:
         """Rows to be made small, the parameters' own priors last."""
         rows = self._rows(values)
-        return np.concatenate([rows - self.Q @ (self.Q.T @ rows), (values - self.centre) / self.sigma])
+        return np.concatenate([rows - self.matrix @ self._best(rows), (values - self.centre) / self.sigma])
 
     def jacobian(self, values: Array) -> Array:
         """Slopes of ``residual``, Kaufman's."""
@@ -287,7 +292,7 @@ class Projected:
             blocks.append(-slopes.reshape(-1, values.size))
         blocks.append(np.zeros((self.now.size, values.size)))
         matrix = np.vstack(blocks)
-        return np.vstack([matrix - self.Q @ (self.Q.T @ matrix), np.diag(1.0 / self.sigma)])
+        return np.vstack([matrix - self.matrix @ self._best(matrix), np.diag(1.0 / self.sigma)])
 
     def deviance(self, rows: Array) -> float:
         """Minus twice the log probability of a ``residual``, up to a constant, as if of its own spectrum.

@@ -20,6 +20,7 @@ def table(layout: Layout) -> tuple[tuple[str, Parameter], ...]:
     return tuple((effect.name, p) for effect in EFFECTS.values() for p in effect.parameters(layout))
 
 
+@cache
 def names(layout: Layout) -> tuple[str, ...]:
     """``effect.parameter`` of every entry."""
     return tuple(f"{effect}.{p.name}" for effect, p in table(layout))
