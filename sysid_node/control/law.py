@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 LONGEST_STEP = 0.1  # s
 SPEED_GAIN, SPEED_INTEGRAL = 0.6, 0.1  # 1/s, 1/s^2: of the airspeed loop
 SPEED_FILTER = 1.0  # s, of the airspeed that gains are scheduled by
+MOST_INTEGRAL = 1.0  # rad s
 PRESSURES = (0.4, 2.5)  # dynamic pressure over the reference one, within which gains are scheduled
 
 
@@ -50,6 +51,7 @@ class Law:
     thrust: float = 0.0  # N, of the airspeed's integral
     command: Array | None = None  # (3,) rad, the last
     surfaces: Array = field(default_factory=lambda: np.zeros(3))  # rad, what feedback has moved them by
+    gains: tuple[Array, ...] = ()  # (m, n) of both axes, the last
     coming: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback on its way to the actuators
     wanted: Wanted | None = None  # the reference that the motion is compared with
 
@@ -85,6 +87,7 @@ def step(
     forward = _feedforward(law.reference, wanted, pitch, side, scales, step)
     late = law.wanted = reference.follow(law.behind, sensed.time, wanted, step)
     errors = _errors(law, sensed, late, level)
+    _bear_new_gains(law, errors, tuple(f.gains for _, f in flown))
     back = np.concatenate([f.gains @ e for (_, f), e in zip(flown, errors, strict=True)]) / pressure
     planned = np.array([trim, 0.0, 0.0]) + forward + np.asarray(excitation, dtype=float)
     command, held = _limited(law, planned - back, step)
@@ -151,6 +154,20 @@ def _errors(law: Law, sensed: Sensed, late: Wanted, level: float) -> tuple[Array
     )
 
 
+def _bear_new_gains(law: Law, errors: tuple[Array, Array], gains: tuple[Array, ...]) -> None:
+    """Set the integrals, in ``errors`` too, so that gains that move do not move the surfaces (bumpless transfer).
+
+    What the integrals hold is a deflection, such as that which trims a shifted centre of gravity; times other gains it
+    would be another one, until they have wound up anew (Astrom & Hagglund, "PID Controllers" (1995), sect. 3.5).
+    """
+    for i, (error, now, before) in enumerate(zip(errors, gains, law.gains, strict=False)):
+        place = error.size - len(now) - 1  # of the integral
+        effect = now[:, place]
+        share = float(effect @ (before @ error - now @ error)) / max(float(effect @ effect), 1e-12)
+        error[place] = law.integrals[i] = min(max(law.integrals[i] + share, -MOST_INTEGRAL), MOST_INTEGRAL)
+    law.gains = gains
+
+
 def _follow_surfaces(law: Law, time: float, feedback: Array, step: float) -> None:
     """Move the surfaces' model behind the delay and the lag of the actuators."""
     late = reference.delayed(law.coming, time, feedback, law.settings.delay)
@@ -171,7 +188,7 @@ def _integrate(law: Law, errors: tuple[Array, Array], held: NDArray[np.bool_], s
     """Errors of theta and phi add up while their surface has travel left: no winding up."""
     for i, (error, stuck) in enumerate(zip((errors[0][2], errors[1][3]), held[:2], strict=True)):
         if not stuck:
-            law.integrals[i] = min(max(law.integrals[i] + step * error, -1.0), 1.0)
+            law.integrals[i] = min(max(law.integrals[i] + step * error, -MOST_INTEGRAL), MOST_INTEGRAL)
 
 
 def _thrust(law: Law, sensed: Sensed, points: SetPoints, late: Wanted, level: float, step: float) -> float:

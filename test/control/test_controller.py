@@ -99,3 +99,16 @@ def test_the_clock_may_step_back() -> None:
     command = controller.step(state, level(3.0), SetPoints())
     assert np.isfinite(command).all()
     assert "no estimates for" in state.stale
+
+
+def test_new_gains_do_not_move_the_surfaces() -> None:
+    """Feedback holds a deflection, here against a trim error; other gains hold it from the first moment on."""
+    state, now = fly(SetPoints(roll=0.2), 12.0, excitation=0.03)
+    before = state.law.command
+    for axis in state.axes:
+        axis.flown = axis.flown._replace(gains=0.6 * axis.flown.gains)
+    _, _, _, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
+    sensed = Sensed(now.time + 1e-3, p, q, r, phi, theta, V, alpha, beta, now.density)
+    after = controller.step(state, sensed, SetPoints(roll=0.2), (0.03, 0.0, 0.0))
+    assert after.elevator == pytest.approx(before[0], abs=5e-4)
+    assert after[1:3] == pytest.approx(before[1:], abs=5e-3)  # one integral for two surfaces
