@@ -26,7 +26,7 @@ from sysid_node.gap.credence import WEIGHTS, Grounds
 
 Array = NDArray[np.float64]
 
-_NAMES = ("a constant", "logarithm of the nats", "misfit")
+_NAMES = ("a constant", "logarithm of the nats", "misfit", "derivatives beyond their tolerances")
 
 
 def main() -> None:
@@ -49,12 +49,12 @@ def causes(text: str) -> Iterator[tuple[str, Grounds, bool]]:
         if first <= int(path.stem) <= last and said.exists():
             label, document = (json.loads(p.read_text(encoding="utf-8")) for p in (path, said))
             for cause in (*document["causes"], *document["doubted"]):
-                grounds = Grounds(cause["grounds"]["foretold"], cause["grounds"]["misfit"])
+                grounds = Grounds(*(cause["grounds"][name] for name in ("foretold", "misfit", "denied")))
                 yield f"{name}/{path.stem}", grounds, judging.there(label, cause)
 
 
 def learned(X: Array, right: Array) -> Array:
-    """Weights (3,) of a logistic regression on regressors (n, 3), by Firth's penalised likelihood."""
+    """Weights (K,) of a logistic regression on regressors (n, K), by Firth's penalised likelihood."""
 
     def loss(weights: Array) -> float:
         p = 1.0 / (1.0 + np.exp(-np.clip(X @ weights, -500.0, 500.0)))

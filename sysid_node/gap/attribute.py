@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.adequacy import adequacy_of
 from sysid_node.gap.candidates import BETWEEN, PER_CONTROL, TIMES, Candidate, bounds, candidates_of
-from sysid_node.gap.credence import LIKELY, Grounds
+from sysid_node.gap.credence import LIKELY, Grounds, prior
 from sysid_node.gap.evidence import Evidence, judged, probabilities
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, with_candidates
 from sysid_node.gap.foretold import advantage
@@ -102,6 +102,11 @@ class Cause:
     def probability(self) -> float:
         """That it is there."""
         return self.share * self.grounds.credence
+
+    @property
+    def likelier(self) -> bool:
+        """Whether a rival is likelier."""
+        return any(share > self.share for _, share in self.alternatives)
 
 
 @dataclass(frozen=True)
@@ -416,17 +421,43 @@ def _refined(
 def _believed(
     trier: Trier, base: Trial, chosen: Trial, stages: Sequence[list[Trial]], late: Sequence[Candidate]
 ) -> tuple[Trial, tuple[Cause, ...], tuple[Cause, ...]]:
-    """The explanation without what is less likely to be there than not, and such causes, one after another."""
+    """The explanation without what is less likely to be there than not, and such causes, one after another.
+
+    A rival that can be believed takes the place of each, where there is one, and one that is likelier that of any.
+    """
     doubted: list[Cause] = []
+    yielded: frozenset[str] = frozenset()  # labels of what made way
     while True:
         barred = frozenset(cause.candidate.label for cause in doubted)
-        chosen, places = _refined(trier, base, chosen, stages, late, barred)
-        causes = sorted((_cause(trier, chosen, place) for place in places), key=lambda cause: -cause.probability)
+        chosen, places = _refined(trier, base, chosen, stages, late, barred | yielded)
+        causes = [_cause(trier, chosen, place, barred) for place in places]
+        second = [cause for cause in causes if cause.likelier and cause.candidate.label not in yielded]
         worst = min(causes, key=lambda cause: cause.grounds.credence, default=None)
-        if worst is None or worst.grounds.credence >= LIKELY:
-            return chosen, tuple(causes), tuple(doubted)
-        doubted.append(worst)
-        chosen = next(place.without for place in places if place.candidate is worst.candidate)
+        if second:
+            out, otherwise = second[0], chosen
+        elif worst is not None and worst.grounds.credence < LIKELY:
+            out, otherwise = worst, places[causes.index(worst)].without
+            doubted.append(worst)
+        else:
+            return chosen, tuple(sorted(causes, key=lambda cause: -cause.probability)), tuple(doubted)
+        yielded |= {out.candidate.label}
+        chosen = _instead(base, places[causes.index(out)], out, barred | yielded) or otherwise
+
+
+def _instead(base: Trial, place: Place, cause: Cause, barred: frozenset[str]) -> Trial | None:
+    """The likeliest rival that can be believed in a cause's place, None where there is none."""
+    likely = dict(cause.alternatives)
+    rivals = [t for t in place.rivals if t.added and t.added.label not in barred and accepted(base, place.without, t)]
+    for trial in sorted(rivals, key=lambda t: (-likely.get(t.added.effect if t.added else "", 0.0), -t.evidence.total)):
+        if _grounds(trial, place.without, trial.added).credence >= LIKELY:
+            return trial
+    return None
+
+
+def _grounds(trial: Trial, without: Trial, candidate: Candidate | None) -> Grounds:
+    """What speaks for a candidate that a trial has more than another."""
+    assert candidate is not None
+    return Grounds.of(candidate.effect, advantage(trial.fit, without.fit), adequacy_of(trial.fit, candidate))
 
 
 def _place(
@@ -457,26 +488,29 @@ def _replacement(base: Trial, chosen: Trial, places: Sequence[Place], barred: fr
     return best if best is not None and ahead[id(best)] > _CLEARLY else None
 
 
-def _cause(trier: Trier, chosen: Trial, place: Place) -> Cause:
+def _cause(trier: Trier, chosen: Trial, place: Place, barred: frozenset[str]) -> Cause:
     """Its probability, summed over all sets of effects that were tried with it, and who else could be to blame.
 
     A rival is to blame instead only as far as it does not predict still better beside the cause: what adds up is no
     alternative (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
     """
     candidate = place.candidate
-    rivals = [t for t in place.rivals if t.added is not None and t.added.label != candidate.label]
+    others = barred | {candidate.label}
+    rivals = [t for t in place.rivals if t.added is not None and t.added.label not in others]
     instead = _shares([chosen], rivals)[1:]
     strong = [t for t, share in zip(rivals, instead, strict=True) if share > _WORTH_TRYING]
     tried = [trier.beside(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
     sets = [chosen, *(trial for trial in tried if trial is not None)]
-    shares = _shares(sets, [*rivals, place.without])
+    odds = [prior(candidate.effect)] * len(sets) + [prior(t.added.effect) for t in rivals if t.added] + [1.0]
+    shares = np.array(odds) * _shares(sets, [*rivals, place.without])
+    shares = shares / shares.sum()
     by_effect = {candidate.effect: float(shares[: len(sets)].sum())}
     for trial, share in zip(rivals, shares[len(sets) : -1], strict=True):
         effect = trial.added.effect if trial.added else ""
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
     taken = np.maximum(power_left(place.without.evidence) - power_left(chosen.evidence), 0.0)
-    grounds = Grounds.of(advantage(chosen.fit, place.without.fit), adequacy_of(chosen.fit, candidate))
+    grounds = _grounds(chosen, place.without, candidate)
     return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), grounds, place.rivals)
 
 

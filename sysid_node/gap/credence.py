@@ -9,14 +9,16 @@ Classifiers). ``bench/gap_credence.py`` learns its weights from flights of the d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sysid_node.gap.adequacy import Adequacy
+from sysid_node.gap.nuisance import WIDENED
 
-#: Weights of a constant, of the logarithm of the nats and of the misfit (bench/gap_credence.py).
-WEIGHTS = (-5.8, 1.46, -8.4)
+#: Weights of a constant, of the logarithm of the nats, of the misfit, and of derivatives beyond their tolerances, which
+#: the file itself says are improbable (bench/gap_credence.py).
+WEIGHTS = (-3.5, 1.1, -4.0, -1.5)
 
 #: Probability below which a cause is not named.
 LIKELY = 0.5
@@ -34,18 +36,19 @@ class Grounds:
 
     foretold: float  # nats by which it accounts better for what the commands foretell, the other causes given
     misfit: float  # of what it does to a channel, what is left that goes with it: amplitude, the worst channel
+    denied: bool  # by the aircraft file's own tolerances
 
     @classmethod
-    def of(cls, foretold: float, adequacy: Adequacy) -> Grounds:
-        """From the nats, and what the cause leaves."""
+    def of(cls, effect: str, foretold: float, adequacy: Adequacy) -> Grounds:
+        """From the effect, the nats, and what it leaves."""
         counted = (adequacy.done > _COUNTS * adequacy.done.sum()) & (adequacy.deviations > _DEVIATIONS)
         ratio = np.divide(adequacy.left, adequacy.done, out=np.zeros_like(adequacy.left), where=counted)
-        return cls(foretold, float(np.sqrt(ratio.max())))
+        return cls(foretold, float(np.sqrt(ratio.max())), effect == WIDENED)
 
     @property
-    def regressors(self) -> tuple[float, float, float]:
+    def regressors(self) -> tuple[float, float, float, float]:
         """What the weights belong to."""
-        return 1.0, float(np.log(max(self.foretold, 1.0))), self.misfit
+        return 1.0, float(np.log(max(self.foretold, 1.0))), self.misfit, float(self.denied)
 
     @property
     def credence(self) -> float:
@@ -55,4 +58,9 @@ class Grounds:
     @property
     def wanting(self) -> bool:
         """Whether it is doubted for what it leaves alone: then something is there, but not this."""
-        return self.credence < LIKELY <= Grounds(self.foretold, 0.0).credence
+        return self.credence < LIKELY <= replace(self, misfit=0.0).credence
+
+
+def prior(effect: str) -> float:
+    """Odds of an effect before any flight, beside those that the aircraft file says nothing of."""
+    return float(np.exp(WEIGHTS[3])) if effect == WIDENED else 1.0

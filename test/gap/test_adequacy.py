@@ -26,7 +26,7 @@ def misfit(aircraft):
         trier = Trier(nuisances, Steps())
         base = trier.trial(blank([view], nuisances), [])
         (candidate,) = (c for c in candidates_of(view.simulator, [view]) if c.label == "imu_scale")
-        return Grounds.of(1000.0, adequacy_of(trier.beside(base, candidate).fit, candidate))
+        return Grounds.of("imu_scale", 1000.0, adequacy_of(trier.beside(base, candidate).fit, candidate))
 
     return of
 

@@ -10,19 +10,19 @@ NATS, MISFITS = st.floats(-1e3, 1e6), st.floats(0.0, 2.0)
 
 @given(NATS, st.floats(0.0, 1e5), MISFITS)
 def test_more_nats_are_more_credible(nats, more, misfit) -> None:
-    assert Grounds(nats, misfit).credence <= Grounds(nats + more, misfit).credence
+    assert Grounds(nats, misfit, denied=False).credence <= Grounds(nats + more, misfit, denied=False).credence
 
 
 @given(NATS, MISFITS, st.floats(0.0, 1.0))
 def test_what_is_left_counts_against_a_cause(nats, misfit, more) -> None:
-    assert Grounds(nats, misfit + more).credence <= Grounds(nats, misfit).credence
+    assert Grounds(nats, misfit + more, denied=False).credence <= Grounds(nats, misfit, denied=False).credence
 
 
 @given(NATS)
 def test_what_leaves_nothing_is_not_wanting(nats) -> None:
-    assert not Grounds(nats, 0.0).wanting
+    assert not Grounds(nats, 0.0, denied=False).wanting
 
 
 def test_nothing_foretold_is_not_believed() -> None:
-    assert Grounds(0.0, 0.0).credence < 0.05
-    assert Grounds(1e4, 0.0).credence > LIKELY
+    assert Grounds(0.0, 0.0, denied=False).credence < 0.05
+    assert Grounds(1e4, 0.0, denied=False).credence > LIKELY
