@@ -376,7 +376,7 @@ def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
     look = problem.looking(candidate)
     for start in candidate.starts:
         values = np.concatenate([fit.values, start])
-        rows = look.residual(values)
+        rows = look.ahead(values)
         step = np.linalg.lstsq(look.jacobian(values), -rows, rcond=None)[0]
         stepped = np.clip(values + step, low, high)
         for there, left in ((values, rows), (stepped, look.residual(stepped))):

@@ -195,7 +195,7 @@ def _one_round(fit: Fit) -> Fit:
         start = np.clip(values, low + 1e-9, high - 1e-9)
         scale = fit.views[0].simulator.scales[list(fit.indices)]
         solution = least_squares(
-            problem.residual, start, problem.jacobian, bounds=(low, high), x_scale=scale, max_nfev=_EVALUATIONS,
+            problem.ahead, start, problem.jacobian, bounds=(low, high), x_scale=scale, max_nfev=_EVALUATIONS,
             ftol=1e-4, xtol=1e-4, gtol=1e-6,
         )  # fmt: skip
         values = solution.x
@@ -222,6 +222,7 @@ class Projected:
         self.gram = self.matrix.T @ self.matrix
         self.indices = list(fit.indices)
         self.centre, self.sigma = prior(fit.views[0].simulator, fit.indices)
+        self._kept = (b"", np.empty((0, 0)))
         self._settle(np.ones(self.now.size, bool), np.zeros(self.now.size))
         self._bind(fit.values)
 
@@ -282,8 +283,17 @@ class Projected:
         rows = self._rows(values)
         return np.concatenate([rows - self.matrix @ self._best(rows), (values - self.centre) / self.sigma])
 
+    def ahead(self, values: Array) -> Array:
+        """``residual`` where its slopes will be wanted, too: they are worked out along with it and kept."""
+        self._kept = (values.tobytes(), self._slopes(values))
+        return self.residual(values)
+
     def jacobian(self, values: Array) -> Array:
         """Slopes of ``residual``, Kaufman's."""
+        key, kept = self._kept
+        return kept if key == values.tobytes() else self._slopes(values)
+
+    def _slopes(self, values: Array) -> Array:
         blocks = []
         for view, point, weight in zip(self.fit.views, self.fit.points, self.weights, strict=True):
             there = point.copy()
@@ -362,8 +372,8 @@ def linearised(fit: Fit) -> Fit:
     rows, slopes = [], []
     for i, (view, point, power) in enumerate(zip(fit.views, fit.points, fit.power, strict=True)):
         weight = weights(view.windows, power)
-        rows.append(real_rows(view.residual(point), weight))
         raw = real_rows(view.slopes(point, [*chosen, *own]), weight)
+        rows.append(real_rows(view.residual(point), weight))
         wide = _placed(raw[..., len(chosen) :].reshape(-1, len(own)), fit.nuisances, i, len(fit.views))
         slopes.append(np.concatenate([raw[..., : len(chosen)], wide.reshape(*raw.shape[:2], -1)], axis=2))
     information = fit.prior_information

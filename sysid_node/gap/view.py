@@ -7,8 +7,9 @@ so that each measurement counts once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from typing import NamedTuple
 
 import jax
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flights import Flight, thinned
 from sysid_node.gap.kinematics import READINGS, Motion, motion_of, reconstruct
+from sysid_node.gap.recent import Recent
 from sysid_node.gap.spectra import Complex, Windows
-from sysid_node.sim import Simulator
+from sysid_node.sim import EFFECTS, Simulator, parameters
 from sysid_node.sim.layout import Layout, Model, Scalar
 from sysid_node.sim.prediction import ACCELERATIONS, COEFFICIENTS, Signals, coefficients, predict, signals_of
 
@@ -38,6 +40,9 @@ _GUSTS = (0.3, 2.0)
 
 #: Directions in which a prediction is differentiated at once: as many as most effects have parameters.
 _LANES = 3
+
+#: Predictions that a view keeps: fits ask for the same point again, and kinematics stay while forces are fitted.
+_KEPT = 32
 
 #: Flights are padded to multiples of so many samples: each length is another program to compile.
 _BLOCK = 500
@@ -66,20 +71,29 @@ class Given(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def _expected(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
-    forces = coefficients(model, given.signals, predict(layout, model, theta, given.signals, given.step))
-    return jnp.concatenate([forces, reconstruct(layout, model, theta, given.motion, given.fading, given.step)], axis=1)
+def _forces(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
+    """Coefficients (N, 6) that parameters (P,) expect."""
+    return coefficients(model, given.signals, predict(layout, model, theta, given.signals, given.step))
 
 
 @partial(jax.jit, static_argnums=0)
-def _changes(layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given) -> Scalar:
-    """d expected along each of the directions (K, P): (N, 12, K)."""
+def _readings(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
+    """Air data and attitude (N, 6) that parameters (P,) expect."""
+    return reconstruct(layout, model, theta, given.motion, given.fading, given.step)
 
-    def along(direction: Scalar) -> Scalar:
-        slope: Scalar = jax.jvp(lambda t: _expected(layout, model, t, given), (theta,), (direction,))[1]
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _changes(
+    expected: Callable[..., Scalar], layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given
+) -> tuple[Scalar, Scalar]:
+    """What is expected (N, 6), and d expected along each of the directions (K, P): (N, 6, K)."""
+
+    def along(direction: Scalar) -> tuple[Scalar, Scalar]:
+        slope: tuple[Scalar, Scalar] = jax.jvp(lambda t: expected(layout, model, t, given), (theta,), (direction,))
         return slope
 
-    return jax.vmap(along, out_axes=2)(directions)
+    values, slopes = jax.vmap(along, out_axes=(None, 2))(directions)
+    return values, slopes
 
 
 @partial(jax.jit, static_argnums=0)
@@ -115,6 +129,8 @@ class View:
     noise: Array  # (L, 12) power that the sensors' noise leaves in measured minus predicted
     axes: NDArray[np.bool_]  # (12,): what was measured
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, as the aircraft file has it
+    _forces: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
+    _readings: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
 
     @property
     def commands(self) -> Array:
@@ -123,45 +139,75 @@ class View:
 
     def predicted_series(self, theta: Array) -> Array:
         """Channels (N, 12) that parameters (P,) expect."""
-        s = self.simulator
-        return np.asarray(_expected(s.layout, s.model, jnp.asarray(theta), self.given))[: len(self.record)]
+        return np.concatenate([self._series(_forces, theta), self._series(_readings, theta)], axis=1)
 
     def predicted(self, theta: Array) -> Complex:
         """The same by window and line, (W, L, 12)."""
-        return self.windows.transform(self.predicted_series(theta))
+        known = self._forces.get(theta.tobytes())
+        forces = self.windows.transform(self._series(_forces, theta)) if known is None else known
+        key = theta[_kinematic(self.simulator.layout)].tobytes()
+        readings = self._readings.get(key)
+        if readings is None:
+            readings = self._readings.keep(key, self.windows.transform(self._series(_readings, theta)))
+        return np.concatenate([self._forces.keep(theta.tobytes(), forces), readings], axis=2)
 
     def residual(self, theta: Array) -> Complex:
         """Measured minus predicted (W, L, 12), zero where not measured."""
         return np.asarray((self.measured - self.predicted(theta)) * self.axes)
 
     def slopes(self, theta: Array, indices: list[int]) -> Complex:
-        """d predicted / d parameters of these indices, (W, L, 12, K)."""
-        slopes = np.empty((*self.measured.shape, len(indices)), complex)
-        own = {self.simulator.names.index(f"derivative_error.{n}"): d
-               for d, n in enumerate(self.simulator.layout.derivatives)}  # fmt: skip
+        """d predicted / d parameters of these indices, (W, L, 12, K). ``residual`` there costs little afterwards."""
+        slopes = np.zeros((*self.measured.shape, len(indices)), complex)
+        layout, forces = self.simulator.layout, len(COEFFICIENTS)
+        own = {self.simulator.names.index(f"derivative_error.{n}"): d for d, n in enumerate(layout.derivatives)}
         linear = [k for k, index in enumerate(indices) if index in own]
         others = [k for k, index in enumerate(indices) if index not in own]
+        moving = [k for k in others if indices[k] in _kinematic(layout)]
         if linear:
-            slopes[..., linear] = self._slopes_by_derivative(theta)[..., [own[indices[k]] for k in linear]]
-        for first in range(0, len(others), _LANES):
-            some = others[first : first + _LANES]
-            slopes[..., some] = self._slopes_along(theta, [indices[k] for k in some])
+            by_derivative = self._slopes_by_derivative(theta)
+            slopes[:, :, :forces, linear] = by_derivative[..., [own[indices[k]] for k in linear]]
+        for some in _lanes(others):
+            slopes[:, :, :forces, some] = self._slopes_along(_forces, theta, [indices[k] for k in some])
+        for some in _lanes(moving):
+            slopes[:, :, forces:, some] = self._slopes_along(_readings, theta, [indices[k] for k in some])
         return np.asarray(slopes * self.axes[:, None])
 
+    def _series(self, expected: Callable[..., Scalar], theta: Array) -> Array:
+        """One of ``_forces`` and ``_readings`` (N, 6) at parameters (P,)."""
+        s = self.simulator
+        return np.asarray(expected(s.layout, s.model, jnp.asarray(theta), self.given))[: len(self.record)]
+
     def _slopes_by_derivative(self, theta: Array) -> Complex:
-        """Of every derivative of the file, (W, L, 12, D); air data and attitude know of none."""
+        """Of every derivative of the file, (W, L, 6, D); air data and attitude know of none."""
         s, samples = self.simulator, len(self.record)
         changes = np.asarray(_changes_by_derivative(s.layout, s.model, jnp.asarray(theta), self.given))[:samples]
-        slopes = np.zeros((*self.measured.shape, changes.shape[2]), complex)
-        slopes[:, :, : len(COEFFICIENTS)] = self.windows.transform(changes)
-        return slopes
+        return self.windows.transform(changes)
 
-    def _slopes_along(self, theta: Array, indices: list[int]) -> Complex:
-        """Of at most ``_LANES`` entries of the vector, (W, L, 12, K)."""
-        s, directions = self.simulator, np.zeros((_LANES, len(theta)))
+    def _slopes_along(self, expected: Callable[..., Scalar], theta: Array, indices: list[int]) -> Complex:
+        """Of at most ``_LANES`` entries of the vector, (W, L, 6, K); what is expected is kept."""
+        s, directions, samples = self.simulator, np.zeros((_LANES, len(theta))), len(self.record)
         directions[np.arange(len(indices)), indices] = 1.0
-        changes = np.asarray(_changes(s.layout, s.model, jnp.asarray(theta), directions, self.given))
-        return self.windows.transform(changes[: len(self.record), :, : len(indices)])
+        values, changes = _changes(expected, s.layout, s.model, jnp.asarray(theta), directions, self.given)
+        entries = _kinematic(s.layout) if expected is _readings else slice(None)
+        kept, key = (self._readings if expected is _readings else self._forces), theta[entries].tobytes()
+        if kept.get(key) is None:
+            kept.keep(key, self.windows.transform(np.asarray(values)[:samples]))
+        return self.windows.transform(np.asarray(changes)[:samples, :, : len(indices)])
+
+
+@cache
+def _kinematic(layout: Layout) -> list[int]:
+    """Entries of the parameter vector that kinematics depend on: clocks, instruments, and where they are."""
+    return [
+        i
+        for i, (effect, _) in enumerate(parameters.table(layout))
+        if EFFECTS[effect].station in {"sensors", "clock"} or effect == "cg_shift"
+    ]
+
+
+def _lanes(places: list[int]) -> Iterator[list[int]]:
+    """As many at a time as are differentiated at once."""
+    return (places[first : first + _LANES] for first in range(0, len(places), _LANES))
 
 
 def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:

@@ -1,6 +1,10 @@
 """Measured against predicted: nothing but the sensors' noise is left where the simulator is the aircraft."""
 
+from dataclasses import replace
+
 import numpy as np
+
+from sysid_node.gap.view import _kinematic
 
 
 def test_only_noise_is_left_of_the_same_aircraft(plain_view) -> None:
@@ -17,3 +21,23 @@ def test_slopes_agree_with_differences(plain_view) -> None:
     numeric = (plain_view.predicted(neutral + step) - plain_view.predicted(neutral - step)) / 2e-4
     slopes = plain_view.slopes(neutral, [index])[..., 0]
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
+
+
+def test_kinematics_depend_on_no_other_entries_than_those_named(plain_view) -> None:
+    simulator = plain_view.simulator
+    entries = np.setdiff1d(np.arange(len(simulator.names)), _kinematic(simulator.layout))
+    somewhere = simulator.neutral() + 0.1 * np.random.default_rng(0).random(len(simulator.names))
+    changed = somewhere.copy()
+    changed[entries] += 0.01
+    np.testing.assert_array_equal(
+        plain_view.predicted_series(changed)[:, 6:], plain_view.predicted_series(somewhere)[:, 6:]
+    )
+
+
+def test_what_is_kept_along_with_slopes_is_what_is_predicted(plain_view) -> None:
+    names, point = plain_view.simulator.names, plain_view.simulator.neutral()
+    point[names.index("cg_shift.x")] = 0.02
+    fresh = replace(plain_view)
+    fresh.slopes(point, [names.index("imu_bias.q"), names.index("actuator_lag.time_constant")])
+    expected = plain_view.windows.transform(plain_view.predicted_series(point))
+    np.testing.assert_allclose(fresh.predicted(point), expected, atol=1e-12 * np.abs(expected).max())

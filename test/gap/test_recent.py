@@ -1,0 +1,10 @@
+"""What was worked out lately is given again, and only so much of it."""
+
+from sysid_node.gap.recent import Recent
+
+
+def test_the_latest_are_kept_and_the_oldest_forgotten() -> None:
+    recent = Recent[int](2)
+    for value in range(3):
+        assert recent.keep(bytes([value]), value) == value
+    assert [recent.get(bytes([value])) for value in range(3)] == [None, 1, 2]
