@@ -98,8 +98,17 @@ def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:
 
 def there(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
     """Whether a cause, or one of those named with it, is there."""
-    named = {cause["effect"], *cause["indistinguishable_from"][: TOGETHER - 1]}
-    return bool(named & set(label["effects"])) or _has(label, cause) or _one_of_its(label, cause)
+    return _named(label, cause) or _has(label, cause) or _one_of_its(label, cause)
+
+
+def always_there(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
+    """Whether it is the plant that has such a cause, and not the case."""
+    return there(label, cause) and not _named(label, cause)
+
+
+def _named(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
+    """Whether an effect of the case is a cause or one of those named with it."""
+    return not {cause["effect"], *cause["indistinguishable_from"][: TOGETHER - 1]}.isdisjoint(label["effects"])
 
 
 def _has(label: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:

@@ -2,23 +2,27 @@
 
 Evidence says how much better one model of the list predicts than another. Where the truth is none of them, the least
 wrong one wins by as many nats as there are data, and no number of these is a probability (Bernardo & Smith (1994),
-Bayesian Theory, sect. 6.1: the M-open case). So the nats, and whether what is left goes with the cause, are turned into
-a probability by a logistic regression over causes whose truth was known (Platt (1999), Advances in Large Margin
-Classifiers). ``bench/gap_credence.py`` learns its weights from flights of the development set.
+Bayesian Theory, sect. 6.1: the M-open case). So a cause whose law is refuted by what it leaves is not believed at all,
+and for the others the nats are made a probability by a logistic regression over causes whose truth was known (Platt
+(1999), Advances in Large Margin Classifiers). ``bench/gap_credence.py`` learns its weights from flights of the
+development set.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sysid_node.gap.adequacy import Adequacy
 from sysid_node.gap.nuisance import WIDENED
 
-#: Weights of a constant, of the logarithm of the nats, of the misfit, and of derivatives beyond their tolerances, which
-#: the file itself says are improbable (bench/gap_credence.py).
-WEIGHTS = (-3.5, 1.1, -4.0, -1.5)
+#: Weights of a constant, of the logarithm of the nats, and of derivatives beyond their tolerances, which the file
+#: itself says are improbable (bench/gap_credence.py).
+WEIGHTS = (-2.25, 0.8, -1.2)
+
+#: Amplitude of what goes with a cause and is left, as a share of what it does, from which its law is refuted.
+REFUTED = 0.3
 
 #: Probability below which a cause is not named.
 LIKELY = 0.5
@@ -35,32 +39,41 @@ class Grounds:
     """What speaks for a cause and against it."""
 
     foretold: float  # nats by which it accounts better for what the commands foretell, the other causes given
-    misfit: float  # of what it does to a channel, what is left that goes with it: amplitude, the worst channel
+    misfit: float  # of what it does, what is left that goes with it: amplitude, on the channels where any is left
     denied: bool  # by the aircraft file's own tolerances
 
     @classmethod
     def of(cls, effect: str, foretold: float, adequacy: Adequacy) -> Grounds:
         """From the effect, the nats, and what it leaves."""
-        counted = (adequacy.done > _COUNTS * adequacy.done.sum()) & (adequacy.deviations > _DEVIATIONS)
-        ratio = np.divide(adequacy.left, adequacy.done, out=np.zeros_like(adequacy.left), where=counted)
-        return cls(foretold, float(np.sqrt(ratio.max())), effect == WIDENED)
+        seen = (adequacy.done > _COUNTS * adequacy.done.sum()) & (adequacy.deviations > _DEVIATIONS)
+        misfit = np.sqrt(adequacy.left[seen].sum() / adequacy.done[seen].sum()) if seen.any() else 0.0
+        return cls(foretold, float(misfit), effect == WIDENED)
 
     @property
-    def regressors(self) -> tuple[float, float, float, float]:
+    def regressors(self) -> tuple[float, float, float]:
         """What the weights belong to."""
-        return 1.0, float(np.log(max(self.foretold, 1.0))), self.misfit, float(self.denied)
+        return 1.0, float(np.log(max(self.foretold, 1.0))), float(self.denied)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether what is left goes with the cause by too much: then the law is another, however many the nats."""
+        return self.misfit > REFUTED
 
     @property
     def credence(self) -> float:
         """Probability that the cause, or a rival named with it, is there."""
-        return 1.0 / (1.0 + float(np.exp(-np.dot(WEIGHTS, self.regressors))))
+        return 0.0 if self.refuted else self._by_nats
 
     @property
     def wanting(self) -> bool:
-        """Whether it is doubted for what it leaves alone: then something is there, but not this."""
-        return self.credence < LIKELY <= replace(self, misfit=0.0).credence
+        """Whether it would be believed but for its law: then something is there, but not this."""
+        return self.refuted and self._by_nats >= LIKELY
+
+    @property
+    def _by_nats(self) -> float:
+        return 1.0 / (1.0 + float(np.exp(-np.dot(WEIGHTS, self.regressors))))
 
 
 def prior(effect: str) -> float:
     """Odds of an effect before any flight, beside those that the aircraft file says nothing of."""
-    return float(np.exp(WEIGHTS[3])) if effect == WIDENED else 1.0
+    return float(np.exp(WEIGHTS[2])) if effect == WIDENED else 1.0

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid_node.gap.credence import LIKELY, Grounds
+from sysid_node.gap.credence import LIKELY, REFUTED, Grounds
 
 NATS, MISFITS = st.floats(-1e3, 1e6), st.floats(0.0, 2.0)
 
@@ -23,6 +23,14 @@ def test_what_leaves_nothing_is_not_wanting(nats) -> None:
     assert not Grounds(nats, 0.0, denied=False).wanting
 
 
+@given(NATS)
+def test_a_law_that_is_refuted_is_not_believed(nats) -> None:
+    """More data of a wrong law are more nats."""
+    grounds = Grounds(nats, 2.0 * REFUTED, denied=False)
+    assert grounds.credence == 0.0
+    assert grounds.wanting is (Grounds(nats, 0.0, denied=False).credence >= LIKELY)
+
+
 def test_nothing_foretold_is_not_believed() -> None:
-    assert Grounds(0.0, 0.0, denied=False).credence < 0.05
+    assert Grounds(0.0, 0.0, denied=False).credence < LIKELY
     assert Grounds(1e4, 0.0, denied=False).credence > LIKELY
