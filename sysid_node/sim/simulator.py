@@ -31,7 +31,7 @@ _rollout = jax.jit(rollout, static_argnums=0)
 
 @partial(jax.jit, static_argnums=0)
 def _jacobian(layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs: Inputs, step: Scalar) -> Scalar:
-    slopes: Scalar = jax.jacfwd(lambda t: rollout(layout, model, t, initial, inputs, step).outputs)(theta)
+    slopes: Scalar = jax.jacfwd(lambda t: _rollout(layout, model, t, initial, inputs, step).outputs)(theta)
     return slopes
 
 
