@@ -126,7 +126,7 @@ def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, 
         velocity = velocity - np.cross(rates, np.array(aircraft.sensors.air_data))
         s["V"] = np.linalg.norm(velocity, axis=1)
         s["alpha"] = np.arctan2(velocity[:, 2], velocity[:, 0])
-        s["beta"] = np.arcsin(velocity[:, 1] / s["V"])
+        s["beta"] = np.arctan2(velocity[:, 1], np.hypot(velocity[:, 0], velocity[:, 2]))
     return s
 
 

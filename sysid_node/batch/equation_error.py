@@ -16,6 +16,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.coefficients import Equations, Slope, equations, sensor_slopes, usable
 from sysid_node.batch.identifiability import sentences
+from sysid_node.batch.length import freedom
 from sysid_node.batch.regression import Regression, regress
 from sysid_node.batch.result import Answer, Estimate, Fit
 from sysid_node.batch.sensor_noise import Noise, Noisy, white_variance
@@ -60,25 +61,9 @@ def _fit(
         )
         for flight, X, of_sensors in zip(flights, passed, sensors, strict=True)
     ]
-    fit = regress(names, ys, passed, None, _freedom(names, flights, low_pass), noisy)
+    fit = regress(names, ys, passed, None, freedom(names, [flight.time for flight in flights], low_pass), noisy)
     values = np.array([estimate.value for estimate in fit.estimates.values()])
     return replace(fit, modelled=[X @ values for X in Xs])
-
-
-def _freedom(names: Sequence[str], flights: Sequence[Equations], low_pass: float) -> float:
-    """How many independent values the band holds beyond the regressors. Raises InputError where it holds none."""
-    independent = 0.0
-    for flight in flights:
-        duration = float(flight.time[-1] - flight.time[0])
-        rate = (flight.time.size - 1) / duration
-        independent += min(2.0 * low_pass, rate) * duration if low_pass > 0.0 else rate * duration
-    if independent - len(names) < 1.0:
-        band = f" below {low_pass:g} Hz" if low_pass > 0.0 else ""
-        raise InputError(
-            f"these flights hold {independent:.0f} independent values{band}, too few for {len(names)} regressors "
-            f"({', '.join(names)}); give a longer flight"
-        )
-    return independent - len(names)
 
 
 def noises(

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.equation_error import equation_error
+from sysid_node.batch.equation_error import DEFAULT_LOWPASS, equation_error
 from sysid_node.batch.filter_error import filter_error, predict_filter
+from sysid_node.batch.length import freedom
 from sysid_node.batch.manoeuvres import manoeuvre, segments, with_forces_at_cg
 from sysid_node.batch.model import Manoeuvre, Model
 from sysid_node.batch.models.rigid_body import AT_CG, OUTPUTS, STATES, rigid_body
@@ -46,7 +47,11 @@ class Integrated:
         return cls(method, aircraft, settings, model, (), remarks).on(records)
 
     def on(self, records: Sequence[FlightRecord]) -> Integrated:
-        """The same model, and so the same compiled program, set up for other flights."""
+        """The same model, and so the same compiled program, set up for other flights.
+
+        Raises InputError where these are too short.
+        """
+        _require_length(self.model, self.aircraft, records)
         started, remark = _started(self.model, self.aircraft, records)
         pieces = [_pieces(self.method, started, self.aircraft, record, self.settings) for record in records]
         flat = tuple(piece for several in pieces for piece in several)
@@ -87,6 +92,12 @@ def choose_model(
             f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.structure)}) make no complete motion; an "
             "equation-error method estimates each coefficient alone"
         )
+    unflown = [record.name for record in records if not record.measured("V")]
+    if unflown:
+        raise InputError(
+            f"flight {unflown[0]!r}: its airspeed was never measured, and without it no coefficient makes a force; "
+            "record air_data, or leave the flight out"
+        )
     needs_thrust = aircraft.throttle is not None and thrust
     first = rigid_body(aircraft, states, (), thrust=needs_thrust)
     modelled = {name.partition("_")[0] for name in first.names}
@@ -98,6 +109,17 @@ def choose_model(
     if lost:
         remarks.append(f"{', '.join(lost)} not measured: known through the other outputs alone")
     return model, tuple(remarks)
+
+
+def _require_length(model: Model, aircraft: Aircraft, records: Sequence[FlightRecord]) -> None:
+    """Raises InputError where the flights are too short for one of the model's coefficients.
+
+    Outputs and states tell of the same few motions: they do not make up for a flight that ends before it has begun.
+    """
+    for coefficient, regressors in aircraft.structure.items():
+        names = [name for name in (f"{coefficient}_{r}" for r in regressors) if name in model.names]
+        if names:
+            freedom(names, [record.time for record in records], DEFAULT_LOWPASS)
 
 
 def _possible_states(aircraft: Aircraft, thrust: bool) -> tuple[str, ...]:

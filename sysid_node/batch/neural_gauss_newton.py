@@ -24,6 +24,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.coefficients import Equations, at_cg, equations
 from sysid_node.batch.colour import coloured_covariance
 from sysid_node.batch.equation_error import DEFAULT_LOWPASS, collected, columns, structure_of
+from sysid_node.batch.length import freedom
 from sysid_node.batch.recursive_least_squares import regression_of
 from sysid_node.batch.regression import Regression
 from sysid_node.batch.result import Fit
@@ -61,6 +62,8 @@ def neural_gauss_newton(aircraft: Aircraft, records: Sequence[FlightRecord], low
     slower = [averaged(record, _RATE) for record in records]
     flights = [equations(aircraft, record) for record in slower]
     structure = structure_of(aircraft, flights)
+    for coefficient, regressors in structure.items():
+        freedom([f"{coefficient}_{r}" for r in regressors], [flight.time for flight in flights], low_pass)
     fits: dict[str, Regression] = {}
     for motion, changing, coefficients in _GROUPS:
         present = [name for name in coefficients if name in structure]

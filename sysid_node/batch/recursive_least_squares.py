@@ -13,8 +13,9 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.coefficients import equations
-from sysid_node.batch.equation_error import collected, columns, structure_of
+from sysid_node.batch.equation_error import DEFAULT_LOWPASS, collected, columns, structure_of
 from sysid_node.batch.identifiability import Groups, status_of, undetermined
+from sysid_node.batch.length import freedom
 from sysid_node.batch.regression import Regression
 from sysid_node.batch.result import Estimate, Fit, interval
 from sysid_node.flight.record import Array, FlightRecord
@@ -51,12 +52,16 @@ def recursion(y: Array, X: Array, forgetting: float, shaped: Callable[[float], f
 
 
 def sequential_fit(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], along: Pass) -> Fit:
-    """All coefficients, each in one pass along the flights one after the other."""
+    """All coefficients, each in one pass along the flights one after the other.
+
+    Raises InputError where the flights are too short for one: faster than the aircraft moves there is only noise.
+    """
     flights = [equations(aircraft, record) for record in records]
     step = float(np.median(np.diff(flights[0].time)))
     fits = {}
     for coefficient, regressors in structure_of(aircraft, flights).items():
         names = [f"{coefficient}_{name}" for name in regressors]
+        freedom(names, [flight.time for flight in flights], DEFAULT_LOWPASS)
         Xs = [columns(flight, regressors) for flight in flights]
         ys = [flight.coefficients[coefficient] for flight in flights]
         values, covariance = along(names, np.concatenate(ys), np.concatenate(Xs), step)

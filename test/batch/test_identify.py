@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, TRUTH, clean, flight, scores
 
-from sysid_node.batch.identify import identify
+from sysid_node.batch.identify import METHODS, identify
 from sysid_node.batch.integrated import choose_model
 from sysid_node.batch.manoeuvres import segments
 from sysid_node.batch.settings import Settings
@@ -125,5 +125,32 @@ def test_an_unknown_method_and_no_flight_are_refused():
 def test_a_flight_of_three_samples_is_refused(method):
     whole = flight(1)
     short = dataclasses.replace(whole, time=whole.time[:3], columns={k: v[:3] for k, v in whole.columns.items()})
-    with pytest.raises(InputError, match="samples"):
+    with pytest.raises(InputError, match="too short"):
         identify(method, KESTREL, [short], QUICK)
+
+
+@pytest.mark.parametrize("method", ["output_error", "filter_error"])
+@pytest.mark.parametrize("reading", [np.nan, np.inf])
+def test_a_flight_without_airspeed_is_refused(method, reading):
+    whole = clean()
+    blind = dataclasses.replace(whole, columns={**whole.columns, "V": np.full(len(whole), reading)})
+    with pytest.raises(InputError, match="airspeed was never measured"):
+        identify(method, KESTREL, [blind], QUICK)
+
+
+def test_filter_error_refuses_a_command_that_is_missing_for_a_moment():
+    whole = clean()
+    hole = np.where(np.abs(whole.time - 3.0) < 0.1, np.nan, whole["de"])
+    with pytest.raises(InputError, match=r"input de is missing at 2\.9"):
+        identify("filter_error", KESTREL, [dataclasses.replace(whole, columns={**whole.columns, "de": hole})], QUICK)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_flight_that_ends_before_the_aircraft_has_answered_is_too_short(method):
+    with pytest.raises(InputError, match="give a longer flight"):
+        identify(method, KESTREL, [clean(0.25)], QUICK)
+
+
+def test_several_short_flights_make_a_long_one():
+    fit = identify("recursive_least_squares", KESTREL, [clean(0.25)] * 6, QUICK).fit
+    assert set(fit.estimates) == set(TRUTH)
