@@ -12,6 +12,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from sysid_node.batch import kalman
 from sysid_node.batch.filter_error import filter_error, predict_filter
+from sysid_node.batch.model import Parameter
 from sysid_node.batch.output_error import output_error
 from sysid_node.batch.rollout import rk4_step
 from sysid_node.errors import InputError
@@ -144,3 +145,13 @@ def test_outputs_with_gaps_are_refused():
     outputs[100:110, 1] = np.nan
     with pytest.raises(InputError, match=r"output q has gaps, the first at 2\.00 s; .* use output_error"):
         filter_error(short_period_model(), [with_outputs(manoeuvre, outputs)])
+
+
+def test_a_parameter_at_its_bound_is_named_and_not_valid():
+    lowest = 0.5 * SHORT_PERIOD["Mq"]
+    starts = SHORT_PERIOD | {"Mq": 0.4 * SHORT_PERIOD["Mq"]}
+    parameters = tuple(Parameter(n, v, lower=lowest if n == "Mq" else -np.inf) for n, v in starts.items())
+    fit = filter_error(short_period_model().changed(parameters=parameters), [in_gusts(np.random.default_rng(2))])
+    assert fit.estimates["Mq"].status == f"at its lower bound {lowest:g}"
+    assert not fit.estimates["Mq"].valid
+    assert fit.estimates["Md"].valid
