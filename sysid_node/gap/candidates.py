@@ -20,6 +20,9 @@ from sysid_node.sim import EFFECTS, Simulator
 #: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
 UNSEEN = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 
+#: Effects of instruments that a flight without vanes has not, or shows by its airspeed alone.
+_OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay"})
+
 #: Parameters that only shape an effect and stay as they are: the data of one flight seldom determine them.
 _HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
 
@@ -75,8 +78,9 @@ def candidates_of(simulator: Simulator, views: Sequence[View]) -> list[Candidate
     """All effects that these flights could show."""
     found: list[Candidate] = []
     length = max(view.windows.starts[-1] + view.windows.length for view in views)
+    unseen = UNSEEN | (_OF_VANES if any(view.flight.inferred for view in views) else frozenset())
     for effect in EFFECTS:
-        if effect in UNSEEN:
+        if effect in unseen:
             continue
         if effect == WIDENED:
             found += _per_coefficient(simulator)

@@ -18,6 +18,7 @@ from sysid_node.flight.bag import read_streams
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs import READERS, read_log
 from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.gap import inferred
 
 #: Rate at which forces are predicted (Hz): six times the highest line that is compared, and more.
 RATE = 50.0
@@ -43,6 +44,7 @@ class Flight:
     lateral: bool = True  # whether side force, roll and yaw were measured
     source: str = ""
     filled: tuple[str, ...] = field(default=())  # columns that were not measured and are taken as zero
+    inferred: tuple[str, ...] = field(default=())  # flow angles that no vane measured
 
 
 def load_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> Flight:
@@ -60,7 +62,8 @@ def load_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None
 
 def complete(aircraft: Aircraft, flight: Flight) -> Flight:
     """The flight with the lateral signals, where all are absent, as zeros. Raises InputError where one is missing."""
-    record = _first_run(flight.record)
+    flight = _with_flow_angles(aircraft, replace(flight, record=_first_run(flight.record)))
+    record = flight.record
     longitudinal = ("ax", "az", "q", "V", "alpha", "rho", *aircraft.control_symbols)
     needed = [*longitudinal, *(["thrust"] if aircraft.throttle else [])]
     lateral = all(np.isfinite(record[name]).all() for name in _LATERAL)
@@ -76,6 +79,14 @@ def complete(aircraft: Aircraft, flight: Flight) -> Flight:
     filled = (*(n for n in _LATERAL if not np.isfinite(record[n]).all()), *fillable)
     columns = {**record.columns, **{name: np.zeros(len(record)) for name in filled}}
     return replace(flight, record=replace(record, columns=columns), lateral=False, filled=filled)
+
+
+def _with_flow_angles(aircraft: Aircraft, flight: Flight) -> Flight:
+    """The flight with the flow angles that its aircraft has no vane for, where the six inertial instruments tell."""
+    angles = inferred.lacking(flight.record)
+    if not angles or not all(np.isfinite(flight.record[name]).all() for name in ("ay", "p", "r")):
+        return flight
+    return replace(flight, record=inferred.with_angles(aircraft, flight.record, angles, flight.source), inferred=angles)
 
 
 def _first_run(record: FlightRecord) -> FlightRecord:

@@ -66,7 +66,8 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
         return None
     motion, noise, *errors = np.concatenate(tables, axis=1)
     lateral = all(view.flight.lateral for view in final.views)
-    counted = np.array([lateral or name in _LONGITUDINAL for name in READINGS])
+    inferred = {angle for view in final.views for angle in view.flight.inferred}
+    counted = np.array([(lateral or name in _LONGITUDINAL) and name not in inferred for name in READINGS])
     counted &= motion.mean(axis=0) > _MOVED * noise.mean(axis=0)
     if not counted.any():
         return None

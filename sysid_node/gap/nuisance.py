@@ -34,6 +34,9 @@ _CLOCKS = {
 #: Share of the airspeed from which on the air's motion counts.
 _GUSTY = 0.01
 
+#: Mean error of a flow angle that no vane measured, 1 sigma, rad: it is the aircraft file's.
+_INFERRED = 0.01
+
 #: Noise of the aircraft file that a bias may be as large as.
 _BIASES = {
     **{f"imu_bias.{n}": "accel" for n in ("ax", "ay", "az")},
@@ -77,6 +80,7 @@ def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
+    sigma |= {f"vane_bias.{angle}": _INFERRED for angle in view.flight.inferred}
     sigma |= _turning_air(aircraft, view)
     limit = {name: LIMIT * s for name, s in sigma.items()}
     for clock, rate in zip(_CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.gap import inferred
 from sysid_node.gap.flights import Flight, thinned
 from sysid_node.gap.kinematics import READINGS, Motion, motion_of, reconstruct
 from sysid_node.gap.recent import Recent
@@ -217,6 +218,7 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
     axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
     axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
+    axes[[CHANNELS.index(name) for name in flight.inferred]] = False
     calm = _measured_noise(_bare(simulator, flight, record, windows, axes, LONGEST), seed)
     calm = replace(calm, gusts=gusts_of(calm, simulator.neutral()))
     fading = _fading(calm)
@@ -240,7 +242,7 @@ def _bare(
     simulator: Simulator, flight: Flight, record: FlightRecord, windows: Windows, axes: NDArray[np.bool_], fading: float
 ) -> View:
     """A view that does not know its noise."""
-    given, series = _given(simulator, record, fading)
+    given, series = _given(simulator, record, fading, own_clock=not flight.inferred)
     return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
 
 
@@ -251,11 +253,22 @@ def gusts_of(view: View, theta: Array) -> float:
     """
     vanes = len(COEFFICIENTS) + np.flatnonzero(view.axes[len(COEFFICIENTS) :][1:3]) + 1
     if not vanes.size:
-        return 0.0
+        return _gusts_ahead(view, theta)
     calm = replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
     power = (np.abs(calm.residual(theta)[:, 1:, vanes]) ** 2).sum(axis=1)
     beyond = np.maximum(np.median(power, axis=0) - view.noise[1:, vanes].sum(axis=0), 0.0)
     return float(view.record["V"].mean() * np.sqrt(2.0 / view.windows.size * beyond.mean()))
+
+
+def _gusts_ahead(view: View, theta: Array) -> float:
+    """The same by the airspeed alone, where no vane was there: air that moves moves alike in all directions."""
+    airspeed = CHANNELS.index("V")
+    if not view.axes[airspeed]:
+        return 0.0
+    calm = replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
+    power = (np.abs(calm.residual(theta)[:, 1:, airspeed]) ** 2).sum(axis=1)
+    beyond = max(float(np.median(power) - view.noise[1:, airspeed].sum()), 0.0)
+    return float(np.sqrt(2.0 / view.windows.size * beyond))
 
 
 def _fading(calm: View) -> float:
@@ -276,12 +289,15 @@ def _fading(calm: View) -> float:
     return float(np.clip(np.exp(np.log(memory).mean()), SHORTEST_MEMORY, LONGEST))
 
 
-def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[Given, Array]:
+def _given(simulator: Simulator, record: FlightRecord, fading: float, *, own_clock: bool) -> tuple[Given, Array]:
     """What a prediction needs, padded, and the measured channels (N, 12)."""
     signals, short = signals_of(simulator, record), -len(record) % _BLOCK
     nothing = jnp.zeros((len(record), 3))
     motion = motion_of(record) or Motion(nothing, nothing, nothing, signals.air, nothing)
-    signals, motion = (jax.tree.map(lambda x: _padded(x, short), parts) for parts in (signals, motion))
+    clock = jnp.asarray(float(own_clock))
+    signals, motion = (
+        jax.tree.map(lambda x: _padded(x, short), parts._replace(air_clock=clock)) for parts in (signals, motion)
+    )
     shown = _padded(np.column_stack([record[name] for name in ACCELERATIONS]), short)
     forces = np.asarray(_reduced(simulator.model, signals, shown))[: len(record)]
     readings = np.concatenate([motion.air, motion.attitude], axis=1)[: len(record)]
@@ -290,8 +306,9 @@ def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[G
 
 
 def _padded(series: Scalar | Array, short: int) -> Scalar:
-    """A series (N, ...) with its end held for so many samples."""
-    return jnp.pad(jnp.asarray(series), [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge")
+    """A series (N, ...) with its end held for so many samples; what is no series, as it is."""
+    series = jnp.asarray(series)
+    return jnp.pad(series, [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge") if series.ndim else series
 
 
 def _noise_power(view: View, random: np.random.Generator) -> Array:
@@ -318,7 +335,10 @@ def noisier(view: View, random: np.random.Generator) -> Flight:
             if name in columns and name not in view.flight.filled:
                 columns[name] = columns[name] + spread * random.standard_normal(len(record))
     columns |= _jittered(view, random)
-    return replace(view.flight, record=replace(record, columns=columns))
+    noisy = replace(record, columns=columns)
+    if view.flight.inferred:
+        noisy = inferred.with_angles(view.simulator.aircraft, noisy, view.flight.inferred, view.flight.source)
+    return replace(view.flight, record=noisy)
 
 
 def _jittered(view: View, random: np.random.Generator) -> dict[str, Array]:

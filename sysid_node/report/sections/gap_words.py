@@ -44,7 +44,7 @@ _STILL = 0.2
 
 def paragraph(found: Diagnosis) -> str:
     """What was found."""
-    return f"{_off(found)}{_findings(found)}{_weather(found)}"
+    return f"{_off(found)}{_findings(found)}{_weather(found)}{_blindness(found)}"
 
 
 def _off(found: Diagnosis) -> str:
@@ -117,6 +117,15 @@ def _falls(found: Diagnosis, otherwise: str) -> str:
         f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)}) of what could be closed; noise "
         f"alone would leave {percent(gap.noise_floor)}"
     )
+
+
+def _blindness(found: Diagnosis) -> str:
+    """What was not measured, and what cannot be said without."""
+    angles = dict.fromkeys(angle for view in found.views for angle in view.flight.inferred)
+    if not angles:
+        return ""
+    known = " and ".join(WORDS[angle] for angle in angles)
+    return f" Not measured, but inferred from the inertial instruments: {known}. What gusts do is not known then."
 
 
 def _weather(found: Diagnosis) -> str:

@@ -1,0 +1,101 @@
+"""Flights without vanes: flow angles inferred from the inertial instruments; truth: the vanes that were taken away."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.errors import InputError
+from sysid_node.gap.candidates import candidates_of
+from sysid_node.gap.diagnose import diagnose
+from sysid_node.gap.document import document
+from sysid_node.gap.flights import Flight, complete
+from sysid_node.gap.view import CHANNELS, view_of
+from sysid_node.sim import Simulator
+
+
+def blind(aircraft, flight: Flight, *lost: str) -> Flight:
+    """The flight as an aircraft without these instruments has it."""
+    columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in lost}}
+    return complete(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+
+
+@pytest.fixture(scope="module")
+def vaneless(aircraft, plain) -> Flight:
+    return blind(aircraft, plain, "alpha", "beta")
+
+
+@pytest.fixture(scope="module")
+def vaneless_view(aircraft, vaneless):
+    return view_of(Simulator(aircraft, 50.0), vaneless)
+
+
+def test_angles_are_those_that_the_vanes_read(plain, vaneless) -> None:
+    assert vaneless.inferred == ("alpha", "beta")
+    for angle in vaneless.inferred:
+        error, moved = vaneless.record[angle] - plain.record[angle], plain.record[angle].std()
+        assert np.sqrt((error**2).mean()) < 0.006 < moved / 2.0
+
+
+def test_one_vane_is_used_where_it_is_there(aircraft, plain) -> None:
+    flight = blind(aircraft, plain, "beta")
+    assert flight.inferred == ("beta",)
+    np.testing.assert_array_equal(flight.record["alpha"], plain.record["alpha"])
+
+
+def test_what_was_not_measured_is_not_compared(vaneless_view) -> None:
+    assert {c for c, measured in zip(CHANNELS, vaneless_view.axes, strict=True) if not measured} == {"alpha", "beta"}
+    effects = {c.effect for c in candidates_of(vaneless_view.simulator, [vaneless_view])}
+    assert not {"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay"} & effects
+    assert {"actuator_lag", "imu_delay", "cg_shift"} <= effects
+
+
+def test_only_noise_is_left_of_the_same_aircraft(vaneless_view) -> None:
+    view = vaneless_view
+    residual = np.abs(view.residual(view.simulator.neutral())[:, 1:]) ** 2
+    ratio = (residual.mean(axis=0).sum(axis=0) / view.noise[1:].sum(axis=0))[view.axes]
+    assert (ratio < 8.0).all(), ratio
+
+
+def test_still_air_is_known_to_be_still(vaneless_view) -> None:
+    assert vaneless_view.gusts < 0.01 * vaneless_view.record["V"].mean()
+
+
+def test_inferred_angles_are_as_late_as_the_imu(vaneless_view) -> None:
+    """A late IMU is late in all but the airspeed, which hardly changes: as if the commands had been early."""
+    view = vaneless_view
+    names, late_imu, late_commands = view.simulator.names, view.simulator.neutral(), view.simulator.neutral()
+    late_imu[names.index("imu_delay.delay")] = 0.04
+    late_commands[names.index("command_delay.delay")] = 0.04
+    as_measured = view.predicted_series(view.simulator.neutral())
+    moved = [view.predicted_series(theta)[:, 3:6] - as_measured[:, 3:6] for theta in (late_imu, late_commands)]
+    assert np.abs(moved[0]).max() > 0.01
+    # moments, away from the ends
+    assert np.corrcoef(moved[0][50:-50].ravel(), moved[1][50:-50].ravel())[0, 1] > 0.5
+
+
+def test_a_lag_is_named_without_vanes(aircraft, make_flight) -> None:
+    effects = {"actuator_lag": {"time_constant": 0.1}}
+    flights = [blind(aircraft, make_flight(effects, seed=seed), "alpha", "beta") for seed in (5, 6)]
+    found = diagnose(aircraft, flights[:1], flights[1:])
+    (cause,) = document(found)["causes"]
+    assert found.verdict == "explained" and cause["effect"] == "actuator_lag"
+    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.1, rel=0.15)
+    assert not {"alpha", "beta"} & found.size.per_channel.keys()
+
+
+def test_tolerances_are_no_gap_without_vanes(aircraft, make_flight) -> None:
+    """A lift slope that is off makes the mean angle of attack wrong, and with it the drag."""
+    wrong = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "CL_0": 0.02, "Cl_p": 0.03, "Cn_beta": 0.006}
+    flight = blind(aircraft, make_flight({"derivative_error": wrong}, seed=7), "alpha", "beta")
+    assert diagnose(aircraft, [flight], []).verdict == "no_gap"
+
+
+def test_what_cannot_be_inferred_is_said(aircraft, plain) -> None:
+    with pytest.raises(InputError, match=r"no complete alpha; the gap cannot be measured without"):
+        blind(aircraft, plain, "alpha", "beta", "ay")
+    derivatives = {name: d for name, d in aircraft.derivatives.items() if name != "CL_alpha"}
+    with pytest.raises(
+        InputError, match=r"no alpha or beta; they can be inferred where the aircraft file has CL_alpha"
+    ):
+        blind(replace(aircraft, derivatives=derivatives), plain, "alpha", "beta")
