@@ -29,7 +29,7 @@ from sysid_node.flight.commands import read_commands
 from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.topics import topic_names
-from sysid_node.flight.truth import read_truth
+from sysid_node.flight.truth import Truth, truth_at_end
 from sysid_node.online import reconstruction
 from sysid_node.online.alignment import Aligned, align_streams
 from sysid_node.online.run import run as run_online
@@ -97,9 +97,7 @@ def judge_replay(done: Replay, bag: str | Path, progress: Callable[[float], None
     return judge(done.aircraft, FaultSettings(), done.streams, read_commands(bag), heard, progress)
 
 
-def write_replay(
-    folder: Path, done: Replay, truth: Mapping[str, float] | None = None, faults: Verdict | None = None
-) -> None:
+def write_replay(folder: Path, done: Replay, truth: Truth | None = None, faults: Verdict | None = None) -> None:
     """Writes summary.json, the tables and report.html, and the bag of all estimates in ``folder``/estimates.
 
     What an earlier replay left there is replaced. Raises InputError where the folder cannot be written.
@@ -117,7 +115,8 @@ def write_replay(
         samples=samples,
         history=list(shown.values()),
         rejected=flat(aligned.rejected),
-        truth=truth,
+        truth=truth.values if truth else None,
+        truth_since=truth.since if truth else None,
         faults=faults,
         remarks=reconstruction.remarks(flow),
     )
@@ -190,7 +189,7 @@ def run(args: argparse.Namespace) -> None:
     """Replays a bag."""
     aircraft = load_aircraft(args.aircraft)
     settings, publish_rate = parse_settings(args.set, args.frequencies)
-    topics, truth = topic_names(args.topic), read_truth(args.bag)
+    topics, truth = topic_names(args.topic), truth_at_end(args.bag)
     with progress_bar(f"replay {args.bag.name}", quiet=args.quiet) as progress:
         done = replay(
             args.bag,
@@ -205,6 +204,6 @@ def run(args: argparse.Namespace) -> None:
         faults = judge_replay(done, args.bag, progress)
     write_replay(args.out, done, truth, faults)
     if not args.quiet:
-        show_estimates(done.final, truth)
+        show_estimates(done.final, truth.values, truth.since)
         show_faults(faults)
         print(args.out / "report.html")

@@ -23,8 +23,11 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
         yield lambda share: progress.update(task, completed=share)
 
 
-def show_estimates(final: Estimates, truth: Mapping[str, float]) -> None:
-    """The final estimates as a table: value, 95 % interval, status, and the truth where it is known."""
+def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[str, float] | None = None) -> None:
+    """The final estimates as a table: value, 95 % interval, status, and the truth where it is known.
+
+    ``since``: s from which on it is that, of those that have changed.
+    """
     table = Table(box=None, header_style="bold")
     for heading, justify in (("derivative", "left"), ("estimate", "right"), ("95 % interval", "left")):
         table.add_column(heading, justify=justify)  # type: ignore[arg-type]
@@ -33,9 +36,15 @@ def show_estimates(final: Estimates, truth: Mapping[str, float]) -> None:
         table.add_column("true", justify="right")
     for d in final.derivatives.values():
         cells = [d.name, f"{d.value:.4f}", f"{d.lower:.4f} to {d.upper:.4f}", d.status]
-        known = [f"{truth[d.name]:.4f}" if d.name in truth else ""] if truth else []
+        known = [_true(d.name, truth, since or {})] if truth else []
         table.add_row(*cells, *known, style="" if d.valid else "dim")
     Console().print(table)
+
+
+def _true(name: str, truth: Mapping[str, float], since: Mapping[str, float]) -> str:
+    if name not in truth:
+        return ""
+    return f"{truth[name]:.4f}" + (f" since {since[name]:.1f} s" if name in since else "")
 
 
 def show_faults(verdict: Verdict) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Rate of the integration, Hz; raised to the IMU's where that is higher.
 _RATE = 200.0
+#: Failures that take a surface's effect away, the second one by what is commanded.
+LOSSES = ("control_effectiveness_loss", "stuck_surface")
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -108,9 +111,11 @@ def _thrust(simulator: Simulator, manoeuvre: Manoeuvre) -> NDArray[np.float64]:
 
 def _truth(args: argparse.Namespace, sortie: Sortie) -> dict[str, Any]:
     """What was flown, apart from the bag."""
+    derivatives, changes = _derivatives(args.surfaces, sortie)
     return {
         "aircraft": sortie.simulator.aircraft.name,
-        "derivatives": sortie.derivatives,
+        "derivatives": derivatives,
+        "changes": changes,
         "effects": sortie.effects,
         "trim": {
             "airspeed": float(np.linalg.norm(sortie.trim.initial[3:6])),
@@ -124,6 +129,34 @@ def _truth(args: argparse.Namespace, sortie: Sortie) -> dict[str, Any]:
         "recorded_surfaces": args.surfaces,
         "command": _command(args),
     }
+
+
+def _derivatives(surfaces: str, sortie: Sortie) -> tuple[dict[str, float], list[dict[str, Any]]]:
+    """The true derivatives at the beginning, and what failures make of those of the recorded surfaces, and when.
+
+    A jammed surface whose position is recorded does what it does; by its commands it has lost its effect.
+    """
+    lossy = LOSSES[:1] if surfaces == "measured" else LOSSES
+    failed = sorted((effect.get("onset", 0.0), name) for name, effect in sortie.effects.items() if name in lossy)
+    end = (len(sortie.flight.outputs) - 1) * sortie.simulator.step
+    begin, changes = dict(sortie.derivatives), []
+    now = begin
+    for onset, name in failed:
+        changed = _left(sortie, name, now)
+        now = now | changed
+        if onset <= 0.0:
+            begin = now
+        elif onset < end:
+            changes.append({"time": onset, "derivatives": changed})
+    return begin, changes
+
+
+def _left(sortie: Sortie, effect: str, derivatives: Mapping[str, float]) -> dict[str, float]:
+    """What a failure leaves of the derivatives that it touches."""
+    lost = sortie.effects[effect]
+    share = {c.symbol: 1.0 - lost[n] for n, c in sortie.simulator.aircraft.controls.items() if lost.get(n)}
+    of = {name: name.partition("_")[2] for name in derivatives}
+    return {name: share[of[name]] * value for name, value in derivatives.items() if of[name] in share}
 
 
 def _command(args: argparse.Namespace) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import NamedTuple
 
 from sysid_node.errors import InputError
 
@@ -15,13 +16,35 @@ def truth_path(bag: str | Path) -> Path:
     return folder.with_name(f"{folder.name}.truth.json")
 
 
+class Truth(NamedTuple):
+    """True derivatives by name as they are at a flight's end, and since when (s) those that have changed are so."""
+
+    values: dict[str, float]
+    since: dict[str, float]
+
+
 def read_truth(bag: str | Path) -> dict[str, float]:
-    """True derivatives by name; empty where there is no truth file. Raises InputError where it is no such file."""
+    """As ``truth_at_end``, of those derivatives alone that are the same from a flight's beginning to its end."""
+    truth = truth_at_end(bag)
+    return {name: value for name, value in truth.values.items() if name not in truth.since}
+
+
+def truth_at_end(bag: str | Path) -> Truth:
+    """All that is true at the end; empty where there is no truth file. Raises InputError where it is no such file."""
     path = truth_path(bag)
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        return {str(name): float(value) for name, value in found["derivatives"].items()}
+        truth = Truth(_numbers(found["derivatives"]), {})
+        for change in found.get("changes", []):
+            changed = _numbers(change["derivatives"])
+            truth.values.update(changed)
+            truth.since.update(dict.fromkeys(changed, float(change["time"])))
+        return truth
     except FileNotFoundError:
-        return {}
+        return Truth({}, {})
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: expected JSON with derivatives: {{name: value}}, got {error}; remove it") from error
+
+
+def _numbers(values: dict[str, float]) -> dict[str, float]:
+    return {str(name): float(value) for name, value in values.items()}

@@ -88,6 +88,7 @@ class RunResult:
     settings: Mapping[str, object] = field(default_factory=dict)  # as written to summary.json
     prior: Mapping[str, Prior] = field(default_factory=dict)  # by derivative
     truth: Mapping[str, float] = field(default_factory=dict)  # by derivative, where it is known (simulated flights)
+    truth_since: Mapping[str, float] = field(default_factory=dict)  # s, of those that changed in flight
     flight: FlightRecord | None = None  # the aligned samples, for the drawn time histories
     spectra: Spectra | None = None
     responses: Mapping[str, Response] = field(default_factory=dict)  # by output or coefficient

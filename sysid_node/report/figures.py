@@ -86,9 +86,12 @@ def band(x: Array, lower: Array, upper: Array, keep: Mask, colour: str) -> Trace
     }
 
 
-def level(value: float, colour: str, dash: str = "solid", width: float = 1.4) -> dict[str, Any]:
-    """A horizontal line across the plot."""
-    position = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value}
+def level(
+    value: float, colour: str, dash: str = "solid", width: float = 1.4, span: tuple[float, float] | None = None
+) -> dict[str, Any]:
+    """A horizontal line across the plot, or over a ``span`` of times (s)."""
+    begin, end = span or (0, 1)
+    position = {"type": "line", "xref": "x" if span else "paper", "x0": begin, "x1": end, "y0": value, "y1": value}
     return {**position, "line": {"color": colour, "dash": dash, "width": width}}
 
 

@@ -48,7 +48,7 @@ def rebuild_report(folder: Path) -> Path:
 def read_run(folder: Path) -> RunResult:
     """The run that ``write_run`` wrote. Raises InputError naming the file where something is missing or wrong."""
     found = _read_summary(folder / SUMMARY)
-    prior, truth = tables.read_references(folder / "derivatives.csv")
+    prior, truth, since = tables.read_references(folder / "derivatives.csv")
     return RunResult(
         aircraft=found["aircraft"],
         method=found["method"],
@@ -59,6 +59,7 @@ def read_run(folder: Path) -> RunResult:
         settings=found.get("settings", {}),
         prior=prior,
         truth=truth,
+        truth_since=since,
         flight=tables.read_signals(folder / "signals.csv"),
         spectra=tables.read_spectra(folder / "spectra.csv"),
         responses=tables.read_responses(folder / "responses.csv"),
@@ -100,6 +101,7 @@ def _stored(run: RunResult) -> RunResult:
         history=[e for e in run.history if e.derivatives or e.fits],
         prior={name: prior for name, prior in run.prior.items() if name in known},
         truth={name: value for name, value in run.truth.items() if name in known},
+        truth_since={name: time for name, time in run.truth_since.items() if name in known},
         flight=thin_flight(run.flight) if run.flight else None,
         responses={name: _thin_response(response) for name, response in run.responses.items()},
     )
@@ -121,7 +123,7 @@ def _writing(folder: Path) -> Iterator[None]:
 
 def _write_tables(folder: Path, run: RunResult) -> None:
     final = run.final.derivatives.values() if run.final else ()
-    tables.write_derivatives(folder / "derivatives.csv", final, run.prior, run.truth)
+    tables.write_derivatives(folder / "derivatives.csv", final, run.prior, run.truth, run.truth_since)
     tables.write_estimates(folder / "estimates.csv", run.history)
     tables.write_fits(folder / "fits.csv", run.history)
     tables.write_signals(folder / "signals.csv", run.flight)

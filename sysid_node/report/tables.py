@@ -2,7 +2,7 @@
 
 ========================  ==============================================================================
 ``derivatives.csv``       final: name, value, standard_error, lower, upper, valid, status, prior,
-                          prior_tolerance, truth
+                          prior_tolerance, truth, truth_since (where it changed in flight)
 ``estimates.csv``         over time: time, name, value, standard_error, lower, upper, valid, status
 ``fits.csv``              over time: time, coefficient, r_squared, residual_std, degrees_of_freedom, samples
 ``signals.csv``           the aligned record (thinned where it is long): time, one column per signal
@@ -31,7 +31,7 @@ from sysid_node.report.data import Prior, Response, Spectra
 
 ESTIMATE_COLUMNS = ("name", "value", "standard_error", "lower", "upper", "valid", "status")
 FIT_COLUMNS = ("coefficient", "r_squared", "residual_std", "degrees_of_freedom", "samples")
-REFERENCE_COLUMNS = ("prior", "prior_tolerance", "truth")
+REFERENCE_COLUMNS = ("prior", "prior_tolerance", "truth", "truth_since")
 RESPONSE_COLUMNS = ("name", "unit", "time", "measured", "modelled")
 
 Row = Sequence[object]
@@ -39,7 +39,11 @@ T = TypeVar("T")
 
 
 def write_derivatives(
-    path: Path, derivatives: Iterable[DerivativeEstimate], prior: Mapping[str, Prior], truth: Mapping[str, float]
+    path: Path,
+    derivatives: Iterable[DerivativeEstimate],
+    prior: Mapping[str, Prior],
+    truth: Mapping[str, float],
+    since: Mapping[str, float],
 ) -> None:
     """The final estimates, each with what was believed and what is true of it."""
     rows = (
@@ -48,23 +52,27 @@ def write_derivatives(
             prior[d.name].value if d.name in prior else math.nan,
             prior[d.name].tolerance if d.name in prior else math.nan,
             truth.get(d.name, math.nan),
+            since.get(d.name, math.nan),
         )
         for d in derivatives
     )
     _write(path, ESTIMATE_COLUMNS + REFERENCE_COLUMNS, rows)
 
 
-def read_references(path: Path) -> tuple[dict[str, Prior], dict[str, float]]:
-    """Prior and truth by derivative, from ``derivatives.csv``; empty where there is no such file."""
+def read_references(path: Path) -> tuple[dict[str, Prior], dict[str, float], dict[str, float]]:
+    """Prior, truth and since when (s) it is that, by derivative, from ``derivatives.csv``; empty without the file."""
     prior: dict[str, Prior] = {}
     truth: dict[str, float] = {}
+    since: dict[str, float] = {}
     for row in _read(path, ESTIMATE_COLUMNS + REFERENCE_COLUMNS, lambda r: r):
-        value, tolerance, true = (_number(cell) for cell in row[-3:])
+        value, tolerance, true, time = (_number(cell) for cell in row[-4:])
         if not math.isnan(value):
             prior[row[0]] = Prior(value, tolerance)
         if not math.isnan(true):
             truth[row[0]] = true
-    return prior, truth
+        if not math.isnan(time):
+            since[row[0]] = time
+    return prior, truth, since
 
 
 def write_estimates(path: Path, history: Iterable[Estimates]) -> None:

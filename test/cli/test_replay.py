@@ -155,7 +155,9 @@ def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp
     out = tmp_path / "out"
     bag = Path(__file__).resolve().parents[2] / "bags" / "cdrw_failed_elevator"
     assert main(["replay", str(bag), "--aircraft", "cdrw", "--out", str(out)]) == 0
-    assert "faults: elevator: loss of effectiveness, " in capsys.readouterr().out
+    terminal = capsys.readouterr().out
+    assert "faults: elevator: loss of effectiveness, " in terminal
+    assert "-0.2303 since 30.0 s" in terminal  # half of the file's Cm_de
     found = json.loads((out / "summary.json").read_text())["faults"]
     (fault,) = found["found"]
     assert (fault["kind"], fault["part"], fault["until"]) == ("loss of effectiveness", "elevator", None)
@@ -168,6 +170,10 @@ def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp
     assert said[0].status == []
     assert (said[-1].status[0].name, said[-1].status[0].hardware_id) == ("fault_monitor: elevator", "cdrw")
     assert {pair.key: pair.value for pair in said[-1].status[0].values}["size"] == f"{fault['size']:.6g}"
+    with (out / "derivatives.csv").open() as file:
+        (row,) = (row for row in csv.DictReader(file) if row["name"] == "Cm_de")
+    assert float(row["lower"]) <= float(row["truth"]) <= float(row["upper"])
+    assert (row["truth"], row["truth_since"]) == ("-0.2303", "30.0")
     page = (out / "report.html").read_text()
     assert "<td>elevator: loss of effectiveness</td>" in page
     assert main(["report", str(out), "--quiet"]) == 0

@@ -67,6 +67,35 @@ def test_the_truths_command_flies_it_again(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("effects", "surfaces", "begin", "changes"),
+    [
+        (["control_effectiveness_loss:elevator=0.5:onset=0.4"], "measured", 1.0, [(0.4, 0.5)]),
+        (["control_effectiveness_loss:elevator=0.5:onset=9"], "measured", 1.0, []),  # after its end
+        (["control_effectiveness_loss:elevator=0.5"], "measured", 0.5, []),  # from the beginning on
+        (["stuck_surface:elevator=1:onset=0.4"], "measured", 1.0, []),  # where it stands is recorded
+        (["stuck_surface:elevator=1:onset=0.4"], "commanded", 1.0, [(0.4, 0.0)]),
+        (
+            ["stuck_surface:elevator=1:onset=0.4", "control_effectiveness_loss:elevator=0.5:onset=0.2"],
+            *("commanded", 1.0, [(0.2, 0.5), (0.4, 0.0)]),
+        ),
+    ],
+)
+def test_the_truth_of_a_failure(tmp_path, effects, surfaces, begin, changes):
+    """What the recorded surface does, in what it does in a sound aircraft, and since when; all else stays."""
+    options = [word for effect in effects for word in ("--effect", effect)]
+    flown = ["--duration", "0.6", "--surfaces", surfaces, "--out", str(tmp_path / "bag"), "--quiet"]
+    assert main(["simulate", "--aircraft", "cdrw", *options, *flown]) == 0
+    truth = json.loads((tmp_path / "bag.truth.json").read_text())
+    file = load_aircraft("cdrw").derivatives
+    assert truth["derivatives"]["Cm_de"] == pytest.approx(begin * file["Cm_de"].value)
+    assert truth["derivatives"]["Cm_alpha"] == file["Cm_alpha"].value
+    assert [change["time"] for change in truth["changes"]] == [time for time, _ in changes]
+    for change, (_, share) in zip(truth["changes"], changes, strict=True):
+        assert change["derivatives"].keys() == {"CL_de", "CD_de", "Cm_de"}
+        assert change["derivatives"]["Cm_de"] == pytest.approx(share * file["Cm_de"].value, abs=1e-12)
+
+
+@pytest.mark.parametrize(
     ("options", "said"),
     [
         (["--effect", "gremlins:size=3"], "'gremlins' is not known; known: command_delay"),

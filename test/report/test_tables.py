@@ -48,11 +48,12 @@ def test_references_read_back(tmp_path):
     path = tmp_path / "derivatives.csv"
     prior = {"Cm_q": Prior(-1.3, 0.2), "CL_0": Prior(0.1)}
     known = [estimate(name, 1.0, 0.1, 0.8, 1.2) for name in ("Cm_q", "CL_0", "CL_q")]
-    tables.write_derivatives(path, known, prior, {"CL_q": 4.0})
-    read_prior, truth = tables.read_references(path)
+    tables.write_derivatives(path, known, prior, {"CL_q": 4.0}, {"CL_q": 30.0})
+    read_prior, truth, since = tables.read_references(path)
     assert read_prior["Cm_q"] == prior["Cm_q"]
     assert math.isnan(read_prior["CL_0"].tolerance)
     assert truth == {"CL_q": 4.0}
+    assert since == {"CL_q": 30.0}
 
 
 def test_signals_spectra_and_responses_read_back(tmp_path):

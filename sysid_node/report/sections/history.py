@@ -104,7 +104,9 @@ def _references(run: RunResult, name: str) -> list[dict[str, Any]]:
     if name in run.prior:
         shapes.append(figures.level(run.prior[name].value, figures.MUTED, "dash"))
     if name in run.truth:
-        shapes.append(figures.level(run.truth[name], figures.VERMILION))
+        since = run.truth_since.get(name)
+        span = None if since is None else (since, run.history[-1].time)
+        shapes.append(figures.level(run.truth[name], figures.VERMILION, span=span))
     return shapes
 
 
