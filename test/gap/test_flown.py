@@ -1,6 +1,7 @@
 """Short flights beside a flight: with nothing wrong the noise floor is left, whatever the effect and the air."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,8 +60,7 @@ def test_short_flights_begin_where_the_flight_is(plain_view) -> None:
 
 def test_no_attitude_no_short_flights(plain_view) -> None:
     columns = {n: v for n, v in plain_view.record.columns.items() if n not in ("phi", "theta")}
-    record = plain_view.record.__class__(plain_view.record.time, columns)
-    bare = plain_view.__class__(**{**plain_view.__dict__, "record": record})
+    bare = replace(plain_view, record=replace(plain_view.record, columns=columns))
     assert gap_of(bare, {}) is None
 
 
