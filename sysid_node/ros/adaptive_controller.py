@@ -18,22 +18,23 @@ from sysid_node.control.allocation import Allocation
 from sysid_node.control.plant import CONTROLS
 from sysid_node.control.settings import RANGES, Settings
 from sysid_node.control.types import Command, Sensed, SetPoints
-from sysid_node.flight.topics import AIR_DATA, IMU
-from sysid_node.ros import conversion
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.ros import conversion, inputs
 from sysid_node.ros.arrivals import Arrivals
 from sysid_node.ros.beliefs import beliefs_of
 from sysid_node.ros.conversion import NANOSECONDS, stamp_ns
+from sysid_node.ros.inputs import ATTITUDE_FIELDS, FIELDS, Numbers, Texts
 from sysid_node.ros.loop_node import (
     AIRCRAFT,
     COMMAND,
     DERIVATIVES,
     EXCITATION,
+    LAG,
     LATEST,
     SET_POINTS,
     LoopNode,
-    attitude_of,
+    by_name,
     named,
-    values_by_name,
 )
 from sysid_node.ros.monitor import Durations
 from sysid_node.ros.parameters import Parameter, setting
@@ -51,7 +52,7 @@ PARAMETERS = (
         "Whether estimates are used; false: the gains of the aircraft file, whatever is identified.",
         "false to compare, or until the identifier is trusted.",
     ),
-    _setting("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft."),
+    _setting(*LAG),
     _setting("delay", "s", "From a reading to its command's arrival at the actuator.", "Up on a slow bus."),
     _setting(
         "gain_margin",
@@ -106,11 +107,11 @@ class AdaptiveController(LoopNode):
         self._work = Durations()
         self._command = self.create_publisher(JointState, COMMAND, 10)
         self._tracking = self.create_publisher(JointState, "~/tracking", 10)
-        self.create_subscription(Imu, IMU, self._on_imu, LATEST)
-        self.create_subscription(AirData, AIR_DATA, self._on_air_data, LATEST)
+        self.listen(Imu, IMU, ATTITUDE_FIELDS, self._on_imu, LATEST)
+        self.listen(AirData, AIR_DATA, FIELDS[AIR_DATA], self._on_air_data, LATEST)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
-        self.create_subscription(JointState, EXCITATION, self._on_excitation, LATEST)
-        self.create_subscription(JointState, SET_POINTS, self._on_set_points, 10)
+        self.listen(JointState, EXCITATION, FIELDS[ACTUATORS], self._on_excitation, LATEST)
+        self.listen(JointState, SET_POINTS, FIELDS[ACTUATORS], self._on_set_points, 10)
         self.every(0.02, self._watch)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
@@ -132,40 +133,36 @@ class AdaptiveController(LoopNode):
         line = "; ".join([line, *troubles])
         return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
 
-    def _seconds(self, stamp: Any) -> float:
-        """A stamp in s from the first IMU message's."""
-        return (stamp_ns(stamp) - self._start_ns) / NANOSECONDS
-
-    def _on_imu(self, message: Any) -> None:
-        self._start_ns = self._start_ns or stamp_ns(message.header.stamp)
-        now = self._seconds(message.header.stamp)
+    def _on_imu(self, numbers: Numbers, _: Texts) -> None:
+        stamp, (_x, _y, _z, p, q, r), (phi, theta) = inputs.imu_and_attitude(numbers)
+        self._start_ns = self._start_ns or stamp
+        now = (stamp - self._start_ns) / NANOSECONDS
         if not self._imu.arrived(now):
             return  # out of order
         self._now = now
         self._imu_count += 1
-        *_, p, q, r = conversion.imu_values(message, -1.0)
-        phi, theta = attitude_of(message)
         taken, air = self._air
         V, alpha, beta, density = air if abs(now - taken) <= SENSOR_AGE else (math.nan,) * 4
         self._fly(Sensed(now, p, q, r, phi, theta, V, alpha, beta, density))
 
-    def _on_air_data(self, message: Any) -> None:
-        self._others[AIR_DATA].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
-        self._air = self._seconds(message.header.stamp), conversion.air_data_values(message)
+    def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
+        stamp, values = inputs.air_data(numbers)
+        self._others[AIR_DATA].arrived(stamp / NANOSECONDS)
+        self._air = (stamp - self._start_ns) / NANOSECONDS, values
 
     def _on_estimates(self, message: Any) -> None:
         estimates = conversion.estimates_from_message(message, self._start_ns)
         self._others[DERIVATIVES].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
         controller.hear(self._state, estimates.time, beliefs_of(estimates))
 
-    def _on_excitation(self, message: Any) -> None:
-        self._others[EXCITATION].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
-        values = values_by_name(message)
+    def _on_excitation(self, numbers: Numbers, texts: Texts) -> None:
+        stamp, values = by_name(numbers, texts)
+        self._others[EXCITATION].arrived(stamp / NANOSECONDS)
         found = [values.get(name, 0.0) for name in CONTROLS]
         self._extra = time.monotonic(), found if all(map(math.isfinite, found)) else [0.0] * len(found)
 
-    def _on_set_points(self, message: Any) -> None:
-        values = values_by_name(message)
+    def _on_set_points(self, numbers: Numbers, texts: Texts) -> None:
+        _stamp, values = by_name(numbers, texts)
         self._points = SetPoints(**{name: values.get(name, math.nan) for name in SetPoints._fields})
 
     def _watch(self) -> None:

@@ -32,17 +32,6 @@ def header(nanoseconds: int, frame_id: str) -> Header:
     return Header(stamp=stamp_message(nanoseconds), frame_id=frame_id)
 
 
-def imu_values(message: Any, sign: float) -> tuple[float, float, float, float, float, float]:
-    """Specific force (m/s^2) and rates (rad/s), FRD, of a sensor_msgs/Imu; ``sign`` -1 turns FLU axes, 1 keeps FRD."""
-    force, rate = message.linear_acceleration, message.angular_velocity
-    return force.x, sign * force.y, sign * force.z, rate.x, sign * rate.y, sign * rate.z
-
-
-def air_data_values(message: Any) -> tuple[float, float, float, float]:
-    """True airspeed (m/s), flow angles (rad) and air density (kg/m^3) of a sysid_msgs/AirData."""
-    return message.true_airspeed, message.angle_of_attack, message.sideslip, message.air_density
-
-
 def axes_sign(body_frame: str) -> float:
     """What y and z are multiplied by on the way from ``body_frame`` to FRD."""
     return 1.0 if body_frame == "frd" else -1.0

@@ -18,9 +18,10 @@ from sysid_node.errors import InputError
 from sysid_node.excite import inflight
 from sysid_node.excite.inflight import RANGES, Flight, Settings
 from sysid_node.flight.topics import AIR_DATA, IMU
-from sysid_node.ros import conversion
+from sysid_node.ros import conversion, inputs
 from sysid_node.ros.beliefs import precision_of
-from sysid_node.ros.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, attitude_of, named
+from sysid_node.ros.inputs import ATTITUDE_FIELDS, FIELDS, Numbers, Texts
+from sysid_node.ros.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, named
 from sysid_node.ros.parameters import Parameter, setting
 from sysid_node.ros.spin import run_program, serve
 
@@ -77,8 +78,8 @@ class Exciter(LoopNode):
         self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first
         self._excitation = self.create_publisher(JointState, EXCITATION, 10)
         self._reset = self.create_client(Trigger, "identifier/reset")
-        self.create_subscription(Imu, IMU, self._on_imu, LATEST)
-        self.create_subscription(AirData, AIR_DATA, self._on_air_data, LATEST)
+        self.listen(Imu, IMU, ATTITUDE_FIELDS, self._on_imu, LATEST)
+        self.listen(AirData, AIR_DATA, FIELDS[AIR_DATA], self._on_air_data, LATEST)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -92,15 +93,14 @@ class Exciter(LoopNode):
         values = {"active": state.active, "not yet known": " ".join(state.missing), "events": len(state.events)}
         return DiagnosticStatus.OK, doing, {**values, "last event": last}
 
-    def _on_imu(self, message: Any) -> None:
-        _, _, az, *_ = conversion.imu_values(message, -1.0)
-        self._inertial = time.monotonic(), (*attitude_of(message), -az / inflight.GRAVITY)
-        stamp = conversion.stamp_ns(message.header.stamp)
+    def _on_imu(self, numbers: Numbers, _: Texts) -> None:
+        stamp, values, attitude = inputs.imu_and_attitude(numbers)
+        self._inertial = time.monotonic(), (*attitude, -values[2] / inflight.GRAVITY)
         self._start_ns = self._start_ns or stamp
         self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
 
-    def _on_air_data(self, message: Any) -> None:
-        self._air = time.monotonic(), message.true_airspeed
+    def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
+        self._air = time.monotonic(), inputs.air_data(numbers)[1][0]
 
     def _on_estimates(self, message: Any) -> None:
         estimates = conversion.estimates_from_message(message, 0)

@@ -18,9 +18,9 @@ from sysid_node.faults.settings import RANGES, Settings
 from sysid_node.faults.types import Fault
 from sysid_node.faults.watch import PERIOD, STALE_AFTER, Speech
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.ros import conversion
-from sysid_node.ros.conversion import stamp_ns
-from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, SENSOR_QOS, LoopNode
+from sysid_node.ros import conversion, inputs
+from sysid_node.ros.inputs import FIELDS, Numbers, Texts
+from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
 from sysid_node.ros.monitor import Durations
 from sysid_node.ros.parameters import Parameter, setting
 from sysid_node.ros.spin import run_program, serve
@@ -39,7 +39,7 @@ PARAMETERS = (
         "Share of each derivative that counts as no change: no model is exact.",
         "Up where the aircraft flies far from the condition at which its derivatives were identified.",
     ),
-    _setting("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft."),
+    _setting(*LAG),
     _setting(
         "servo_error",
         "rad",
@@ -67,10 +67,10 @@ class FaultMonitor(LoopNode):
         self._watch = watching.init(self.aircraft, settings, self.values["stale_after"])
         self._work, self._speech = Durations(), Speech()
         self._faults = self.create_publisher(DiagnosticArray, "~/faults", 10)
-        self.create_subscription(Imu, IMU, self._on_imu, SENSOR_QOS)
-        self.create_subscription(AirData, AIR_DATA, self._on_air_data, SENSOR_QOS)
-        self.create_subscription(JointState, ACTUATORS, self._on_actuators, SENSOR_QOS)
-        self.create_subscription(JointState, COMMAND, self._on_command, SENSOR_QOS)
+        self.listen(Imu, IMU, FIELDS[IMU], self._on_imu, SENSOR_QOS)
+        self.listen(AirData, AIR_DATA, FIELDS[AIR_DATA], self._on_air_data, SENSOR_QOS)
+        self.listen(JointState, ACTUATORS, FIELDS[ACTUATORS], self._on_actuators, SENSOR_QOS)
+        self.listen(JointState, COMMAND, FIELDS[ACTUATORS], self._on_command, SENSOR_QOS)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
         self.every(PERIOD, self._on_time)
 
@@ -87,14 +87,14 @@ class FaultMonitor(LoopNode):
 
     # Messages
 
-    def _on_imu(self, message: Any) -> None:
-        self._take(watching.on_imu, stamp_ns(message.header.stamp), conversion.imu_values(message, -1.0))
+    def _on_imu(self, numbers: Numbers, _: Texts) -> None:
+        self._take(watching.on_imu, *inputs.imu(numbers, -1.0))
 
-    def _on_air_data(self, message: Any) -> None:
-        self._take(watching.on_air_data, stamp_ns(message.header.stamp), conversion.air_data_values(message))
+    def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
+        self._take(watching.on_air_data, *inputs.air_data(numbers))
 
-    def _on_actuators(self, message: Any) -> None:
-        self._take(watching.on_actuators, stamp_ns(message.header.stamp), message.name, message.position)
+    def _on_actuators(self, numbers: Numbers, texts: Texts) -> None:
+        self._take(watching.on_actuators, *inputs.actuators(numbers, texts))
 
     def _take(self, take: Callable[..., None], *message: Any) -> None:
         """Have a sensor's message taken."""
@@ -102,8 +102,8 @@ class FaultMonitor(LoopNode):
         take(self._watch, start, *message)
         self._work.add(time.monotonic() - start)
 
-    def _on_command(self, message: Any) -> None:
-        watching.on_command(self._watch, stamp_ns(message.header.stamp), message.name, message.position)
+    def _on_command(self, numbers: Numbers, texts: Texts) -> None:
+        watching.on_command(self._watch, *inputs.actuators(numbers, texts))
 
     def _on_estimates(self, message: Any) -> None:
         known = {d.name: Known(d.value, d.standard_error, d.valid) for d in message.derivatives}

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from sysid_node.flight.cdr_single import Text
+from sysid_node.flight.frames import euler_from_quaternion
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 Numbers = tuple[Any, ...]
 Texts = tuple[Text, ...]
+Fields = tuple[tuple[str, ...], tuple[str, ...]]
 
 UNREADABLE = "not a message of this type"
 
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _VECTORS = tuple(f"{vector}.{axis}" for vector in ("angular_velocity", "linear_acceleration") for axis in "xyz")
 #: What is read of each topic's messages: paths of numbers, in the messages' order, and of strings.
-FIELDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxyType(
+FIELDS: Mapping[str, Fields] = MappingProxyType(
     {
         IMU: ((*_STAMP, *_VECTORS), ("header.frame_id",)),
         AIR_DATA: ((*_STAMP, "true_airspeed", "angle_of_attack", "sideslip", "air_density"), ()),
@@ -25,11 +30,25 @@ FIELDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = MappingProxyType
     }
 )
 
+#: The same of IMU messages for those who fly by their orientation.
+ATTITUDE_FIELDS: Fields = (
+    (*_STAMP, *(f"orientation.{axis}" for axis in "xyzw"), "orientation_covariance", *_VECTORS),
+    (),
+)
+_COVARIANCE = 9  # numbers of it
+
 
 def imu(numbers: Numbers, sign: float) -> tuple[int, tuple[float, ...]]:
     """Stamp (ns), specific force (m/s^2) and rates (rad/s), FRD; ``sign`` -1 turns FLU axes, 1 keeps FRD."""
     seconds, nanoseconds, p, q, r, x, y, z = numbers
     return seconds * 1_000_000_000 + nanoseconds, (x, sign * y, sign * z, p, sign * q, sign * r)
+
+
+def imu_and_attitude(numbers: Numbers) -> tuple[int, tuple[float, ...], tuple[float, float]]:
+    """As ``imu`` of forward-left-up axes, by ``ATTITUDE_FIELDS``; roll and pitch (rad), NaN without orientation."""
+    orientation, measured = np.array([numbers[2:6]]), numbers[6] >= 0.0  # REP-145: -1 where it is not
+    phi, theta = euler_from_quaternion(orientation, "flu")[0, :2].tolist() if measured else (math.nan, math.nan)
+    return *imu((*numbers[:2], *numbers[6 + _COVARIANCE :]), -1.0), (phi, theta)
 
 
 def air_data(numbers: Numbers) -> tuple[int, tuple[float, ...]]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -17,9 +15,12 @@ from sensor_msgs.msg import JointState
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.frames import euler_from_quaternion
-from sysid_node.ros import conversion
+from sysid_node.flight.cdr_layout import DamageError
+from sysid_node.flight.cdr_single import SingleReader
+from sysid_node.ros import conversion, inputs
 from sysid_node.ros.declaring import declare, values_of
+from sysid_node.ros.inputs import Fields, Numbers, Texts
+from sysid_node.ros.message_types import fields_of
 from sysid_node.ros.parameters import Parameter, check_each
 
 COMMAND = "actuators/command"
@@ -41,6 +42,8 @@ AIRCRAFT = Parameter(
     "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
     "For every aircraft.",
 )
+#: What those that know of the surfaces are told of them.
+LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
@@ -65,6 +68,25 @@ class LoopNode(Node, ABC):
     @abstractmethod
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
         """Level, one line, and values for /diagnostics."""
+
+    def listen(
+        self, kind: Any, topic: str, fields: Fields, take: Callable[[Numbers, Texts], None], profile: QoSProfile | int
+    ) -> None:
+        """Subscribe to ``fields`` of messages that stay serialised; those that cannot be read are left out.
+
+        Making objects of all their parts would take longer than what is done with them.
+        """
+        reader = SingleReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *fields)
+
+        def on_message(raw: bytes) -> None:
+            try:
+                message = reader.read(raw)
+            except DamageError:
+                self.get_logger().warning(f"{topic}: {inputs.UNREADABLE}", throttle_duration_sec=1.0)
+                return
+            take(*message)
+
+        self.create_subscription(kind, topic, on_message, profile, raw=True)
 
     def every(self, period: float, callback: Any) -> None:
         """Call back every so many seconds of a clock that never jumps."""
@@ -92,15 +114,6 @@ class LoopNode(Node, ABC):
         self._diagnostics.publish(message)
 
 
-def attitude_of(message: Any) -> tuple[float, float]:
-    """Roll and pitch (rad), FRD, of a sensor_msgs/Imu in forward-left-up axes; NaN where it has no orientation."""
-    if message.orientation_covariance[0] < 0.0:
-        return math.nan, math.nan
-    q = message.orientation
-    phi, theta, _ = euler_from_quaternion(np.array([[q.x, q.y, q.z, q.w]]), "flu")[0].tolist()
-    return phi, theta
-
-
 def named(stamp_ns: int, values: Mapping[str, float]) -> JointState:
     """Numbers by name."""
     return JointState(
@@ -108,6 +121,7 @@ def named(stamp_ns: int, values: Mapping[str, float]) -> JointState:
     )
 
 
-def values_by_name(message: Any) -> dict[str, float]:
-    """The way back; of a message with fewer positions than names, what there is."""
-    return dict(zip(message.name, message.position, strict=False))
+def by_name(numbers: Numbers, texts: Texts) -> tuple[int, dict[str, float]]:
+    """The way back, with the stamp (ns); of a message with fewer positions than names, what there is."""
+    stamp, names, positions = inputs.actuators(numbers, texts)
+    return stamp, dict(zip(names, positions, strict=False))

@@ -19,7 +19,7 @@ from sysid_msgs.msg import DerivativeEstimates
 
 from sysid_node.online.types import Estimates
 from sysid_node.ros.conversion import NANOSECONDS, estimates_from_message, stamp_ns
-from sysid_node.ros.loop_node import DERIVATIVES, SET_POINTS, named, values_by_name
+from sysid_node.ros.loop_node import DERIVATIVES, SET_POINTS, named
 
 TRACKING = "adaptive_controller/tracking"
 CONTROLLER, MONITOR = "adaptive_controller", "fault_monitor"
@@ -123,7 +123,8 @@ class LoopWatch:
     def _on_tracking(self, message: Any) -> None:
         stamp = stamp_ns(message.header.stamp)
         self.start_ns = self.start_ns or stamp
-        self.tracking.append(((stamp - self.start_ns) / NANOSECONDS, values_by_name(message)))
+        row = dict(zip(message.name, message.position, strict=True))
+        self.tracking.append(((stamp - self.start_ns) / NANOSECONDS, row))
 
     def _on_estimates(self, message: Any) -> None:
         self.estimates = estimates_from_message(message, self.start_ns)

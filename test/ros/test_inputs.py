@@ -1,7 +1,9 @@
 """Inputs read from serialised messages. Truth: rclpy's own serialisation of the same numbers."""
 
+import math
+
 import pytest
-from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import Quaternion, Vector3
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
@@ -10,7 +12,7 @@ from sysid_msgs.msg import AirData
 from sysid_node.flight.cdr_single import SingleReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import inputs
-from sysid_node.ros.conversion import stamp_message
+from sysid_node.ros.conversion import axes_sign, stamp_message
 from sysid_node.ros.message_types import fields_of
 
 STAMP = 1_700_000_000_123_456_789
@@ -32,6 +34,33 @@ def test_imu(frame: str) -> None:
     assert texts == (frame,)
     assert inputs.imu(numbers, -1.0) == (STAMP, (1.0, -2.0, -3.0, 0.1, 0.2, 0.3))
     assert inputs.imu(numbers, 1.0) == (STAMP, (1.0, 2.0, 3.0, 0.1, -0.2, -0.3))
+
+
+def test_level_flight_in_either_frame() -> None:
+    """At rest an accelerometer reads +g upwards: (0, 0, 9.8) FLU, (0, 0, -9.8) FRD (REP-103). Nose up: q > 0 in FRD."""
+    flu = Imu(linear_acceleration=Vector3(z=9.8), angular_velocity=Vector3(x=0.1, y=-0.2, z=-0.3))
+    frd = Imu(linear_acceleration=Vector3(z=-9.8), angular_velocity=Vector3(x=0.1, y=0.2, z=0.3))
+    for message, body_frame in ((flu, "flu"), (frd, "frd")):
+        found = inputs.imu(read(IMU, message)[0], axes_sign(body_frame))
+        assert found == (0, (0.0, 0.0, -9.8, 0.1, 0.2, 0.3))
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_attitude(frame: str) -> None:
+    """Nose up by 0.2 rad is a turn by -0.2 about the left wing (REP-103); a covariance of -1 is none (REP-145)."""
+    message = Imu(
+        header=Header(stamp=stamp_message(STAMP), frame_id=frame),
+        orientation=Quaternion(y=-math.sin(0.1), w=math.cos(0.1)),
+        linear_acceleration=Vector3(z=9.8),
+        angular_velocity=Vector3(x=0.1),
+    )
+    reader = SingleReader(fields_of, INPUT_TOPICS[IMU], *inputs.ATTITUDE_FIELDS)
+    stamp, values, (roll, pitch) = inputs.imu_and_attitude(reader.read(serialize_message(message))[0])
+    assert (stamp, values) == (STAMP, (0.0, 0.0, -9.8, 0.1, 0.0, 0.0))
+    assert (roll, pitch) == pytest.approx((0.0, 0.2), abs=1e-12)
+    message.orientation_covariance[0] = -1.0
+    *_, attitude = inputs.imu_and_attitude(reader.read(serialize_message(message))[0])
+    assert all(map(math.isnan, attitude))
 
 
 @pytest.mark.parametrize("frame", FRAMES)

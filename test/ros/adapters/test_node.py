@@ -80,11 +80,11 @@ def test_messages_go_through(probe: Probe) -> None:
         probe.until(lambda: all_heard() and "adapter: input" in probe.diagnostics)
     finally:
         node.destroy_node()
-    assert conversion.imu_values(heard["imu/data"], -1.0) == (0.5, -0.25, -9.75, 0.5, 0.25, -0.125)
+    assert (heard["imu/data"].linear_acceleration, heard["imu/data"].angular_velocity) == (force, rate)
     assert heard["imu/data"].orientation_covariance[0] == -1.0, "no attitude"
-    V, alpha, beta, rho = conversion.air_data_values(heard["air_data"])
-    assert (V, rho) == pytest.approx((20.0, 1.225), rel=1e-4)
-    assert math.isnan(alpha) and math.isnan(beta)
+    air = heard["air_data"]
+    assert (air.true_airspeed, air.air_density) == pytest.approx((20.0, 1.225), rel=1e-4)
+    assert math.isnan(air.angle_of_attack) and math.isnan(air.sideslip)
     assert (list(heard["actuators"].name), list(heard["actuators"].position)) == (["elevator"], [0.25])
     assert {conversion.stamp_ns(message.header.stamp) for message in heard.values()} == {STAMP}
     assert probe.diagnostics["adapter: input"].hardware_id == "mine"
