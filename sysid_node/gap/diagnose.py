@@ -67,10 +67,9 @@ def diagnose(
     progress(0.0, "reading the flights as forces and moments")
     simulator = Simulator(aircraft, RATE)
     views = [admitted(view_of(simulator, flight)) for flight in flights]
-    nuisances = nuisances_of(aircraft, views[0])
-    steps = Steps.of(keep, views)
     unseen = [admitted(view_of(simulator, flight)) for flight in holdouts]
-    own = [nuisances_of(aircraft, view) for view in unseen]
+    nuisances, *own = (nuisances_of(aircraft, view, (*views, *unseen)) for view in (views[0], *unseen))
+    steps = Steps.of(keep, views)
     attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
     progress(0.92, "the gap on flight not fitted")
     attribution, checked = settled(attribution, views, unseen, own)

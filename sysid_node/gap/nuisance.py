@@ -8,6 +8,7 @@ clocks are shared by all flights; biases are each flight's own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,21 +68,26 @@ class Nuisances:
         return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
 
 
-def nuisances_of(aircraft: Aircraft, view: View) -> Nuisances:
-    """Of an aircraft's flights. Raises InputError where its file has no tolerances."""
+def nuisances_of(aircraft: Aircraft, view: View, others: Sequence[View] = ()) -> Nuisances:
+    """Of one of an aircraft's flights: the same ones for all that are looked at together, by its own rates.
+
+    Raises InputError where the aircraft's file has no tolerances.
+    """
+    every = (view, *others)
     tolerances = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
     if not tolerances:
         raise InputError(
             f"aircraft {aircraft.name!r}: no derivative has a tolerance, so what is a gap cannot be told from an "
             "honest error; give derivatives a tolerance (1 sigma) in the aircraft file"
         )
-    lateral = view.flight.lateral
+    lateral = any(v.flight.lateral for v in every)
     sigma = {
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
     sigma |= {f"vane_bias.{angle}": _INFERRED for angle in view.flight.inferred}
-    sigma |= _turning_air(aircraft, view)
+    if any(gusty(v) for v in every):
+        sigma |= _turning_air(aircraft)
     limit = {name: LIMIT * s for name, s in sigma.items()}
     for clock, rate in zip(_CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
@@ -96,13 +102,11 @@ def gusty(view: View) -> bool:
     return bool(view.gusts >= _GUSTY * view.record["V"].mean())
 
 
-def _turning_air(aircraft: Aircraft, view: View) -> dict[str, float]:
+def _turning_air(aircraft: Aircraft) -> dict[str, float]:
     """In gusts: the air that rises also turns, which works like a derivative with the rate of alpha, up to -C_q.
 
     The pitching gust of a wing as long as the gusts are short: q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2).
     """
-    if not gusty(view):
-        return {}
     damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
     return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}
 

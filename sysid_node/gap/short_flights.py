@@ -36,6 +36,7 @@ class Course(NamedTuple):
     motion: Motion
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     altitude: Scalar  # (N,) m, at which the standard air has the density that was measured
+    moving: Scalar  # (N, 3) velocity of the air that the air data do not show, m/s, and that the simulator is told of
     turning: Scalar  # (N, 3) rotation of the air that the simulator is told of, rad/s
     begins: Scalar  # (N,) whether a short flight begins here
 
@@ -70,7 +71,7 @@ def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scala
     samples = undone(chain, course.motion)
     arriving = command.arrive(chain.effects, course.commands, step)
     air = _air(samples, course.begins, step)
-    gusts = jnp.concatenate([air, course.turning], axis=1)
+    gusts = jnp.concatenate([air + course.moving, course.turning], axis=1)
     starts = _starts(samples, course)
     first, _ = begin(chain, starts.body[0], arriving[0], gusts[0], ())
     coming = (starts, gusts, _next(arriving), _next(gusts), step * jnp.arange(1, len(arriving) + 1))
@@ -142,7 +143,8 @@ def course_of(view: View, size: int) -> Course:
     given = view.given
     altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
     begins = jnp.arange(altitude.size) % size == 0
-    return Course(given.motion, given.signals.commands, altitude, jnp.zeros((altitude.size, 3)), begins)
+    still = jnp.zeros((altitude.size, 3))
+    return Course(given.motion, given.signals.commands, altitude, still, still, begins)
 
 
 def beside(view: View, theta: Array, course: Course) -> tuple[Array, Array, Array]:

@@ -4,6 +4,7 @@ The simulator flies the flight itself, short flight by short flight, with the fl
 the air data show and turns as turbulence of that strength does (``sim.dryden``), and the sensors' noise is added to
 what it reads. Flown beside this record, the same simulator is off by what no model could avoid: noise in the readings,
 in the states that short flights begin with and in the motion of the air, and the air's rotation that no vane shows.
+Without vanes the air's motion across the flight path is not shown either.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from sysid_node.gap.kinematics import Motion
 from sysid_node.gap.short_flights import Course, beside, off
 from sysid_node.gap.view import View, noisier
 from sysid_node.sim.dryden import Dryden
-from sysid_node.sim.layout import OUTPUTS, Scalar
+from sysid_node.sim.layout import OUTPUTS
 
 #: Flights of the simulator itself.
 _REALISATIONS = 6
@@ -40,24 +41,37 @@ def unavoidable(view: View, theta: Array, course: Course, seed: int = 0) -> Iter
         again = thinned(noisier(view, random), view.simulator.rate)
         added = {n: values - view.record[n] for n, values in again.columns.items()}
         noise = np.column_stack([added.get(name, np.zeros(len(view.record))) for name in OUTPUTS])
-        turning = course._replace(turning=_turning(view, course, shown, noise, random))
-        own, _, _ = beside(view, prompt, turning)
-        yield off(view, prompt, _recorded(view, course, own + noise, added)), noise
+        moving, turning = _hidden_air(view, course, shown, noise, random)
+        own, _, _ = beside(view, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning)))
+        yield off(view, prompt, _recorded(view, course, own - _unseen(view, moving) + noise, added)), noise
 
 
-def _turning(view: View, course: Course, shown: Array, noise: Array, random: np.random.Generator) -> Scalar:
-    """Rotation of the air (N, 3), rad/s, in turbulence that moves it as fast as the air data show (N, 3), m/s.
+def _hidden_air(
+    view: View, course: Course, shown: Array, noise: Array, random: np.random.Generator
+) -> tuple[Array, Array]:
+    """Velocity (m/s) and rotation (rad/s) of the air, (N, 3) each along body axes, that the air data do not show.
 
-    What counts is motion within a short flight: slower air does not turn. The vanes' noise moves no air.
+    Turbulence (``sim.dryden``) as strong as the air data show that there is, (N, 3) m/s. What counts is motion within a
+    short flight: slower air does not turn. The air data's noise moves no air.
     """
     model, speed = Dryden.at(_HEIGHT, view.simulator.aircraft.geometry.b), float(view.record["V"].mean())
     gusts = model.realisation(course.altitude.size, view.simulator.rate, speed, random)
     begins = np.asarray(course.begins)
     origin = np.maximum.accumulate(np.where(begins, np.arange(begins.size), 0))
-    usual = _power(gusts[:, 1:3] - gusts[origin, 1:3])
-    vanes = speed * noise[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]]
-    moved = max(_power(shown[:, 1:3]) - _power(vanes - vanes[origin[: len(vanes)]]), 0.0)
-    return jnp.asarray(gusts[:, 3:] * np.sqrt(moved / usual))
+    seen = slice(0, 1) if view.flight.inferred else slice(1, 3)
+    usual = _power((gusts - gusts[origin])[:, seen])
+    read = noise[:, [OUTPUTS.index(name) for name in ("V", "beta", "alpha")]] * [1.0, speed, speed]
+    moved = max(_power(shown[:, seen]) - _power((read - read[origin[: len(read)]])[:, seen]), 0.0)
+    gusts *= np.sqrt(moved / usual)
+    across = [float(name in view.flight.inferred) for name in ("V", "beta", "alpha")]
+    return gusts[:, :3] * across, gusts[:, 3:]
+
+
+def _unseen(view: View, moving: Array) -> Array:
+    """What air that moves so (N, 3) does to readings (N, 12) of the flow angles, and what no vane reads."""
+    angles = np.zeros((len(view.record), len(OUTPUTS)))
+    angles[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]] = -moving[: len(angles), 1:] / view.record["V"][:, None]
+    return angles
 
 
 def _power(velocity: Array) -> float:
