@@ -37,7 +37,9 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser = commands.add_parser("excite", help="design a manoeuvre and tell what it would show", description=__doc__)
     add = parser.add_argument
     add("--aircraft", required=True, metavar="FILE|NAME", help="aircraft file, or name as in cdrw")
-    add("--manoeuvre", action="append", required=True, metavar="SPEC", help="e.g. 3211, or 3211:elevator:amplitude=0.05")
+    add(
+        "--manoeuvre", action="append", required=True, metavar="SPEC", help="e.g. 3211, or 3211:elevator:amplitude=0.05"
+    )
     add("--out", required=True, metavar="DIR", type=Path, help="folder for the results")
     add("--rate", type=float, default=100.0, help="samples a second (default: 100)")
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre)")
