@@ -22,6 +22,7 @@ from sysid_node.gap.candidates import bounds, prior
 from sysid_node.gap.deliberate import deliberate
 from sysid_node.gap.fit import Fit, linearised, moved, real_rows, weights
 from sysid_node.gap.nuisance import gusty
+from sysid_node.gap.spectra import Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
@@ -164,19 +165,23 @@ def priors(fit: Fit) -> tuple[Array, Array]:
 
 def _basis(view: View, weight: Array, *, commanded: bool) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by coefficient that was measured."""
-    of_forces, of_readings = instruments(view, commanded=commanded)
+    tables = view.once(f"instruments, {commanded=}", lambda: _spectra_of_instruments(view, commanded=commanded))
     found = {}
     for axis in np.flatnonzero(view.axes):
-        table = of_forces if axis < len(COEFFICIENTS) else of_readings
-        if not table.size:
+        spectra = tables[0 if axis < len(COEFFICIENTS) else 1]
+        if not spectra.size:
             continue
-        spectra = view.windows.transform(table)
         own = weight[:, axis : axis + 1]
         rows = real_rows(spectra, np.repeat(own, spectra.shape[2], axis=1))
         matrix = rows.reshape(rows.shape[0] * own.shape[0], -1)
         left, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
         found[int(axis)] = np.asarray(left[:, sizes > 1e-3 * sizes[0]])
     return found
+
+
+def _spectra_of_instruments(view: View, *, commanded: bool) -> list[Complex]:
+    """``instruments`` by window and line, each (W, L, M)."""
+    return [view.windows.transform(table) for table in instruments(view, commanded=commanded)]
 
 
 def instruments(view: View, *, commanded: bool = False) -> tuple[Array, Array]:

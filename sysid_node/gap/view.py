@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -60,6 +60,9 @@ _NOISE = {
     "beta": ("beta",),
     "attitude": ("phi", "theta", "psi"),
 }
+
+
+_Kept = TypeVar("_Kept")
 
 
 class Given(NamedTuple):
@@ -131,7 +134,15 @@ class View:
     axes: NDArray[np.bool_]  # (12,): what was measured
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, as the aircraft file has it
     _forces: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
+    _once: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     _readings: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
+
+    def once(self, name: str, work: Callable[[], _Kept]) -> _Kept:
+        """What follows from this view alone, by name: worked out once."""
+        if name not in self._once:
+            self._once[name] = work()
+        kept: _Kept = self._once[name]
+        return kept
 
     @property
     def commands(self) -> Array:
