@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.attribute import Trial
 from sysid_node.gap.fit import Fit, real_rows, weights
+from sysid_node.gap.trials import Trial
 
 
 @dataclass(frozen=True)

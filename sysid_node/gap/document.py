@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from sysid_node.gap.attribute import Cause
+from sysid_node.gap.belief import Cause
 from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.errors import standard_errors

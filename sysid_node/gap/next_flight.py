@@ -18,10 +18,12 @@ from sysid_node.errors import InputError
 from sysid_node.excite.manoeuvre import THROTTLE
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.attribute import Attribution, Cause, Trial
+from sysid_node.gap.attribute import Attribution
+from sysid_node.gap.belief import Cause
 from sysid_node.gap.candidates import Candidate, prior
 from sysid_node.gap.fit import Fit, real_rows, weights
 from sysid_node.gap.flights import thinned
+from sysid_node.gap.trials import Trial
 from sysid_node.gap.verdict import named
 from sysid_node.gap.view import View, view_like
 from sysid_node.sim import Simulator

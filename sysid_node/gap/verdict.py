@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.acceptance import NOTICED, power_left
 from sysid_node.gap.admission import excitation
-from sysid_node.gap.attribute import NOTICED, Attribution, Cause, power_left
+from sysid_node.gap.attribute import Attribution
+from sysid_node.gap.belief import Cause
 from sysid_node.gap.deliberate import purposeful
 from sysid_node.gap.evidence import Evidence
 from sysid_node.gap.flown import BY_CHANCE

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from sysid_node.gap.adequacy import adequacy_of
-from sysid_node.gap.attribute import Trier
 from sysid_node.gap.candidates import candidates_of
 from sysid_node.gap.credence import Grounds
 from sysid_node.gap.fit import blank
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
+from sysid_node.gap.trials import Trier
 from sysid_node.gap.view import view_of
 from sysid_node.sim import Simulator
 

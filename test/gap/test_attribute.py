@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap import attribute as module
-from sysid_node.gap.attribute import Trier, attribute
+from sysid_node.gap import trials as module
+from sysid_node.gap.attribute import attribute
 from sysid_node.gap.candidates import candidates_of
 from sysid_node.gap.fit import blank
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
+from sysid_node.gap.trials import Trier
 from sysid_node.gap.view import view_of
 from sysid_node.sim import Simulator
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.attribute import Trier
 from sysid_node.gap.errors import standard_errors
 from sysid_node.gap.fit import blank
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.structure import unbiased
+from sysid_node.gap.trials import Trier
 from sysid_node.gap.view import View, view_of
 from sysid_node.sim import Simulator
 
