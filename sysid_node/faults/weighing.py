@@ -27,6 +27,7 @@ VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index(
 
 LOOSE = 0.1  # share by which a fault may differ from its hypothesis
 ENOUGH = 3  # blocks of sound flight that say something of it
+LONG = 20  # blocks
 MARGIN = 1.0  # of a logarithm, for the statistics' rounding
 LAST_RESORT = 0.1  # share by which damage of a whole axis, which can explain all, must explain more than what is simple
 
@@ -110,11 +111,14 @@ def _flattened(state: State, read: Array) -> Array:
 
     Noise on a regressor flattens the slope that least squares find, and over a long stretch in which the angle hardly
     moves that would look like a changed derivative (bias-compensated least squares: Soderstrom, Automatica 43, 2007,
-    sec. 5). A vane that reads less than its noise has none of that size: it has jammed, or is a good one.
+    sec. 5). A vane that reads less than its noise has none of that size: it has jammed, or is a good one. Over a short
+    stretch it makes at most half a logarithm a block, and what noise there was cannot be told from what is read.
     """
     total = np.zeros(len(state.terms.names))
+    if len(read) < LONG:
+        return total
     for vane, (variance, score) in state.flattened.items():
-        there = float(read[:, VANES[vane][0]].var()) * len(read) / max(len(read) - 1, 1)
+        there = float(read[:, VANES[vane][0]].var(ddof=1))
         total += min(1.0, there / variance) * len(read) * score
     return total
 
