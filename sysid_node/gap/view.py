@@ -207,13 +207,17 @@ class View:
         return self.windows.transform(np.asarray(changes)[:samples, :, : len(indices)])
 
 
+#: Of clocks and instruments, the effects that kinematics do not see: stamps of commands, and noise that has no value.
+_ELSEWHERE = frozenset({"actuator_stamp_delay", "sensor_noise"})
+
+
 @cache
 def _kinematic(layout: Layout) -> list[int]:
     """Entries of the parameter vector that kinematics depend on: clocks, instruments, and where they are."""
     return [
         i
         for i, (effect, _) in enumerate(parameters.table(layout))
-        if EFFECTS[effect].station in {"sensors", "clock"} or effect == "cg_shift"
+        if effect == "cg_shift" or (EFFECTS[effect].station in {"sensors", "clock"} and effect not in _ELSEWHERE)
     ]
 
 
