@@ -29,7 +29,7 @@ from sysid_node.faults.report import Found, fault_of
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
 from sysid_node.faults.terms import Terms, terms
-from sysid_node.faults.types import VANE_STUCK, Fault
+from sysid_node.faults.types import DAMAGE, VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
     VANES,
     Stretch,
@@ -242,7 +242,10 @@ def _alarm(state: State, over: Stretch, usual: Array) -> None:
 
 
 def _follow(state: State, alarm: Alarm) -> None:
-    """Weigh what has come since the onset; end the alarm where the last seconds speak of nothing."""
+    """Weigh what has come since the onset; end the alarm where the last seconds speak of nothing.
+
+    Damage explains any single moment as well as the surface that made it: it is not said before more has come.
+    """
     if len(state.pieces) < LEAST:
         return  # after a gap
     now = state.pieces[-1].block.time
@@ -253,10 +256,10 @@ def _follow(state: State, alarm: Alarm) -> None:
     factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
     place = int(np.argmax(factors))
     times = Found(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
-    if place < len(found):
-        state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
-    else:
+    if place >= len(found):
         state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
+    elif state.hypotheses[place].kind != DAMAGE or now - alarm.found > (EVERY - 0.5) * PERIOD:
+        state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
     if now - alarm.found > LAG * PERIOD and _over(state, place, alarm):
         state.alarm = state.fault = None
         state.pieces.clear()

@@ -8,6 +8,7 @@ from fault_flights import AIRCRAFT, Truth, fly, monitored
 
 from sysid_node.errors import InputError
 from sysid_node.faults import blocks, monitor
+from sysid_node.faults.blocks import PERIOD
 from sysid_node.faults.held import Known
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, VANE_STUCK
@@ -89,6 +90,18 @@ def test_damage_names_the_derivatives_that_changed() -> None:
     assert "Cm_alpha" in [change.name for change in fault.changes]
     change = next(change for change in fault.changes if change.name == "Cm_alpha")
     assert change.lower <= -0.35 * AIRCRAFT.derivatives["Cm_alpha"].value <= change.upper
+
+
+@pytest.mark.parametrize("truth", [stuck("de", 0.05), stuck("da", -0.1), lost("de", 0.6), lost("dr", 0.6)])
+@pytest.mark.parametrize("seed", [3, 15, 16])
+def test_a_surface_is_never_called_damage(seed: int, truth: Truth) -> None:
+    """Not even in the first moments, in which an axis's dozen derivatives would explain them as well."""
+    state, maker = monitored(seed)
+    fly(state, maker, ONSET)
+    for _ in range(80):
+        fault = fly(state, maker, PERIOD, truth)
+        assert fault is None or fault.kind != DAMAGE, fault.text
+    assert fault is not None
 
 
 def test_a_jammed_vane() -> None:
