@@ -109,8 +109,8 @@ def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: G
     """
 
     def forces(derivatives: Scalar) -> Scalar:
-        changed = model._replace(derivatives=derivatives)
-        return coefficients(changed, given.signals, predict(layout, changed, theta, given.signals, given.step))
+        expected: Scalar = _forces(layout, model._replace(derivatives=derivatives), theta, given)
+        return expected
 
     slopes: Scalar = jax.jacfwd(forces)(model.derivatives)
     return slopes
