@@ -116,6 +116,9 @@ def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Setting
         state.verdict = "kept: hardly any effect of the surfaces"
         return
     gains = _gains(state.axis, values, CAUTIONS[0])
+    if not _same_sense(state.axis, gains):
+        state.verdict = "kept: a steady deflection would do the opposite"
+        return
     state.check, state.checked_at = Check(values, _corners(state.axis, values, half), gains), now
     state.used = tuple(used)
 
@@ -182,6 +185,15 @@ def _gains(axis: Axis, values: Array, caution: float) -> Array:
         return axis.gains(values, caution)
     except np.linalg.LinAlgError:
         return np.full(axis.baseline.shape, np.nan)
+
+
+def _same_sense(axis: Axis, gains: Array) -> bool:
+    """Whether the integral acts as the baseline's does; NaN gains fail their margins anyway.
+
+    Its gain has the sign of what a steady deflection does in the end, to a climb or a turn: where that is turned round
+    an estimate is wrong by more than its interval, and on the way from one sign to the other there is no feedback.
+    """
+    return not float(gains[:, axis.integral] @ axis.baseline[:, axis.integral]) <= 0.0
 
 
 def _between(start: Flown, end: Flown, share: float) -> Flown:

@@ -43,6 +43,11 @@ class Axis:
     Q: Array  # (n,) weight on the states
     weight: float  # on the surfaces
 
+    @property
+    def integral(self) -> int:
+        """Which state is the integral of an attitude: the last before the surfaces."""
+        return self.Q.size - len(range(*self.moments.indices(self.Q.size))) - 1
+
     @cached_property
     def baseline(self) -> Array:
         """Gains (m, n) of the file's aircraft."""

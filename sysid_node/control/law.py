@@ -87,7 +87,7 @@ def step(
     forward = _feedforward(law.reference, wanted, pitch, side, scales, step)
     late = law.wanted = reference.follow(law.behind, sensed.time, wanted, step)
     errors = _errors(law, sensed, late, level)
-    _bear_new_gains(law, errors, tuple(f.gains for _, f in flown))
+    _bear_new_gains(law, errors, flown)
     back = np.concatenate([f.gains @ e for (_, f), e in zip(flown, errors, strict=True)]) / pressure
     planned = np.array([trim, 0.0, 0.0]) + forward + np.asarray(excitation, dtype=float)
     command, held = _limited(law, planned - back, step)
@@ -154,15 +154,17 @@ def _errors(law: Law, sensed: Sensed, late: Wanted, level: float) -> tuple[Array
     )
 
 
-def _bear_new_gains(law: Law, errors: tuple[Array, Array], gains: tuple[Array, ...]) -> None:
+def _bear_new_gains(
+    law: Law, errors: tuple[Array, Array], flown: tuple[tuple[Axis, Flown], tuple[Axis, Flown]]
+) -> None:
     """Set the integrals, in ``errors`` too, so that gains that move do not move the surfaces (bumpless transfer).
 
     What the integrals hold is a deflection, such as that which trims a shifted centre of gravity; times other gains it
     would be another one, until they have wound up anew (Astrom & Hagglund, "PID Controllers" (1995), sect. 3.5).
     """
-    for i, (error, now, before) in enumerate(zip(errors, gains, law.gains, strict=False)):
-        place = error.size - len(now) - 1  # of the integral
-        effect = now[:, place]
+    gains = tuple(f.gains for _, f in flown)
+    for i, ((axis, _), error, now, before) in enumerate(zip(flown, errors, gains, law.gains, strict=False)):
+        place, effect = axis.integral, now[:, axis.integral]
         share = float(effect @ (before @ error - now @ error)) / max(float(effect @ effect), 1e-12)
         error[place] = law.integrals[i] = min(max(law.integrals[i] + share, -MOST_INTEGRAL), MOST_INTEGRAL)
     law.gains = gains

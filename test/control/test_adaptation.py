@@ -98,6 +98,19 @@ def test_surfaces_without_effect_or_reversed_are_not_relied_on(state: controller
     assert "hardly any effect" in state.axes[0].verdict
 
 
+@pytest.mark.parametrize("share", [0.1, -0.2])
+def test_a_lift_slope_that_would_turn_a_steady_deflection_round_is_not_relied_on(
+    state: controller.State, share: float
+) -> None:
+    """Pitch follows the elevator by Cm_de CL_alpha - Cm_alpha CL_de in the end (Cramer): of the other sign here."""
+    d = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
+    assert d["Cm_de"] * d["CL_alpha"] - d["Cm_alpha"] * d["CL_de"] < 0.0
+    assert d["Cm_de"] * share * d["CL_alpha"] - d["Cm_alpha"] * d["CL_de"] > 0.0
+    flown(state, 3.0, beliefs({"CL_alpha": share}, half=0.02))
+    np.testing.assert_allclose(state.axes[0].flown.gains, state.axes[0].axis.baseline)
+    assert "the opposite" in state.axes[0].verdict
+
+
 def test_no_margins_at_the_corners_keeps_what_is_flown() -> None:
     strict = controller.init(AIRCRAFT, Settings(gain_margin=6.0, phase_margin=1.2))
     flown(strict, 5.0, beliefs(ELEVATOR, half=0.35))
