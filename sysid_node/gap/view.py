@@ -45,6 +45,9 @@ _LANES = 3
 #: Predictions that a view keeps: fits ask for the same point again, and kinematics stay while forces are fitted.
 _KEPT = 32
 
+#: The same of slopes, which are large.
+_SLOPES = 4
+
 #: Flights are padded to multiples of so many samples: each length is another program to compile.
 _BLOCK = 500
 
@@ -134,6 +137,7 @@ class View:
     axes: NDArray[np.bool_]  # (12,): what was measured
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, as the aircraft file has it
     _forces: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
+    _slopes: Recent[Complex] = field(default_factory=lambda: Recent(_SLOPES), init=False, repr=False, compare=False)
     _once: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     _readings: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
 
@@ -169,6 +173,11 @@ class View:
 
     def slopes(self, theta: Array, indices: list[int]) -> Complex:
         """d predicted / d parameters of these indices, (W, L, 12, K). ``residual`` there costs little afterwards."""
+        key = theta.tobytes() + np.array(indices, np.intp).tobytes()
+        known = self._slopes.get(key)
+        return self._slopes.keep(key, self._slopes_of(theta, indices) if known is None else known)
+
+    def _slopes_of(self, theta: Array, indices: list[int]) -> Complex:
         slopes = np.zeros((*self.measured.shape, len(indices)), complex)
         layout, forces = self.simulator.layout, len(COEFFICIENTS)
         own = {self.simulator.names.index(f"derivative_error.{n}"): d for d, n in enumerate(layout.derivatives)}
