@@ -23,6 +23,9 @@ from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex, Windows
 from sysid_node.gap.view import CHANNELS, View
 
+#: Weighted residual beyond which a prediction has grown without end, as that of a mode that feeds itself does.
+_ENDLESS = 1e100
+
 #: Rounds of linearising the nuisances anew; a fourth changes nothing that matters.
 _ROUNDS = 3
 
@@ -308,8 +311,10 @@ class Projected:
         """Minus twice the log probability of a ``residual``, up to a constant, as if of its own spectrum.
 
         The spectrum is profiled out: with the weights as they are, an effect would be worth little just where what it
-        explains is most of the remainder.
+        explains is most of the remainder. Infinite where the prediction grew without end.
         """
+        if not np.abs(rows).max(initial=0.0) < _ENDLESS:
+            return np.inf
         data = sum(view.windows.count * weight.size for view, weight in zip(self.fit.views, self.weights, strict=True))
         total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.nuisances.widened, 0
         for view, weight in zip(self.fit.views, self.weights, strict=True):
