@@ -73,6 +73,7 @@ TRIALS = (
     Trial("output_error", "still air, flown at 200 Hz", faster=2),
     Trial("filter_error", "light turbulence, elevator alone", "light", True, LONGITUDINAL, 1, 50.0, ELEVATOR),
     Trial("filter_error", "light turbulence, all surfaces", "light", True, LONGITUDINAL, 1, 50.0),
+    Trial("filter_error", "light turbulence, all axes", "light", True, WHOLE, 1, 50.0),
     Trial("equation_error", "light turbulence", "light"),
     Trial("frequency_equation_error", "light turbulence", "light"),
 )
