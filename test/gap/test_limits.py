@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap.fit import Fit, blank, polish, with_candidates
+from sysid_node.gap.fit import Fit, Projected, blank, linearised, polish, with_candidates
 from sysid_node.gap.nuisance import LIMIT, nuisances_of
 from sysid_node.gap.view import view_of
 from sysid_node.sim import Simulator
@@ -50,3 +50,13 @@ def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
     kept = shifted.nuisances.without(frozenset({"command_delay"}), names)
     left = {names[i] for i in kept.indices}
     assert "actuator_stamp_delay.delay" not in left and "air_data_delay.delay" in left
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e200, np.inf, np.nan])
+def test_a_prediction_that_grew_without_end_is_no_explanation(aircraft, plain_view, size) -> None:
+    problem = Projected(linearised(blank([plain_view], nuisances_of(aircraft, plain_view))))
+    rows = problem.residual(np.zeros(0))
+    assert np.isfinite(problem.deviance(rows))
+    rows[3] = size
+    assert problem.deviance(rows) == np.inf
