@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from sysid_node.gap.evidence import probabilities
 from sysid_node.gap.foretold import advantage
 from sysid_node.gap.rivals import Place, refined
 from sysid_node.gap.trials import Trial, Trier
+
+#: Effects by which commands are on another clock than the IMU.
+_COMMANDS_CLOCK = frozenset({"command_delay", "actuator_stamp_delay"})
 
 #: Probability in a cause's stead from which a rival is also tried beside it.
 _WORTH_TRYING = 0.01
@@ -64,9 +67,19 @@ def believed(
             out, otherwise = worst, places[causes.index(worst)].without
             doubted.append(worst)
         else:
+            causes = [_beside_its_twin(cause, chosen) for cause in causes]
             return chosen, tuple(sorted(causes, key=lambda cause: -cause.probability)), tuple(doubted)
         yielded |= {out.candidate.label}
         chosen = _instead(base, places[causes.index(out)], out, barred | yielded) or otherwise
+
+
+def _beside_its_twin(cause: Cause, chosen: Trial) -> Cause:
+    """Without vanes a late IMU does what late commands do: each is as likely."""
+    inferred = any(view.flight.inferred for view in chosen.fit.views)
+    if not inferred or cause.candidate.effect not in _COMMANDS_CLOCK:
+        return cause
+    half = 0.5 * cause.share
+    return replace(cause, share=half, alternatives=(("imu_delay", half), *cause.alternatives))
 
 
 def _instead(base: Trial, place: Place, cause: Cause, barred: frozenset[str]) -> Trial | None:

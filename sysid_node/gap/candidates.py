@@ -20,8 +20,9 @@ from sysid_node.sim import EFFECTS, Simulator
 #: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
 UNSEEN = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 
-#: Effects of instruments that a flight without vanes has not, or shows by its airspeed alone.
-_OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay"})
+#: Effects of instruments that a flight without vanes has not, or shows by its airspeed alone; and the IMU's lateness,
+#: as all but the airspeed comes from it then: what it does, the commands' does (``belief``).
+_OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"})
 
 #: Parameters that only shape an effect and stay as they are: the data of one flight seldom determine them.
 _HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})

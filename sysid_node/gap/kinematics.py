@@ -40,7 +40,6 @@ class Motion(NamedTuple):
     turning: Scalar  # (N, 3) rad/s^2
     air: Scalar  # (N, 3) V m/s, alpha, beta rad
     attitude: Scalar  # (N, 3) phi, theta, psi rad, without jumps
-    air_clock: Scalar | float = 1.0  # 1: the air data have stamps of their own, 0: they were inferred from the IMU
 
 
 class Sample(NamedTuple):
@@ -96,15 +95,14 @@ def reconstruct(
     pairs = (jax.tree.map(lambda series: jnp.concatenate([series[:1], series[:-1]]), samples), samples)
     _, rows = jax.lax.scan(lambda state, pair: _advance(chain, fading, state, *pair), start, pairs)
     air, attitude = rows[:, :3], rows[:, 3:]
-    late_air = sensors.late_air(chain.effects, motion.air_clock) / step
-    late_imu = chain.effects["imu_delay"]["delay"] / step
+    late_air, late_imu = (chain.effects[name]["delay"] / step for name in ("air_data_delay", "imu_delay"))
     return jnp.concatenate([shift_cubic(air, late_air), shift_cubic(attitude, late_imu)], axis=1)
 
 
 def undone(chain: Chain, motion: Motion) -> Sample:
     """The motion (N,) that the readings tell of, at the time of the samples."""
     effects, step = chain.effects, chain.step
-    late_imu, late_air = effects["imu_delay"]["delay"] / step, sensors.late_air(effects, motion.air_clock) / step
+    late_imu, late_air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
     force, rates, turning, attitude = (
         Vector(*shift_cubic(series, -late_imu).T)
         for series in (motion.force, motion.rates, motion.turning, motion.attitude)

@@ -26,7 +26,7 @@ from sysid_node.sim.body import Vector
 from sysid_node.sim.chain import Chain
 from sysid_node.sim.layout import OUTPUTS, Layout, Model, Scalar
 from sysid_node.sim.rollout import Carry, Pilot, advance, begin
-from sysid_node.sim.stations import command, sensors
+from sysid_node.sim.stations import command
 from sysid_node.sim.timing import shift_cubic
 
 
@@ -124,10 +124,9 @@ def _air(samples: Sample, begins: Scalar, step: Scalar) -> Scalar:
 
 def _measured(chain: Chain, motion: Motion) -> Scalar:
     """Readings (N, 12) as recorded, moved to when the parameters say that they were taken."""
-    late_imu, late_air = chain.effects["imu_delay"]["delay"], sensors.late_air(chain.effects, motion.air_clock)
-    readings = jnp.concatenate([motion.force, motion.rates, motion.attitude], axis=1)
-    inertial = shift_cubic(readings, -late_imu / chain.step)
-    return jnp.concatenate([inertial, shift_cubic(motion.air, -late_air / chain.step)], axis=1)
+    late = [chain.effects[name]["delay"] / chain.step for name in ("imu_delay", "air_data_delay")]
+    inertial = shift_cubic(jnp.concatenate([motion.force, motion.rates, motion.attitude], axis=1), -late[0])
+    return jnp.concatenate([inertial, shift_cubic(motion.air, -late[1])], axis=1)
 
 
 def _next(series: Scalar) -> Scalar:

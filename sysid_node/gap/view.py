@@ -266,7 +266,7 @@ def _bare(
     simulator: Simulator, flight: Flight, record: FlightRecord, windows: Windows, axes: NDArray[np.bool_], fading: float
 ) -> View:
     """A view that does not know its noise."""
-    given, series = _given(simulator, record, fading, own_clock=not flight.inferred)
+    given, series = _given(simulator, record, fading)
     return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
 
 
@@ -313,15 +313,12 @@ def _fading(calm: View) -> float:
     return float(np.clip(np.exp(np.log(memory).mean()), SHORTEST_MEMORY, LONGEST))
 
 
-def _given(simulator: Simulator, record: FlightRecord, fading: float, *, own_clock: bool) -> tuple[Given, Array]:
+def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[Given, Array]:
     """What a prediction needs, padded, and the measured channels (N, 12)."""
     signals, short = signals_of(simulator, record), -len(record) % _BLOCK
     nothing = jnp.zeros((len(record), 3))
     motion = motion_of(record) or Motion(nothing, nothing, nothing, signals.air, nothing)
-    clock = jnp.asarray(float(own_clock))
-    signals, motion = (
-        jax.tree.map(lambda x: _padded(x, short), parts._replace(air_clock=clock)) for parts in (signals, motion)
-    )
+    signals, motion = (jax.tree.map(lambda x: _padded(x, short), parts) for parts in (signals, motion))
     shown = _padded(np.column_stack([record[name] for name in ACCELERATIONS]), short)
     forces = np.asarray(_reduced(simulator.model, signals, shown))[: len(record)]
     readings = np.concatenate([motion.air, motion.attitude], axis=1)[: len(record)]
@@ -330,9 +327,8 @@ def _given(simulator: Simulator, record: FlightRecord, fading: float, *, own_clo
 
 
 def _padded(series: Scalar | Array, short: int) -> Scalar:
-    """A series (N, ...) with its end held for so many samples; what is no series, as it is."""
-    series = jnp.asarray(series)
-    return jnp.pad(series, [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge") if series.ndim else series
+    """A series (N, ...) with its end held for so many samples."""
+    return jnp.pad(jnp.asarray(series), [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge")
 
 
 def _noise_power(view: View, random: np.random.Generator) -> Array:

@@ -52,7 +52,6 @@ class Signals(NamedTuple):
     density: Scalar  # (N,) kg/m^3
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     climb: Scalar  # (N,) m since the start
-    air_clock: Scalar | float = 1.0  # 1: the air data have stamps of their own, 0: they were inferred from the IMU
 
 
 class _Memory(NamedTuple):
@@ -162,8 +161,7 @@ def _climb(record: FlightRecord, time: Array) -> Array:
 def _true_motion(chain: Chain, signals: Signals) -> _Sample:
     """What the sensors' effects hide: the motion and flow at the times of the samples."""
     effects, step = chain.effects, chain.step
-    late_imu = effects["imu_delay"]["delay"]
-    late_air = sensors.late_air(effects, signals.air_clock)
+    late_imu, late_air = effects["imu_delay"]["delay"], effects["air_data_delay"]["delay"]
     rates = sensors.rates_from(effects, Vector(*shift_cubic(signals.rates, -late_imu / step).T))
     reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
     flow = sensors.before_lag(effects, reading, _slope(reading, step))

@@ -76,12 +76,6 @@ def air_data(
     return airspeed_scale.apply(effects["airspeed_scale"], airspeed), *vanes
 
 
-def late_air(effects: dict[str, Values], own_clock: Scalar | float) -> Scalar:
-    """How late (s) the stamps of air data are: their own error, or the IMU's where ``own_clock`` is 0."""
-    late, inertial = effects["air_data_delay"]["delay"], effects["imu_delay"]["delay"]
-    return inertial + own_clock * (late - inertial)
-
-
 def flow_from(
     effects: dict[str, Values], airspeed: Scalar, alpha: Scalar, beta: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
