@@ -11,6 +11,7 @@ from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.holdout import Check
 from sysid_node.gap.verdict import verdict_of
+from sysid_node.report.sections.gap import candidates
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 
@@ -46,6 +47,14 @@ def test_the_document_is_json_and_its_shares_add_up(lagging) -> None:
     found = json.loads(json.dumps(document(lagging), allow_nan=False))
     assert sum(w["share"] for w in found["where"]) == pytest.approx(1.0)
     assert {"verdict", "gap", "where", "causes", "unexplained", "next_flight"} <= found.keys()
+
+
+def test_what_is_doubted_is_told(lagging) -> None:
+    attribution = replace(lagging.attribution, causes=(), doubted=lagging.attribution.causes)
+    found = replace(lagging, attribution=attribution)
+    assert [c["effect"] for c in document(found)["doubted"]] == ["actuator_lag"]
+    assert candidates(found)["doubted"].startswith("actuator lag (0.9")
+    assert not candidates(lagging)["doubted"]
 
 
 def test_tolerances_are_no_gap(aircraft) -> None:

@@ -178,6 +178,8 @@ def _panel(name: str, time: Array, measured: Array, before: Array, after: Array,
 def candidates(found: Diagnosis) -> Mapping[str, Any]:
     """Every effect that was fitted to the end, alone; and the causes with their parameters."""
     rows = [(words_of(label), f"{100 * p:.1f}", 100 * p) for label, p in found.attribution.table]
+    said = document(found)
+    doubted = [f"{words_of(c['label'])} ({number(c['probability'], 2)})" for c in said["doubted"]]
     causes = [
         {
             "name": words_of(c["label"]),
@@ -189,9 +191,9 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
             ],
             "rivals": ", ".join(words_of(r) for r in c["indistinguishable_from"]),
         }
-        for c in document(found)["causes"]
+        for c in said["causes"]
     ]
-    return {"rows": rows, "causes": causes, "confusion": _confusion(found)}
+    return {"rows": rows, "causes": causes, "doubted": ", ".join(doubted), "confusion": _confusion(found)}
 
 
 def _confusion(found: Diagnosis) -> Mapping[str, Any]:
