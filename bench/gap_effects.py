@@ -74,15 +74,18 @@ def told(effect: str, vanes: bool) -> dict[str, Any]:
     try:
         flights = [fly(aircraft, belief, spec, plan, seed + k, vanes) for k, plan in enumerate(PLANS)]
     except InputError:  # so large that these manoeuvres cannot be flown
-        return {}
-    found = document(diagnose(belief, flights[:1], flights[1:]))
+        return {"verdict": "the flight diverges"}
+    try:
+        found = document(diagnose(belief, flights[:1], flights[1:]))
+    except InputError as error:
+        return {"verdict": f"refused: {str(error).partition(': ')[2]}"}
     return {"verdict": found["verdict"], "causes": found["causes"], "gap": found["gap"]}
 
 
 def row(effect: str, found: Mapping[str, Any]) -> list[str]:
     """Of the table."""
-    if not found:
-        return [f"`{effect}:{EXAMPLES[effect]}`", "the flight diverges", "-", "-", "-"]
+    if "gap" not in found:
+        return [f"`{effect}:{EXAMPLES[effect]}`", found["verdict"], "-", "-", "-"]
     gap = found["gap"]
     sizes = " → ".join(f"{100.0 * gap[k]:.1f}" for k in ("before", "tolerances", "after"))
     causes = "; ".join(_cause(cause, EXAMPLES[effect]) for cause in found["causes"]) or "-"
@@ -121,7 +124,7 @@ def section(out: Path, vanes: bool) -> str:
         rows.append(row(effect, found))
         named += right(effect, found)
     heads = ("flown", "verdict", "named, probability: size (s.e.)", "gap %: file → tolerances → after", "floor")
-    flown = sum(row[2:] != ["-"] * 3 for row in rows)
+    flown = sum(row[1] != "the flight diverges" for row in rows)
     return f"{table(heads, rows)}\n\nNamed first, or beside the first: {named} of {flown} that could be flown."
 
 

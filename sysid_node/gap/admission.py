@@ -44,9 +44,15 @@ def admitted(view: View) -> View:
     if not 1.0 / _LIFT < lift / expected < _LIFT:
         raise InputError(
             f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
-            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; another aircraft's flight?"
+            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "
+            f"another aircraft's flight{_or_imu(view)}?"
         )
     return view
+
+
+def _or_imu(view: View) -> str:
+    """What else may be wrong where flow angles are inferred."""
+    return ", or an IMU far off, from which its flow angles are inferred" if view.flight.inferred else ""
 
 
 def excitation(view: View) -> Array:
