@@ -196,3 +196,15 @@ def test_any_record(
         time[at:] += length
     settings = replace(settings, **memory)
     assert_same(AIRCRAFT, settings, time[:count], samples[:count], np.arange(0.0, 12.0, 0.9))
+
+
+def test_looks_between_renewals_change_estimates_from_then_on() -> None:
+    """After 20 s of data some pieces are only looked at: what is wanted before a look leans on what was known then."""
+    rng, time = np.random.default_rng(4), np.arange(0.0, 48.0, 1.0 / 50.0)
+    other = replace(AIRCRAFT, mass=1.3 * AIRCRAFT.mass)
+    before, after = (exact_flight(aircraft, time, 4) for aircraft in (AIRCRAFT, other))
+    samples = np.where(time[:, None] < 36.0, before, after)
+    samples[:, :9] *= 1.0 + 0.05 * rng.normal(size=(time.size, 9))
+    found = assert_same(AIRCRAFT, Settings(), time, samples, np.arange(0.1, 48.0, 0.1))
+    statuses = {d.status for estimates in found for d in estimates.derivatives.values() if estimates.time > 36.0}
+    assert statuses - {"ok", "converging"}
