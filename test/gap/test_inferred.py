@@ -10,6 +10,8 @@ from sysid_node.gap.candidates import candidates_of
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.flights import Flight, complete
+from sysid_node.gap.short_flights import course_of, off
+from sysid_node.gap.unavoidable import unavoidable
 from sysid_node.gap.view import CHANNELS, view_of
 from sysid_node.sim import Simulator
 
@@ -96,3 +98,18 @@ def test_what_cannot_be_inferred_is_said(aircraft, plain) -> None:
         InputError, match=r"no alpha or beta; they can be inferred where the aircraft file has CL_alpha"
     ):
         blind(replace(aircraft, derivatives=derivatives), plain, "alpha", "beta")
+
+
+def test_the_floor_without_vanes_knows_of_gusts(aircraft, make_flight) -> None:
+    """What no vane shows is no error of the simulator; in still air there is nothing that it could not see."""
+    floors = []
+    for turbulence in ("none", "light"):
+        flight = blind(aircraft, make_flight({}, seed=3, turbulence=turbulence), "alpha", "beta")
+        view = view_of(Simulator(aircraft, 50.0), flight)
+        course = course_of(view, 100)
+        error, _ = next(unavoidable(view, view.simulator.neutral(), course))
+        mine = off(view, view.simulator.neutral(), course)
+        floors.append((np.sqrt((error[:, 4] ** 2).mean()), np.sqrt((mine[:, 4] ** 2).mean())))
+    (calm, calm_flown), (rough, rough_flown) = floors
+    assert rough > 3.0 * calm and rough_flown > 3.0 * calm_flown
+    assert 0.4 < rough / rough_flown < 2.5
