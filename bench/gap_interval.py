@@ -25,7 +25,8 @@ from sysid_node.gap.flights import RATE, Flight, complete
 from sysid_node.gap.flown import flown
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.structure import unbiased
-from sysid_node.gap.view import View, view_of
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 from sysid_node.sim.recording import Recorder
 from sysid_node.sim.sortie import Conditions, fly_sortie

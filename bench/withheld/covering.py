@@ -24,7 +24,8 @@ from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.flights import RATE as ANALYSIS_RATE
 from sysid_node.gap.flights import load_flight
 from sysid_node.gap.flown import flown
-from sysid_node.gap.view import View, view_of
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 from .closing import effects_of

@@ -34,6 +34,7 @@ class Cause:
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
     grounds: Grounds
     rivals: tuple[Trial, ...] = ()  # what was tried in its stead
+    made_way: bool = False  # for a rival that can be believed
 
     @property
     def probability(self) -> float:
@@ -61,16 +62,17 @@ def believed(
         causes = [_cause(trier, chosen, place, barred) for place in places]
         second = [cause for cause in causes if cause.likelier and cause.candidate.label not in yielded]
         worst = min(causes, key=lambda cause: cause.grounds.credence, default=None)
-        if second:
-            out, otherwise = second[0], chosen
-        elif worst is not None and worst.grounds.credence < LIKELY:
-            out, otherwise = worst, places[causes.index(worst)].without
-            doubted.append(worst)
-        else:
+        unlikely = worst is not None and worst.grounds.credence < LIKELY
+        out = second[0] if second else worst if unlikely else None
+        if out is None:
             causes = [_beside_its_twin(cause, chosen) for cause in causes]
             return chosen, tuple(sorted(causes, key=lambda cause: -cause.probability)), tuple(doubted)
+        place = places[causes.index(out)]
         yielded |= {out.candidate.label}
-        chosen = _instead(base, places[causes.index(out)], out, barred | yielded) or otherwise
+        rival = _instead(base, place, out, barred | yielded)
+        if not second:
+            doubted.append(replace(out, made_way=rival is not None))
+        chosen = rival or (chosen if second else place.without)
 
 
 def _beside_its_twin(cause: Cause, chosen: Trial) -> Cause:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.air import calm_of
 from sysid_node.gap.nuisance import gusty
-from sysid_node.gap.view import COEFFICIENTS, LONGEST, View
+from sysid_node.gap.view import COEFFICIENTS, View
 
 #: A command steps where it changes so many times faster than it usually does.
 _STEP = 8.0
@@ -84,7 +84,7 @@ def _air(view: View) -> Array:
     """Motion of the air (N, up to 3), of airspeed and flow angles, as a long memory shows it."""
     first = len(COEFFICIENTS)
     shown = first + np.flatnonzero(view.axes[first : first + 3])
-    calm = replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
+    calm = calm_of(view)
     return np.asarray((view.series - calm.predicted_series(view.simulator.neutral()))[:, shown])
 
 

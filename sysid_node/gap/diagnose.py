@@ -10,6 +10,7 @@ from typing import Any
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap import localise
 from sysid_node.gap.admission import admitted, require_others
+from sysid_node.gap.air import gusts_of
 from sysid_node.gap.attribute import Attribution, attribute
 from sysid_node.gap.close import Gap
 from sysid_node.gap.confusion import Confusion, confusion_of
@@ -22,7 +23,8 @@ from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.trials import Progress
 from sysid_node.gap.verdict import verdict_of
-from sysid_node.gap.view import View, gusts_of, view_of
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 

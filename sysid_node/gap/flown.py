@@ -154,8 +154,8 @@ def _table(view: View, base: Sequence[Array], final: Sequence[Array]) -> Array:
 
 def _errors(view: View, points: Sequence[Array], course: Course) -> Array:
     """Measured minus simulated (N, 12), each short flight with the parameters that it was not fitted to."""
-    size, hop = _size(view), view.windows.size // 2
-    edges = [(int(group[0]) + 0.5) * hop for group in groups_of(view)][1:]
+    size, windows = _size(view), view.windows
+    edges = [windows.slices[group[0]].start + windows.size / 4 for group in groups_of(view)][1:]
     middles = np.arange(len(view.record)) // size * size + size // 2
     owner = np.searchsorted(np.array(edges), middles, side="right")
     error = np.empty((len(view.record), len(OUTPUTS)))

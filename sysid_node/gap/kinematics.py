@@ -42,6 +42,13 @@ class Motion(NamedTuple):
     attitude: Scalar  # (N, 3) phi, theta, psi rad, without jumps
 
 
+class _Inertial(NamedTuple):
+    force: Vector  # specific, at the CG
+    rates: Vector
+    turning: Vector  # rad/s^2
+    attitude: Vector  # Euler angles
+
+
 class Sample(NamedTuple):
     """One sample of the motion, or a series of them, that the sensors' effects hide."""
 
@@ -92,8 +99,10 @@ def reconstruct(
     first = jax.tree.map(lambda series: series[0], samples)
     flow = _at_probe(chain, first.velocity, first.rates)
     start = _State(first.velocity, first.attitude, flow, flow)
-    pairs = (jax.tree.map(lambda series: jnp.concatenate([series[:1], series[:-1]]), samples), samples)
-    _, rows = jax.lax.scan(lambda state, pair: _advance(chain, fading, state, *pair), start, pairs)
+    before = jax.tree.map(lambda series: jnp.concatenate([series[:1], series[:-1]]), samples)
+    known = jnp.arange(motion.air.shape[0]) * step
+    steps = (before, samples, jnp.minimum(known, fading), jnp.minimum(known, _ATTITUDE_FADING))
+    _, rows = jax.lax.scan(lambda state, sample: _advance(chain, state, *sample), start, steps)
     air, attitude = rows[:, :3], rows[:, 3:]
     late_air, late_imu = (chain.effects[name]["delay"] / step for name in ("air_data_delay", "imu_delay"))
     return jnp.concatenate([shift_cubic(air, late_air), shift_cubic(attitude, late_imu)], axis=1)
@@ -101,22 +110,52 @@ def reconstruct(
 
 def undone(chain: Chain, motion: Motion) -> Sample:
     """The motion (N,) that the readings tell of, at the time of the samples."""
-    effects, step = chain.effects, chain.step
-    late_imu, late_air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
+    inertial, reading = _inertial(chain, motion), _reading(chain, motion)
+    flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
+    velocity = airflow.velocity_of(*flow.T).minus(inertial.rates.cross(_probe(chain)))
+    return Sample(inertial.force, inertial.rates, velocity, inertial.attitude, flow, reading)
+
+
+def flow_rate(chain: Chain, motion: Motion) -> Scalar:
+    """Rates (N, 3) of airspeed (m/s^2), alpha and beta (rad/s) at the probe, in still air, at the time of the samples.
+
+    By the inertial instruments: differentiated, the vanes' noise would pass for motion.
+    """
+    return _flow_rate(chain, _inertial(chain, motion), _reading(chain, motion))
+
+
+def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
+    force, rates, turning, attitude = inertial
+    u, v, w = velocity = airflow.velocity_of(*reading.T)
+    moving, _ = rates_of_change(velocity.minus(rates.cross(_probe(chain))), attitude, force, rates)
+    du, dv, dw = moving.plus(turning.cross(_probe(chain)))
+    forward, speed = jnp.hypot(u, w), reading[:, 0]
+    faster = (u * du + v * dv + w * dw) / speed
+    return jnp.stack([faster, (u * dw - w * du) / forward**2, (dv - v * faster / speed) / forward], axis=1)
+
+
+def _inertial(chain: Chain, motion: Motion) -> _Inertial:
+    """What gyroscopes, accelerometers and attitude tell (N,)."""
+    effects, late = chain.effects, chain.effects["imu_delay"]["delay"] / chain.step
     force, rates, turning, attitude = (
-        Vector(*shift_cubic(series, -late_imu).T)
+        Vector(*shift_cubic(series, -late).T)
         for series in (motion.force, motion.rates, motion.turning, motion.attitude)
     )
     rates, turning = sensors.rates_from(effects, rates), _unscaled(effects, turning, ("p", "q", "r"))
     bias = effects["imu_bias"]
     felt = _unscaled(effects, force.minus(Vector(bias["ax"], bias["ay"], bias["az"])), ("ax", "ay", "az"))
     arm = sensors.imu_arm(chain.model, effects, chain.body)
-    at_cg = imu_lever_arm.transfer(felt, rates, turning, arm.times(-1.0))
-    reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(motion.air, -late_air).T), 1)
-    flow = sensors.before_lag(effects, reading, jnp.asarray(jnp.gradient(reading, axis=0)) / step)
-    probe = sensors.air_data_arm(chain.model, effects, chain.body)
-    velocity = airflow.velocity_of(*flow.T).minus(rates.cross(probe))
-    return Sample(at_cg, rates, velocity, attitude, flow, reading)
+    return _Inertial(imu_lever_arm.transfer(felt, rates, turning, arm.times(-1.0)), rates, turning, attitude)
+
+
+def _reading(chain: Chain, motion: Motion) -> Scalar:
+    """The flow (N, 3) that a probe without errors but its lag would have read."""
+    late = chain.effects["air_data_delay"]["delay"] / chain.step
+    return jnp.stack(sensors.flow_from(chain.effects, *shift_cubic(motion.air, -late).T), 1)
+
+
+def _probe(chain: Chain) -> Vector:
+    return sensors.air_data_arm(chain.model, chain.effects, chain.body)
 
 
 def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str, str]) -> Vector:
@@ -126,33 +165,38 @@ def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str
     return imu_misalignment.undo(effects["imu_misalignment"], true)
 
 
-def _advance(chain: Chain, fading: Scalar | float, state: _State, before: Sample, now: Sample) -> tuple[_State, Scalar]:
-    """Predicts the readings (6,) of now, then corrects."""
+def _advance(
+    chain: Chain, state: _State, before: Sample, now: Sample, air_memory: Scalar, attitude_memory: Scalar
+) -> tuple[_State, Scalar]:
+    """Predicts the readings (6,) of now, then corrects.
+
+    Memories (s) begin with the flight: the first reading's noise would otherwise stay for as long as they are.
+    """
     h = chain.step
-    k1 = rates_of_change(state.velocity, state.attitude, before)
+    k1 = rates_of_change(state.velocity, state.attitude, before.force, before.rates)
     middle = (state.velocity.plus(k1[0].times(h)), state.attitude.plus(k1[1].times(h)))
-    k2 = rates_of_change(*middle, now)
+    k2 = rates_of_change(*middle, now.force, now.rates)
     velocity = state.velocity.plus(k1[0].plus(k2[0]).times(0.5 * h))
     attitude = state.attitude.plus(k1[1].plus(k2[1]).times(0.5 * h))
     truth = _at_probe(chain, velocity, now.rates)
     probe = air_data_lag.advance(chain.effects["air_data_lag"], state.probe, state.truth, truth, h)
     reading = jnp.stack([*sensors.air_data(chain.effects, *probe), *attitude])
-    velocity = velocity.plus(now.velocity.minus(velocity).times(h / (fading + h)))
-    attitude = attitude.plus(now.attitude.minus(attitude).times(h / _ATTITUDE_FADING))
+    velocity = velocity.plus(now.velocity.minus(velocity).times(h / (air_memory + h)))
+    attitude = attitude.plus(now.attitude.minus(attitude).times(h / (attitude_memory + h)))
     return _State(velocity, attitude, probe, truth), reading
 
 
-def rates_of_change(velocity: Vector, attitude: Vector, sample: Sample) -> tuple[Vector, Vector]:
+def rates_of_change(velocity: Vector, attitude: Vector, force: Vector, rates: Vector) -> tuple[Vector, Vector]:
     """Of velocity (m/s^2) and Euler angles (rad/s)."""
     sin_roll, cos_roll = jnp.sin(attitude.x), jnp.cos(attitude.x)
     sin_pitch, cos_pitch = jnp.sin(attitude.y), jnp.cos(attitude.y)
     down = Vector(-sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch)
-    p, q, r = sample.rates
+    p, q, r = rates
     heading = (q * sin_roll + r * cos_roll) / cos_pitch
     turning = Vector(p + heading * sin_pitch, q * cos_roll - r * sin_roll, heading)
-    return sample.force.plus(down.times(GRAVITY)).minus(sample.rates.cross(velocity)), turning
+    return force.plus(down.times(GRAVITY)).minus(rates.cross(velocity)), turning
 
 
 def _at_probe(chain: Chain, velocity: Vector, rates: Vector) -> Scalar:
     """Airspeed, alpha, beta (3,) where the probe sits."""
-    return jnp.stack(sensors.at_probe(velocity, rates, sensors.air_data_arm(chain.model, chain.effects, chain.body)))
+    return jnp.stack(sensors.at_probe(velocity, rates, _probe(chain)))

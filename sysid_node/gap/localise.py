@@ -99,13 +99,12 @@ def _smallest(power: Array) -> tuple[int, int]:
 
 def _regime(view: View, by_window: Array) -> dict[str, list[float]]:
     """Range of the signal whose departures go with the gap by window, where one does."""
-    hop, size = view.windows.size // 2, view.windows.size
     best, found = 0.5, {}
     for name in REGIMES:
         if name not in view.record.columns:
             continue
         values = view.record[name]
-        pieces = [values[i * hop : i * hop + size] for i in range(view.windows.count)]
+        pieces = [values[window] for window in view.windows.slices]
         spread = np.array([np.abs(p - values.mean()).max() for p in pieces])
         if view.windows.count < 4 or spread.std() < 1e-12 or by_window.std() < 1e-300:
             continue

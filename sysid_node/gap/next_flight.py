@@ -25,7 +25,8 @@ from sysid_node.gap.fit import Fit, real_rows, weights
 from sysid_node.gap.flights import thinned
 from sysid_node.gap.trials import Trial
 from sysid_node.gap.verdict import named
-from sysid_node.gap.view import View, view_like
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import view_like
 from sysid_node.sim import Simulator
 from sysid_node.sim.atmosphere import air_density
 from sysid_node.sim.sortie import Conditions, fly_sortie

@@ -25,15 +25,16 @@ WIDENED, WIDER = "derivative_error", 5.0
 #: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
 LIMIT = 3.0
 
-#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. Beside a
-#: late IMU the others stay as they are: it is late against both, and a servo's own lag must not pass for its lateness.
+#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. A late
+#: IMU is late against both others, and all three together against nothing: it is measured against the air data, and
+#: the commands' clock stays as it is, for a servo's own lag must not pass for lateness.
 _CLOCKS = {
     "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
-    "air_data_delay": ("air_data_delay",),
+    "air_data_delay": ("air_data_delay", "imu_delay"),
 }
 
 #: Share of the airspeed from which on the air's motion counts.
-_GUSTY = 0.01
+_GUSTY = 0.005
 
 #: Mean error of a flow angle that no vane measured, 1 sigma, rad: it is the aircraft file's.
 _INFERRED = 0.01

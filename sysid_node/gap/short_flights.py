@@ -111,8 +111,8 @@ def _air(samples: Sample, begins: Scalar, step: Scalar) -> Scalar:
 
     def integrate(held: Scalar, new: tuple[Sample, Sample, Scalar]) -> tuple[Scalar, Scalar]:
         before, now, anew = new
-        k1, _ = rates_of_change(Vector(*held), before.attitude, before)
-        k2, _ = rates_of_change(Vector(*held).plus(k1.times(step)), now.attitude, now)
+        k1, _ = rates_of_change(Vector(*held), before.attitude, before.force, before.rates)
+        k2, _ = rates_of_change(Vector(*held).plus(k1.times(step)), now.attitude, now.force, now.rates)
         ahead = held + 0.5 * step * jnp.stack(k1.plus(k2))
         moved = jnp.where(anew, jnp.stack(now.velocity), ahead)
         return moved, moved
@@ -143,6 +143,7 @@ def course_of(view: View, size: int) -> Course:
     altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
     begins = jnp.arange(altitude.size) % size == 0
     still = jnp.zeros((altitude.size, 3))
+    assert given.motion is not None  # short flights are of flights with attitude (``flown``)
     return Course(given.motion, given.signals.commands, altitude, still, still, begins)
 
 

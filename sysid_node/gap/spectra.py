@@ -16,11 +16,14 @@ from sysid_node.flight.record import Array
 
 Complex = NDArray[np.complex128]
 
-#: Length of a window, s: two periods of the lowest band's middle, short enough that drift stays in its mean.
+#: Length of a window, about, s: two periods of the lowest band's middle, short enough that drift stays in its mean.
 LENGTH = 8.0
 
 #: Lengths of a window that fit into the shortest flight.
 LEAST = 3.0
+
+#: What is left out at either end of a flight, s: late signals are made up there, by holding the first or last sample.
+EDGE = 0.25
 
 #: Highest line, Hz: beyond it, vanes and rigid-body dynamics have little to say.
 HIGHEST = 4.0
@@ -34,17 +37,20 @@ EDGES = (0.0, 0.06, 0.3, 0.6, 1.0, 1.6, 2.4, HIGHEST + 0.1)
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of ``size`` samples at ``rate`` Hz, ``count`` of them, half a window apart."""
+    """Windows of ``size`` samples at ``rate`` Hz, ``count`` of them, half a window apart, from ``first`` on."""
 
     rate: float
     size: int
     count: int
+    first: int = 0
 
     @classmethod
     def over(cls, samples: int, rate: float, length: float = LENGTH) -> Windows:
-        """As many as fit into so many samples."""
-        size = 2 * round(0.5 * min(length * rate, samples / LEAST))
-        return cls(rate, size, max(1, (samples - size) // (size // 2) + 1))
+        """As many of about this length as fill so many samples without their ends."""
+        first = round(EDGE * rate)
+        inner = samples - 2 * first
+        halves = max(2, round(2.0 * inner / min(length * rate, inner / LEAST)))
+        return cls(rate, 2 * (inner // halves), halves - 1, first)
 
     @property
     def frequencies(self) -> Array:
@@ -56,7 +62,13 @@ class Windows:
     @property
     def starts(self) -> Array:
         """When each window begins (W,), s."""
-        return np.arange(self.count) * (self.size // 2) / self.rate
+        return (self.first + np.arange(self.count) * (self.size // 2)) / self.rate
+
+    @property
+    def slices(self) -> list[slice]:
+        """Samples of each window."""
+        begins = [self.first + i * (self.size // 2) for i in range(self.count)]
+        return [slice(begin, begin + self.size) for begin in begins]
 
     @property
     def length(self) -> float:
@@ -70,9 +82,9 @@ class Windows:
 
     def transform(self, series: Array) -> Complex:
         """Amplitudes (W, L, ...) of a series (N, ...); the variance of white noise passes as it is per sample."""
-        hop, lines = self.size // 2, self.frequencies.size
+        lines = self.frequencies.size
         table, flat = _tapered_waves(self.size, lines), series.reshape(series.shape[0], -1)
-        parts = np.stack([table @ flat[i * hop : i * hop + self.size] for i in range(self.count)])
+        parts = np.stack([table @ flat[window] for window in self.slices])
         amplitudes: Complex = parts[:, :lines] + 1j * parts[:, lines:]
         return amplitudes.reshape(self.count, lines, *series.shape[1:])
 

@@ -18,7 +18,8 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.flights import thinned
 from sysid_node.gap.kinematics import Motion
 from sysid_node.gap.short_flights import Course, beside, off
-from sysid_node.gap.view import View, noisier
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import noisier
 from sysid_node.sim.dryden import Dryden
 from sysid_node.sim.layout import OUTPUTS
 

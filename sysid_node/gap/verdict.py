@@ -65,8 +65,11 @@ def structured(attribution: Attribution) -> bool:
 
 
 def wanting(attribution: Attribution) -> bool:
-    """Whether something is there that the likeliest effect accounts for by most, but not by its own law."""
-    return any(cause.grounds.wanting for cause in attribution.doubted)
+    """Whether something is there that the likeliest effect accounts for by most, but not by its own law.
+
+    Not where another took its place: that is what is there.
+    """
+    return any(cause.grounds.wanting and not cause.made_way for cause in attribution.doubted)
 
 
 def far_off(check: Check) -> bool:

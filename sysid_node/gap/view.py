@@ -8,7 +8,7 @@ so that each measurement counts once.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -18,26 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap import inferred
-from sysid_node.gap.flights import Flight, thinned
-from sysid_node.gap.kinematics import READINGS, Motion, motion_of, reconstruct
+from sysid_node.gap.flights import Flight
+from sysid_node.gap.kinematics import READINGS, Motion, flow_rate, motion_of, reconstruct
 from sysid_node.gap.recent import Recent
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator, parameters
+from sysid_node.sim.chain import Chain
 from sysid_node.sim.layout import Layout, Model, Scalar
 from sysid_node.sim.prediction import ACCELERATIONS, COEFFICIENTS, Signals, coefficients, predict, signals_of
 
 #: What is compared.
 CHANNELS = (*COEFFICIENTS, *READINGS)
 
-#: Channels of a flight without lateral measurements.
-_LONGITUDINAL = frozenset({"CL", "CD", "Cm", "V", "alpha", "theta"})
-
-#: Memory of the observer of the air, at most and at least, s.
-LONGEST, SHORTEST_MEMORY = 4.0, 0.15
-
-#: Band in which gusts are told from noise, Hz.
-_GUSTS = (0.3, 2.0)
+#: Longest memory of the observer of the air, s.
+LONGEST = 4.0
 
 #: Directions in which a prediction is differentiated at once: as many as most effects have parameters.
 _LANES = 3
@@ -51,20 +45,6 @@ _SLOPES = 4
 #: Flights are padded to multiples of so many samples: each length is another program to compile.
 _BLOCK = 500
 
-#: Realisations of the sensors' noise that its power is averaged over.
-_REALISATIONS = 4
-
-#: Columns each sensor's noise falls on.
-_NOISE = {
-    "accel": ("ax", "ay", "az"),
-    "gyro": ("p", "q", "r"),
-    "airspeed": ("V",),
-    "alpha": ("alpha",),
-    "beta": ("beta",),
-    "attitude": ("phi", "theta", "psi"),
-}
-
-
 _Kept = TypeVar("_Kept")
 
 
@@ -72,7 +52,7 @@ class Given(NamedTuple):
     """All that a prediction takes from a flight."""
 
     signals: Signals  # padded
-    motion: Motion  # padded
+    motion: Motion | None  # padded; None without attitude
     fading: Scalar  # s, of the observer
     step: Scalar  # s
 
@@ -80,12 +60,18 @@ class Given(NamedTuple):
 @partial(jax.jit, static_argnums=0)
 def _forces(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
     """Coefficients (N, 6) that parameters (P,) expect."""
-    return coefficients(model, given.signals, predict(layout, model, theta, given.signals, given.step))
+    signals = given.signals
+    if given.motion is not None:
+        chain = Chain.of(layout, model, theta, given.step, jnp.zeros(()))
+        signals = signals._replace(flow_rate=flow_rate(chain, given.motion))
+    return coefficients(model, given.signals, predict(layout, model, theta, signals, given.step))
 
 
 @partial(jax.jit, static_argnums=0)
 def _readings(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
-    """Air data and attitude (N, 6) that parameters (P,) expect."""
+    """Air data and attitude (N, 6) that parameters (P,) expect; nothing without attitude."""
+    if given.motion is None:
+        return jnp.zeros((given.signals.density.size, len(READINGS)))
     return reconstruct(layout, model, theta, given.motion, given.fading, given.step)
 
 
@@ -161,7 +147,7 @@ class View:
         """The same by window and line, (W, L, 12)."""
         known = self._forces.get(theta.tobytes())
         forces = self.windows.transform(self._series(_forces, theta)) if known is None else known
-        key = theta[_kinematic(self.simulator.layout)].tobytes()
+        key = theta[kinematic(self.simulator.layout)].tobytes()
         readings = self._readings.get(key)
         if readings is None:
             readings = self._readings.keep(key, self.windows.transform(self._series(_readings, theta)))
@@ -183,7 +169,7 @@ class View:
         own = {self.simulator.names.index(f"derivative_error.{n}"): d for d, n in enumerate(layout.derivatives)}
         linear = [k for k, index in enumerate(indices) if index in own]
         others = [k for k, index in enumerate(indices) if index not in own]
-        moving = [k for k in others if indices[k] in _kinematic(layout)]
+        moving = [k for k in others if indices[k] in kinematic(layout)]
         if linear:
             by_derivative = self._slopes_by_derivative(theta)
             slopes[:, :, :forces, linear] = by_derivative[..., [own[indices[k]] for k in linear]]
@@ -209,7 +195,7 @@ class View:
         s, directions, samples = self.simulator, np.zeros((_LANES, len(theta))), len(self.record)
         directions[np.arange(len(indices)), indices] = 1.0
         values, changes = _changes(expected, s.layout, s.model, jnp.asarray(theta), directions, self.given)
-        entries = _kinematic(s.layout) if expected is _readings else slice(None)
+        entries = kinematic(s.layout) if expected is _readings else slice(None)
         kept, key = (self._readings if expected is _readings else self._forces), theta[entries].tobytes()
         if kept.get(key) is None:
             kept.keep(key, self.windows.transform(np.asarray(values)[:samples]))
@@ -221,7 +207,7 @@ _ELSEWHERE = frozenset({"actuator_stamp_delay", "sensor_noise"})
 
 
 @cache
-def _kinematic(layout: Layout) -> list[int]:
+def kinematic(layout: Layout) -> list[int]:
     """Entries of the parameter vector that kinematics depend on: clocks, instruments, and where they are."""
     return [
         i
@@ -235,34 +221,7 @@ def _lanes(places: list[int]) -> Iterator[list[int]]:
     return (places[first : first + _LANES] for first in range(0, len(places), _LANES))
 
 
-def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
-    """The flight as windows and lines, with its noise floor. Raises InputError where a signal is missing."""
-    record = thinned(flight, simulator.rate)
-    windows = Windows.over(len(record), simulator.rate)
-    axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
-    axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
-    axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
-    axes[[CHANNELS.index(name) for name in flight.inferred]] = False
-    calm = _measured_noise(_bare(simulator, flight, record, windows, axes, LONGEST), seed)
-    calm = replace(calm, gusts=gusts_of(calm, simulator.neutral()))
-    fading = _fading(calm)
-    if fading == LONGEST:
-        return calm
-    shorter = _bare(simulator, flight, record, windows, axes, fading)
-    return _measured_noise(replace(shorter, gusts=calm.gusts), seed)
-
-
-def view_like(view: View, record: FlightRecord) -> View:
-    """Another record of the same length, seen as this one: with its noise and its observer."""
-    bare = _bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
-    return replace(bare, noise=view.noise)
-
-
-def _measured_noise(view: View, seed: int) -> View:
-    return replace(view, noise=_noise_power(view, np.random.default_rng(seed)))
-
-
-def _bare(
+def bare(
     simulator: Simulator, flight: Flight, record: FlightRecord, windows: Windows, axes: NDArray[np.bool_], fading: float
 ) -> View:
     """A view that does not know its noise."""
@@ -270,58 +229,15 @@ def _bare(
     return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
 
 
-def gusts_of(view: View, theta: Array) -> float:
-    """Root-mean-square motion of the air across the flight path (m/s): flow angles that no motion accounts for.
-
-    With a long memory of the air, at parameters (P,); the median of the windows, which the observer's start leaves out.
-    """
-    vanes = len(COEFFICIENTS) + np.flatnonzero(view.axes[len(COEFFICIENTS) :][1:3]) + 1
-    if not vanes.size:
-        return _gusts_ahead(view, theta)
-    calm = replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
-    power = (np.abs(calm.residual(theta)[:, 1:, vanes]) ** 2).sum(axis=1)
-    beyond = np.maximum(np.median(power, axis=0) - view.noise[1:, vanes].sum(axis=0), 0.0)
-    return float(view.record["V"].mean() * np.sqrt(2.0 / view.windows.size * beyond.mean()))
-
-
-def _gusts_ahead(view: View, theta: Array) -> float:
-    """The same by the airspeed alone, where no vane was there: air that moves moves alike in all directions."""
-    airspeed = CHANNELS.index("V")
-    if not view.axes[airspeed]:
-        return 0.0
-    calm = replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
-    power = (np.abs(calm.residual(theta)[:, 1:, airspeed]) ** 2).sum(axis=1)
-    beyond = max(float(np.median(power) - view.noise[1:, airspeed].sum()), 0.0)
-    return float(np.sqrt(2.0 / view.windows.size * beyond))
-
-
-def _fading(calm: View) -> float:
-    """The observer's best memory of the air (s), from innovations of a long one.
-
-    Gusts wander (their power falls with the square of frequency), readings are noisy: the Kalman filter of a random
-    walk of intensity q in white noise of density r forgets within sqrt(r / q).
-    """
-    lines = calm.windows.frequencies
-    band = (lines > _GUSTS[0]) & (lines < _GUSTS[1])
-    air = len(COEFFICIENTS) + np.flatnonzero(calm.axes[len(COEFFICIENTS) :][:3])
-    if not air.size:
-        return LONGEST
-    power = (np.abs(calm.residual(calm.simulator.neutral())) ** 2).mean(axis=0)[np.ix_(band, air)]
-    noise = calm.noise[np.ix_(band, air)]
-    wandering = np.maximum(power - noise, 0.0) * (2.0 * np.pi * lines[band, None]) ** 2
-    memory = np.sqrt(noise.mean(axis=0) / np.maximum(wandering.mean(axis=0), 1e-300))
-    return float(np.clip(np.exp(np.log(memory).mean()), SHORTEST_MEMORY, LONGEST))
-
-
 def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[Given, Array]:
     """What a prediction needs, padded, and the measured channels (N, 12)."""
     signals, short = signals_of(simulator, record), -len(record) % _BLOCK
-    nothing = jnp.zeros((len(record), 3))
-    motion = motion_of(record) or Motion(nothing, nothing, nothing, signals.air, nothing)
+    motion = motion_of(record)
     signals, motion = (jax.tree.map(lambda x: _padded(x, short), parts) for parts in (signals, motion))
     shown = _padded(np.column_stack([record[name] for name in ACCELERATIONS]), short)
     forces = np.asarray(_reduced(simulator.model, signals, shown))[: len(record)]
-    readings = np.concatenate([motion.air, motion.attitude], axis=1)[: len(record)]
+    read = jnp.zeros((len(shown), len(READINGS))) if motion is None else jnp.hstack([motion.air, motion.attitude])
+    readings = np.asarray(read)[: len(record)]
     given = Given(signals, motion, jnp.asarray(fading), jnp.asarray(simulator.step))
     return given, np.concatenate([forces, readings], axis=1)
 
@@ -331,45 +247,4 @@ def _padded(series: Scalar | Array, short: int) -> Scalar:
     return jnp.pad(jnp.asarray(series), [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge")
 
 
-def _noise_power(view: View, random: np.random.Generator) -> Array:
-    """Power (L, 12) by flying through the noise of the aircraft file again, a few times."""
-    neutral = view.simulator.neutral()
-    clean = view.residual(neutral)
-    power = np.zeros(clean.shape[1:])
-    for _ in range(_REALISATIONS):
-        record = thinned(noisier(view, random), view.simulator.rate)
-        again = _bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
-        power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / _REALISATIONS
-    return np.maximum(view.windows.smoothed(power), 1e-18)
-
-
-def noisier(view: View, random: np.random.Generator) -> Flight:
-    """The flight with the sensors' noise added once more, as strong in the band as each topic's rate makes it."""
-    record, sigmas = view.flight.record, view.simulator.aircraft.noise
-    own_rate = 1.0 / float(np.median(np.diff(record.time)))
-    columns = dict(record.columns)
-    for sensor, names in _NOISE.items():
-        rate = view.flight.imu_rate if sensor in {"accel", "gyro", "attitude"} else view.flight.air_rate
-        spread = sigmas[sensor] * np.sqrt(own_rate / min(rate, own_rate))
-        for name in names:
-            if name in columns and name not in view.flight.filled:
-                columns[name] = columns[name] + spread * random.standard_normal(len(record))
-    columns |= _jittered(view, random)
-    noisy = replace(record, columns=columns)
-    if view.flight.inferred:
-        noisy = inferred.with_angles(view.simulator.aircraft, noisy, view.flight.inferred, view.flight.source)
-    return replace(view.flight, record=noisy)
-
-
-def _jittered(view: View, random: np.random.Generator) -> dict[str, Array]:
-    """Commands as other samples of the same rate might have caught them: a step falls anywhere between two samples."""
-    record, aircraft = view.flight.record, view.simulator.aircraft
-    period = 1.0 / view.flight.actuator_rate
-    nodes = np.arange(0.0, record.duration + period, period)
-    off = np.interp(record.time, nodes, period * (random.random(nodes.size) - 0.5))
-    symbols = [*aircraft.control_symbols, *(["thrust"] if aircraft.throttle else [])]
-    moved = [s for s in symbols if s not in view.flight.filled]
-    return {s: np.interp(record.time + off, record.time, record[s]) for s in moved}
-
-
-__all__ = ["CHANNELS", "COEFFICIENTS", "View", "view_of"]
+__all__ = ["CHANNELS", "COEFFICIENTS", "LONGEST", "View", "bare", "kinematic"]

@@ -33,7 +33,7 @@ from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import actuator, airflow, command, mass, propulsion, sensors, structure
 from sysid_node.sim.stations.actuator import ActuatorState
 from sysid_node.sim.stations.airflow import Air
-from sysid_node.sim.timing import shift_cubic
+from sysid_node.sim.timing import shift_cubic, slope
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,7 @@ class Signals(NamedTuple):
     density: Scalar  # (N,) kg/m^3
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     climb: Scalar  # (N,) m since the start
+    flow_rate: Scalar | None = None  # (N, 3) rate of the flow at the probe, when it moved, m/s^2, rad/s
 
 
 class _Memory(NamedTuple):
@@ -164,7 +165,7 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
     late_imu, late_air = effects["imu_delay"]["delay"], effects["air_data_delay"]["delay"]
     rates = sensors.rates_from(effects, Vector(*shift_cubic(signals.rates, -late_imu / step).T))
     reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
-    flow = sensors.before_lag(effects, reading, _slope(reading, step))
+    flow = sensors.before_lag(effects, reading, signals.flow_rate, step)
     arm = sensors.air_data_arm(chain.model, effects, chain.body)
     velocity = airflow.velocity_of(*flow.T).minus(rates.cross(arm))
     _, alpha, _ = airflow.flow_angles(velocity)
@@ -174,15 +175,9 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
         rates=rates,
         density=signals.density,
         climb=signals.climb,
-        alpha_rate=_slope(alpha, step),
+        alpha_rate=slope(alpha, step),
         time=jnp.arange(signals.density.shape[0]) * step,
     )
-
-
-def _slope(series: Scalar, step: Scalar) -> Scalar:
-    """d/dt of a series (N, ...) by fourth-order central differences; the ends repeat the second inner values."""
-    inner = (8.0 * (series[3:-1] - series[1:-3]) - (series[4:] - series[:-4])) / (12.0 * step)
-    return jnp.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
 
 
 def _flow(sample: _Sample) -> Air:

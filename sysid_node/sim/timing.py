@@ -33,6 +33,12 @@ def shift_near_zero(series: Scalar, samples: Scalar) -> Scalar:
     return series - 0.5 * samples * (after - before)
 
 
+def slope(series: Scalar, step: Scalar) -> Scalar:
+    """d/dt of a series (N, ...) by fourth-order central differences; the ends repeat the second inner values."""
+    inner = (8.0 * (series[3:-1] - series[1:-3]) - (series[4:] - series[:-4])) / (12.0 * step)
+    return jnp.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
+
+
 def _neighbours(series: Scalar, samples: Scalar, first: int, count: int) -> tuple[Scalar, list[Scalar]]:
     """Where each k - samples lies between two samples, 0 to 1, and ``count`` rows around it from ``first`` on.
 

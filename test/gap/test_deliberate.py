@@ -3,7 +3,7 @@
 import pytest
 
 from sysid_node.gap.deliberate import deliberate, driven_by_weather, purposeful
-from sysid_node.gap.view import view_of
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 MULTISINE = ["multisine:elevator,aileron,rudder:amplitude=0.06,0.06,0.1:length=24:low=0.1:high=2.5:start=1"]

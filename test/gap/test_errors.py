@@ -9,7 +9,8 @@ from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.structure import unbiased
 from sysid_node.gap.trials import Trier
-from sysid_node.gap.view import View, view_of
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 

@@ -8,7 +8,8 @@ import pytest
 
 from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.flown import WINDOW, drawn, flown, foreseen
-from sysid_node.gap.view import View, view_of
+from sysid_node.gap.view import View
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 #: Of each kind: in the actuators, in a sensor that sets the states anew, in a clock.

@@ -8,7 +8,7 @@ from sysid_node.gap.foretold import advantage
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.trials import Trier
-from sysid_node.gap.view import view_of
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 

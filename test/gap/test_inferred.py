@@ -12,7 +12,8 @@ from sysid_node.gap.document import document
 from sysid_node.gap.flights import Flight, complete
 from sysid_node.gap.short_flights import course_of, off
 from sysid_node.gap.unavoidable import unavoidable
-from sysid_node.gap.view import CHANNELS, view_of
+from sysid_node.gap.view import CHANNELS
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 

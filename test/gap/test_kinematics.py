@@ -5,7 +5,8 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.gap.kinematics import READINGS
-from sysid_node.gap.view import CHANNELS, View, view_of
+from sysid_node.gap.view import CHANNELS, View
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 FIRST = len(CHANNELS) - len(READINGS)

@@ -6,7 +6,7 @@ from gap_flights import fly
 
 from sysid_node.gap.fit import Fit, Projected, blank, linearised, polish, with_candidates
 from sysid_node.gap.nuisance import LIMIT, nuisances_of
-from sysid_node.gap.view import view_of
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 

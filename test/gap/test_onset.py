@@ -7,7 +7,7 @@ from sysid_node.gap.candidates import candidates_of
 from sysid_node.gap.fit import blank, polish, with_candidates
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.onset import sought
-from sysid_node.gap.view import view_of
+from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid_node.gap.view import _kinematic
+from sysid_node.gap.view import kinematic
 
 
 def test_only_noise_is_left_of_the_same_aircraft(plain_view) -> None:
@@ -23,9 +23,9 @@ def test_slopes_agree_with_differences(plain_view) -> None:
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
 
 
-def test_kinematics_depend_on_no_other_entries_than_those_named(plain_view) -> None:
+def testkinematics_depend_on_no_other_entries_than_those_named(plain_view) -> None:
     simulator = plain_view.simulator
-    entries = np.setdiff1d(np.arange(len(simulator.names)), _kinematic(simulator.layout))
+    entries = np.setdiff1d(np.arange(len(simulator.names)), kinematic(simulator.layout))
     somewhere = simulator.neutral() + 0.1 * np.random.default_rng(0).random(len(simulator.names))
     changed = somewhere.copy()
     changed[entries] += 0.01

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import jax
+import jax.numpy as jnp
+
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
 from sysid_node.sim.layout import Scalar, Values
@@ -19,6 +22,18 @@ EFFECT = Effect(
 def advance(values: Values, y: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:
     """The reading one step (s) on."""
     return first_order(values["time_constant"], y, truth0, truth1, step)
+
+
+def behind(values: Values, rate: Scalar, step: Scalar) -> Scalar:
+    """How far readings (N, 3) lag behind the truth, from the truth's rate (N, 3): settled on the first sample."""
+
+    def advance_one(lag: Scalar, pair: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        lag = first_order(values["time_constant"], lag, *pair, step)
+        return lag, lag
+
+    before = jnp.concatenate([rate[:1], rate[:-1]])
+    _, lagging = jax.lax.scan(advance_one, rate[0], (before, rate))
+    return values["time_constant"] * lagging
 
 
 def undo(values: Values, y: Scalar, rate: Scalar) -> Scalar:

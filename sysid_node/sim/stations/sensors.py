@@ -17,6 +17,7 @@ from sysid_node.sim.effects import (
 )
 from sysid_node.sim.layout import Model, Scalar, Values
 from sysid_node.sim.stations.airflow import flow_angles
+from sysid_node.sim.timing import slope
 
 
 def imu_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
@@ -84,9 +85,14 @@ def flow_from(
     return airspeed_scale.undo(effects["airspeed_scale"], airspeed), *angles
 
 
-def before_lag(effects: dict[str, Values], reading: Scalar, rate: Scalar) -> Scalar:
-    """What the lagged probe lags behind, from its reading and that one's rate."""
-    return air_data_lag.undo(effects["air_data_lag"], reading, rate)
+def before_lag(effects: dict[str, Values], reading: Scalar, flow_rate: Scalar | None, step: Scalar) -> Scalar:
+    """What the lagged probe lags behind (N, 3), from its readings and the flow's own rate (N, 3).
+
+    That is what inertial instruments tell. Without it, by differences of the readings, whose noise comes along.
+    """
+    if flow_rate is None:
+        return air_data_lag.undo(effects["air_data_lag"], reading, slope(reading, step))
+    return reading + air_data_lag.behind(effects["air_data_lag"], flow_rate, step)
 
 
 def noisy(model: Model, effects: dict[str, Values], reading: Scalar, realisation: Scalar) -> Scalar:
