@@ -6,7 +6,8 @@ it know them to 2 %, as from an identifier. Surfaces are commands (`actuators` e
 position. Missed is what raises no alarm within 15 s, wrongly isolated what 5 s after its alarm is given another name.
 `--power` has faults grow from small to large and counts how many of them are found within which time.
 `--hours 4` flies hours in which nothing fails, half of them with 3-2-1-1s, half with a doublet a minute on each
-surface, and counts alarms. Results are kept in files as they come; those that are there are not flown again.
+surface, and counts alarms, in every turbulence or in those that are named. Results are kept in files as they come;
+those that are there are not flown again, and the table sums up all of them.
 """
 
 from __future__ import annotations
@@ -284,12 +285,12 @@ def _keep(results: Path, one: object) -> None:
         file.write(json.dumps(one) + "\n")
 
 
-def hours(count: float, results: Path) -> str:
+def hours(count: float, weathers: Sequence[str], first: int, results: Path) -> str:
     """Fly hours in which nothing fails, those that are not yet in the file of results, and count alarms."""
     known = _kept(results)
     done = {(one["turbulence"], one["seed"]) for one in known}
-    for seed in range(1, round(count * HOUR / PART) + 1):
-        for turbulence in WEATHERS:
+    for seed in range(first, first + round(count * HOUR / PART)):
+        for turbulence in weathers:
             if (turbulence, seed) in done:
                 continue
             setting = Setting("", turbulence, seconds=PART, manoeuvre=DOUBLETS if seed % 2 else ())
@@ -320,12 +321,15 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=10, help="of each fault and turbulence (default: 10)")
     parser.add_argument("--identified", action="store_true", help="derivatives known to 2 %% instead")
     parser.add_argument("--hours", type=float, default=0.0, help="fly so many in each turbulence without a fault")
+    parser.add_argument("--weathers", nargs="+", choices=WEATHERS, default=WEATHERS, help="of the hours (default: all)")
+    parser.add_argument("--first", type=int, default=1, help="seed of the hours' first flight (default: 1)")
     parser.add_argument("--power", action="store_true", help="count what is found by size and time instead")
     parser.add_argument("--results", type=Path, default=Path("out/faults"), help="folder (default: out/faults)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     if args.hours:
-        publish("bench/faults.py --hours", hours(args.hours, args.results / "hours.jsonl"), args.page)
+        table_of_hours = hours(args.hours, args.weathers, args.first, args.results / "hours.jsonl")
+        publish("bench/faults.py --hours", table_of_hours, args.page)
         return
     mode = " --identified" if args.identified else ""
     results = args.results / f"faults{mode.replace(' --', '_')}_{args.flights}.jsonl"

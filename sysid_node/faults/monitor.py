@@ -33,6 +33,7 @@ from sysid_node.faults.types import DAMAGE, VANE_STUCK, Fault
 from sysid_node.faults.weighing import (
     VANES,
     Stretch,
+    doubted,
     excess,
     explained,
     onsets,
@@ -226,6 +227,9 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
     threshold = state.settings.threshold
     found = promising(state, over, usual, squares, threshold)
     best = float(stuck_vanes(state, over.pieces).max()) if len(over.pieces) >= PATIENT else 0.0
+    if any(weighed.factor > threshold for weighed in found):
+        over = doubted(state, over)
+        found = weights(state, over, usual)
     for place, weighed in enumerate(found):
         if weighed.factor > threshold:
             left = max(excess(state, over, place, weighed), float(usual[place]), 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
-from sysid_node.faults import colour
+from sysid_node.faults import colour, gusts
 from sysid_node.faults.colour import ORDER
 from sysid_node.faults.evidence import Shifts, Weighed, marginal, most, score_squares, weigh_each, weigh_loosely
 from sysid_node.faults.held import Belief
@@ -88,6 +88,14 @@ def onsets(state: State, counts: Sequence[int], sound: int) -> list[Stretch]:
         sums = [sum((getattr(piece, name) for piece in first), start) for name, start in zip("Jv", rest, strict=True)]
         found.append(_against(state, [*first, *pieces[n + ORDER :]], (sums[0], sums[1]), belief))
     return found
+
+
+def doubted(state: State, over: Stretch) -> Stretch:
+    """A stretch against a belief that allows for what gusts may have taught (``gusts``)."""
+    J, v = over.whole
+    allowed = np.linalg.inv(over.belief.precision) + gusts.doubt(state.held, J / len(over.pieces))
+    belief = over.belief._replace(precision=np.asarray(np.linalg.inv(allowed)))
+    return Stretch(over.pieces, belief, over.whole, *marginal(J, v, belief.precision))
 
 
 def _last(state: State, count: int) -> list[Piece]:
