@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
 from sysid_node.ros.adapters.attitude import attitude_of, other_axes
 from sysid_node.ros.adapters.base import (
     SEA_LEVEL_DENSITY,
-    Adapter,
     AirSample,
     ImuSample,
     JointSample,
-    Sample,
     Settings,
     header_ns,
     numbered,
 )
+from sysid_node.ros.adapters.five_topics import FiveTopics
 
 IMU = "/mavros/imu/data_raw"
 ATTITUDE = "/mavros/imu/data"
@@ -33,9 +31,10 @@ WRAP_NS = 2**32 * 1000
 PULSES = (400.0, 2600.0)
 
 
-class Mavros(Adapter):
+class Mavros(FiveTopics):
     """ArduPlane beside MAVROS 2."""
 
+    parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
         {
             IMU: "sensor_msgs/msg/Imu",
@@ -53,16 +52,6 @@ class Mavros(Adapter):
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
         self._last_imu_ns = 0
-
-    def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
-        """See ``Adapter``."""
-        return {
-            IMU: self._imu,
-            ATTITUDE: self._attitude,
-            PRESSURE: self._pressure,
-            AIRSPEED: self._air,
-            OUTPUTS: self._joints,
-        }
 
     def _imu(self, message: Any) -> ImuSample:
         """Of data_raw: in data the force is that of the message before, at the attitude's time."""

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
 from sysid_node.ros.adapters.attitude import attitude_of
 from sysid_node.ros.adapters.base import (
-    Adapter,
     AirSample,
     ImuSample,
     JointSample,
-    Sample,
     header_ns,
     numbered,
 )
+from sysid_node.ros.adapters.five_topics import FiveTopics
 
 IMU = "/imu/data"
 ATTITUDE = "/attitude"
@@ -25,9 +23,10 @@ AIRSPEED = "/airspeed"
 OUTPUTS = "/output_raw"
 
 
-class Rosflight(Adapter):
+class Rosflight(FiveTopics):
     """ROSflight 2, whose firmware streams OutputRaw, Airspeed and Barometer."""
 
+    parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
         {
             IMU: "sensor_msgs/msg/Imu",
@@ -41,16 +40,6 @@ class Rosflight(Adapter):
     example = "aileron=out1:0:0.35 elevator=out2:0:0.35 rudder=out3:0:0.35 throttle=out5:0:1"
     package = "rosflight_msgs"
     remedy = "build github.com/rosflight/rosflight_ros_pkgs, and source that workspace"
-
-    def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
-        """See ``Adapter``."""
-        return {
-            IMU: self._imu,
-            ATTITUDE: self._attitude,
-            PRESSURE: self._pressure,
-            AIRSPEED: self._air,
-            OUTPUTS: self._joints,
-        }
 
     def _imu(self, message: Any) -> ImuSample:
         """Its own orientation is an older attitude without a time; the stamped one is taken."""
