@@ -2,10 +2,11 @@
 
     OMP_NUM_THREADS=1 python bench/update.py [--bag bags/cdrw_multistep] [--aircraft cdrw] [--repeat 3]
 
-Every sample of the flight is taken in (kinematics, transform), and all derivatives are solved for with their variances;
-renewals (segments, colour of the residuals, watch for changes) fall in between, every second or so. ``estimate`` adds
-names, intervals and statuses, as published. The bare arithmetic is 14 signals at 48 lines accumulated, their Gram
-matrix and two least-squares solves with covariances. Both are timed by turns, a hundred samples at a time.
+Every sample of the flight is taken in (kinematics, transform), all derivatives are solved for with their variances, and
+each is judged; renewals (segments, colour of the residuals, watch for changes) fall in between, every second or so.
+``estimate`` solves and judges too, and adds intervals and names, as published. The bare arithmetic is 14 signals at 48
+lines accumulated, their Gram matrix and two least-squares solves with covariances. Both are timed by turns, a hundred
+samples at a time.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from sysid_node.flight.bag import read_streams
 from sysid_node.online import estimator
 from sysid_node.online.alignment import align_streams
 from sysid_node.online.estimates import estimate
+from sysid_node.online.judgement import judge
 from sysid_node.online.present import present
 from sysid_node.online.settings import METHODS, Settings
+from sysid_node.online.state import State
 
 Array = NDArray[np.float64]
 Bare = Callable[[float, Array], object]
@@ -100,27 +103,41 @@ def timed(work: Callable[[], object]) -> float:
     return (time.perf_counter_ns() - begin) / 1e3
 
 
+def step_by_step(state: State, moment: float, sample: list[float]) -> tuple[float, float, float]:
+    """What taking in one sample, solving, and judging take, us."""
+    begin = time.perf_counter_ns()
+    estimator.update(state, moment, sample)
+    updated = time.perf_counter_ns()
+    current, renewed = present(state), state.renewed
+    solved = time.perf_counter_ns()
+    if current is not None and renewed is not None:
+        judge(state, renewed, current, moment)
+    judged = time.perf_counter_ns()
+    return (updated - begin) / 1e3, (solved - updated) / 1e3, (judged - solved) / 1e3
+
+
 def measure(aircraft: Aircraft, bag: Path, method: str) -> dict[str, Array]:
     """Times in us of every sample, by what was done."""
     settings = Settings(method=method)
     aligned = align_streams(aircraft, read_streams(bag), settings.max_gap)
     state = estimator.init(aircraft, settings)
     bare, x = {"naive NumPy": naive(), "tuned NumPy": tuned()}, np.random.default_rng(1).normal(size=(TURN, SIGNALS))
-    costs: dict[str, list[float]] = {name: [] for name in (*bare, "update", "present", "estimate")}
+    costs: dict[str, list[float]] = {name: [] for name in (*bare, "update", "present", "judge", "estimate")}
     times, samples = aligned.time.tolist(), aligned.samples.tolist()
     for first in range(0, len(times), TURN):
         turn = range(first, min(first + TURN, len(times)))
         for name, step in bare.items():
             costs[name] += [timed(lambda i=i, step=step: step(times[i], x[i - first])) for i in turn]  # noqa: B023
-        for i in turn:
-            costs["update"].append(timed(lambda i=i: estimator.update(state, times[i], samples[i])))
-            costs["present"].append(timed(lambda: present(state)))
+        parts = zip(*(step_by_step(state, times[i], samples[i]) for i in turn), strict=True)
+        for name, part in zip(("update", "present", "judge"), parts, strict=True):
+            costs[name] += part
         costs["estimate"] += [timed(lambda: estimate(state)) for _ in turn]
     found = {name: np.array(values[WARM:]) for name, values in costs.items()}
     return {
         **found,
-        "update + present": found["update"] + found["present"],
-        "update + estimate": found["update"] + found["estimate"],
+        "update, present": found["update"] + found["present"],
+        "update, present, judge": found["update"] + found["present"] + found["judge"],
+        "update, estimate": found["update"] + found["estimate"],
     }
 
 

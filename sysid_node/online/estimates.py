@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import interval, judgement, signals
-from sysid_node.online.present import Present, offsets, present, present_at, with_beliefs
+from sysid_node.online import interval, signals, status
+from sysid_node.online.judgement import grounds_of, judge
+from sysid_node.online.present import Present, present, present_at
 from sysid_node.online.rows import DerivativeRows, FitRows
-from sysid_node.online.state import Grounds, State
+from sysid_node.online.state import Renewed, State
+from sysid_node.online.status import Codes
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
@@ -19,50 +22,56 @@ Array = NDArray[np.float64]
 
 def estimate(state: State, now: float | None = None) -> Estimates:
     """All derivatives of the aircraft's model with their intervals; ``now`` (s) tells how old the last sample is."""
-    last = state.transform.last
-    return estimates_of(state, present(state), [last], [last if now is None else now])[0]
+    return estimate_of(state, present(state), now)
+
+
+def estimate_of(state: State, current: Present | None, now: float | None = None) -> Estimates:
+    """The same from what was just solved for."""
+    time, renewed = state.transform.last, state.renewed
+    if current is None or renewed is None:
+        return Estimates(time, _nothing_known(state), {})
+    numbers, codes, explained = _told(state, renewed, current, time if now is None else now)
+    return _named(state, renewed, time, numbers, codes, explained)
 
 
 def estimates_at(
     state: State, lines: Sequence[Array], times: Sequence[float], nows: Sequence[float]
 ) -> list[Estimates]:
-    """The same at several ``times`` (s) since the last renewal, at which the transform was ``lines`` (2F + 1, T)."""
-    return estimates_of(state, present_at(state, lines, times), times, nows)
-
-
-def estimates_of(
-    state: State, current: Present | None, times: Sequence[float], nows: Sequence[float]
-) -> list[Estimates]:
-    """The same from what was solved for at ``times`` (s)."""
-    renewed = state.renewed
+    """The same at several ``times`` (s) since the last renewal, when the transform was ``lines`` (2F + 1, T)."""
+    current, renewed = present_at(state, np.array(lines), np.array(times)), state.renewed
     if current is None or renewed is None:
-        every = [f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors]
-        return [Estimates(time, {name: _unknown(state, name) for name in every}, {}) for time in times]
-    table = state.model.table
-    grounds = renewed.grounds = renewed.grounds or judgement.grounds(state, renewed)
-    theta, variance, K = current.solution.theta, current.variance, len(times)
-    if state.model.settings.use_prior:
-        theta, variance = with_beliefs(state, renewed, theta)
-    constants, constant_variances = offsets(state, renewed, current, theta)
-    values = np.concatenate([theta.reshape(K, -1), constants], axis=1).take(table.place, axis=1)
-    variances = np.concatenate([variance.reshape(K, -1), constant_variances], axis=1).take(table.place, axis=1)
-    variances = np.maximum(variances, 0.0)
-    errors = np.sqrt(variances)
-    below, above = interval.reach(grounds.squares * variances, renewed.bend)
-    bounded = np.where(np.isinf(above), np.inf, errors)
-    statuses = judgement.judge(state, renewed, grounds, current, values, bounded, nows)
-    numbers = np.stack([values, errors, values - below, values + above], axis=1)
-    names = table.names
-    if table.unformed:
-        missing = [_unknown(state, name) for name in table.unformed]
-        lacking = np.array([row[1:5] for row in missing]).T
-        numbers = np.concatenate([numbers, np.broadcast_to(lacking, (K, *lacking.shape))], axis=2)
-        names += table.unformed
-        statuses = [status + tuple(row.status for row in missing) for status in statuses]
-    return [
-        Estimates(time, DerivativeRows(names, *row), fit)
-        for time, *row, fit in zip(times, numbers, statuses, _fits(state, grounds, current), strict=True)
-    ]
+        return [Estimates(time, _nothing_known(state), {}) for time in times]
+    told = _told(state, renewed, current, np.array(nows))
+    return [_named(state, renewed, time, *one) for time, *one in zip(times, *told, strict=True)]
+
+
+def _told(state: State, renewed: Renewed, current: Present, now: Any) -> tuple[Array, Codes, Array]:
+    """(..., 4, D) values, standard errors, lower and upper ends, (..., D) statuses, and (..., C) R squared."""
+    codes = judge(state, renewed, current, now)
+    values, variances = current.values, current.variances
+    below, above = interval.reach(grounds_of(state, renewed).squares * variances, renewed.bend)
+    numbers = np.stack([values, np.sqrt(variances), values - below, values + above], axis=-2)
+    missing = len(state.model.table.unformed)
+    if missing:
+        lacking = np.repeat([[math.nan], [math.inf], [-math.inf], [math.inf]], missing, axis=1)
+        numbers = np.concatenate([numbers, np.broadcast_to(lacking, (*numbers.shape[:-1], missing))], axis=-1)
+        unknown = np.full((*codes.shape[:-1], missing), status.INERTIA, codes.dtype)
+        codes = np.concatenate([codes, unknown], axis=-1)
+    explained = 1.0 - current.solution.residual / np.maximum(current.solution.motion, 1e-300)
+    return numbers, codes, np.minimum(np.maximum(explained, 0.0), 1.0)
+
+
+def _named(state: State, renewed: Renewed, time: float, numbers: Array, codes: Codes, explained: Array) -> Estimates:
+    """The estimates of one moment, of which ``_told`` has told."""
+    table, words = state.model.table, state.model.vocabulary
+    fits = FitRows(state.plan.coefficients, explained, grounds_of(state, renewed).fits)
+    return Estimates(time, DerivativeRows(table.all_names, numbers, codes, words), fits)
+
+
+def _nothing_known(state: State) -> dict[str, DerivativeEstimate]:
+    """All derivatives before there is anything to solve."""
+    every = (f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors)
+    return {name: _unknown(state, name) for name in every}
 
 
 def _unknown(state: State, name: str) -> DerivativeEstimate:
@@ -72,11 +81,3 @@ def _unknown(state: State, name: str) -> DerivativeEstimate:
         column = max(state.incomplete, key=lambda column: state.incomplete[column])
         reason = f"{column} not measured"
     return DerivativeEstimate(name, math.nan, math.inf, -math.inf, math.inf, False, reason or "converging")
-
-
-def _fits(state: State, grounds: Grounds, current: Present) -> list[FitRows]:
-    """Quality of each coefficient's fit at each of the K moments."""
-    squares = current.gram.reshape(len(current.time), -1).take(state.plan.square, axis=1)
-    explained = 1.0 - current.solution.residual / np.maximum(squares, 1e-300)
-    shares = np.minimum(np.maximum(explained, 0.0), 1.0)
-    return [FitRows(state.plan.coefficients, row, grounds.fits) for row in shares]

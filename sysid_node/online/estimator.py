@@ -28,6 +28,7 @@ from sysid_node.online.renewal import begin_segment, reach, renew
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import NUISANCES, OUTPUTS, Layout
 from sysid_node.online.state import Model, State
+from sysid_node.online.status import vocabulary
 from sysid_node.online.table import table
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -58,6 +59,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         layout=layout,
         plan=plan,
         table=table(aircraft, plan, settings.valid_fraction),
+        vocabulary=vocabulary(aircraft, plan),
         spectrum=information.spectrum(grid.omega, memory),
         lowest=_lowest(len(aircraft.controls)),
         signals=signals.scalar_signals(aircraft),
@@ -170,5 +172,4 @@ def interrupt(state: State, time: float) -> None:
     if state.transform.last > state.segment_start:
         renew(state, last=True)
     state.watch.pieces.clear()
-    state.transform.last = time
-    begin_segment(state, transform.current(state.transform), time)
+    begin_segment(state, time)

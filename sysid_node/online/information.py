@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -103,16 +104,22 @@ def about_mean(transform: Array, model: Auxiliary | None) -> Array:
 
     Nuisances are kept. The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
     """
+    T = transform.shape[-1]
     share = transform[..., -1, :] / np.maximum(transform[..., -1, OFFSET, None], 1e-12)
     share[..., OFFSET : OFFSET + 3] = 0.0
-    *several, rows, T = transform.shape
-    lines = np.empty((*several, rows - 1, T + (0 if model is None else model.gains.shape[1])))
-    measured = lines[..., :T]
-    np.multiply(transform[..., :-1, OFFSET, None], share[..., None, :], out=measured)
-    np.subtract(transform[..., :-1, :], measured, out=measured)
+    unit = _unit(T, T + (0 if model is None else model.gains.shape[1]))
+    change = np.empty((*transform.shape[:-2], *unit.shape))
+    change[...] = unit
+    change[..., OFFSET, :T] -= share
+    lines: Array = transform[..., :-1, :] @ change  # z - k share, and room for the instruments
     if model is not None:
         fill_in(model, lines)
     return lines
+
+
+@cache
+def _unit(rows: int, columns: int) -> Array:
+    return np.eye(rows, columns)
 
 
 def project(lines: Array) -> Array:
@@ -167,7 +174,7 @@ def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
 def products(transform: Array, model: Auxiliary | None) -> Array:
     """(..., W, W) Gram matrices of transforms' (..., 2F + 1, T) clean lines, constant and drift projected out."""
     lines = about_mean(transform, model)
-    gram: Array = lines.swapaxes(-1, -2) @ lines
+    gram: Array = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
     border = gram[..., _N]
     gram -= border @ inverse2(border[..., _N, :]) @ border.swapaxes(-1, -2)
     return gram

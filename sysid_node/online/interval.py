@@ -33,6 +33,11 @@ class Bend(NamedTuple):
     curve: Array  # (D,) per unit squared
     counted: Array  # (D,) h^2 over t^2 se^2
 
+    def longest(self, squares: Array) -> Array:
+        """(D,) the largest squared standard errors whose intervals have an end, where ``squares`` (D,) are t^2."""
+        bent = squares * self.counted * self.curve
+        return np.divide(1.0 - 2.0 * ROUNDING, bent, out=np.full_like(bent, np.inf), where=bent > 0.0)
+
 
 def bend(
     plan: Plan,

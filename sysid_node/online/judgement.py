@@ -1,16 +1,21 @@
-"""Whether an estimate is to be believed, and what speaks against it."""
+"""Whether an estimate is to be believed, and what speaks against it.
+
+What changes with renewals only is weighed once for all samples until the next (``grounds``); what changes with every
+sample is decided for all estimates of all moments (...) at once (``judge``), as numbers (see ``status``).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import reconstruction, regression
+from sysid_node.online import reconstruction, regression, status
 from sysid_node.online.present import Present
-from sysid_node.online.regression import Plan, student_95
+from sysid_node.online.regression import student_95
 from sysid_node.online.state import Grounds, Renewed, State
+from sysid_node.online.status import Codes
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,127 +30,117 @@ NARROWEST = 1e-12  # share of an estimate under which its standard error is roun
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
-def grounds(state: State, renewed: Renewed) -> Grounds:
-    """What the judgement of all estimates rests on until the next renewal."""
+def grounds_of(state: State, renewed: Renewed) -> Grounds:
+    """What the judgement of all estimates rests on until the next renewal; weighed once."""
+    renewed.grounds = renewed.grounds or _weigh(state, renewed)
+    return renewed.grounds
+
+
+def _weigh(state: State, renewed: Renewed) -> Grounds:
+    """See ``grounds_of``."""
     table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
     c = table.coefficient
     start, _, stop = state.model.settings.frequencies
     # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
-    firm = (np.where(plan.mine > 0.0, renewed.hold.strength[:, None], np.inf) >= regression.STRONG).all(axis=0)
-    sound = ((freedom >= ENOUGH_FREEDOM) & firm & ~renewed.lost & ~renewed.doubted)[table.coefficient]
-    spoilt = renewed.timing.spoilt[table.unknown, table.coefficient] & ~table.offset
-    flaws = np.full(len(table.names), "", dtype=object)
-    if state.flow.active:
-        structure, at = state.model.aircraft.structure, state.piece_start
-        flaws[:] = [reconstruction.flaw(state.flow, at, n, structure[n.partition("_")[0]]) for n in table.names]
+    held = np.where(plan.mine > 0.0, renewed.hold.strength[:, None], np.inf).min(axis=0)
+    against, squares = _against(state, renewed), student_95(freedom)[c] ** 2
     cautions = np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])
-    caution = np.sqrt(np.maximum(cautions, 1.0))
+    caution, longest = np.maximum(cautions, 1.0), renewed.bend.longest(squares)
+    stds, samples = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density), round(renewed.total.samples)
     return Grounds(
-        sound=sound & ~spoilt & (flaws == ""),
-        spoilt=spoilt,
-        flaws=flaws,
-        squares=student_95(freedom)[c] ** 2,
-        allowed=table.allowed / caution,
-        relative=table.relative / caution if table.relative.any() else None,
-        floor=np.maximum(BURIED * renewed.total.bias.take(plan.columns * (plan.width + 1)), regression.TINY),
-        fits=list(
-            zip(
-                np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density).tolist(),
-                freedom.tolist(),
-                [round(renewed.total.samples)] * len(plan.coefficients),
-                strict=True,
-            )
-        ),
+        sound=(held >= regression.STRONG)[c] & (against == status.OK),
+        against=against,
+        squares=squares,
+        longest=longest,
+        allowed=np.minimum(table.allowed**2 / caution, longest),
+        relative=table.relative**2 / caution if table.relative.any() else None,
+        floor=np.maximum(BURIED * renewed.total.bias.take(plan.energy), regression.TINY),
+        fits=[(*both, samples) for both in zip(stds.tolist(), freedom.tolist(), strict=True)],
     )
 
 
-def judge(
-    state: State,
-    renewed: Renewed,
-    grounds: Grounds,
-    current: Present,
-    values: Array,
-    errors: Array,
-    nows: Sequence[float],
-) -> list[tuple[str, ...]]:
-    """Of K moments why each of the D estimates ``values`` (K, D) is not to be believed, or "ok"."""
-    table, plan = state.model.table, state.plan
-    flat = current.gram.reshape(len(values), -1)
-    motion = flat.take(plan.columns * (plan.width + 1), axis=1)
+def _against(state: State, renewed: Renewed) -> Codes:
+    """(D,) what speaks against each whatever the present says; what is found later counts more."""
+    table, words = state.model.table, state.model.vocabulary
+    c = table.coefficient
+    against = np.zeros(c.size, np.uint8)
+    spoilt = renewed.timing.spoilt[table.unknown, c] & ~table.offset
+    against[spoilt] = [words.code(f"{renewed.timing.blamed[i]} not on time") for i in c[spoilt].tolist()]
+    against[(renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
+    if not state.thrust_known:
+        against[table.needs_thrust] = status.THRUST
+    if state.flow.active:
+        structure, at = state.model.aircraft.structure, state.piece_start
+        for i, name in enumerate(table.names):
+            flaw = reconstruction.flaw(state.flow, at, name, structure[name.partition("_")[0]])
+            against[i] = words.code(flaw) if flaw else against[i]
+    against[renewed.doubted[c]] = status.CONTRADICTED
+    against[renewed.lost[c]] = status.OUTSIDE
+    return against
+
+
+def judge(state: State, renewed: Renewed, current: Present, now: Any) -> Codes:
+    """(..., D) statuses of the estimates ``current``, ``now`` (...) s."""
+    table, plan, grounds = state.model.table, state.plan, grounds_of(state, renewed)
+    gram = current.gram
+    motion = gram.reshape(*gram.shape[:-2], -1).take(plan.energy, axis=-1)
     inflation = current.diagonal * motion
     buried = motion < grounds.floor
     hidden = buried | (inflation > HOPELESS)
-    poor = _poor(plan, flat, current.solution.residual)
-    sizes = np.abs(values)
-    allowed = grounds.allowed if grounds.relative is None else np.maximum(grounds.allowed, grounds.relative * sizes)
-    good = (errors <= allowed) & grounds.sound & (errors > NARROWEST * sizes)
-    if hidden.any():
-        good &= ~(hidden.take(table.unknown, axis=1) & ~table.offset) & ~_lost_with(state, hidden)
-    if poor.any():
-        good &= ~poor.take(table.coefficient, axis=1)
-    if not state.thrust_known:
-        good &= ~table.needs_thrust
-    everywhere = [
-        _whole(state, *moment) for moment in zip(current.time.tolist(), nows, current.solution.usable, strict=True)
-    ]
-    if good.all() and not any(everywhere):
-        return [("ok",) * len(table.names)] * len(values)
-    reasons = _reasons(state, renewed, grounds, current, inflation, buried, poor[:, table.coefficient])
-    reasons[good] = "ok"
-    return [(w,) * len(table.names) if w else tuple(r) for w, r in zip(everywhere, reasons.tolist(), strict=True)]
+    poor = _poor(current)
+    good = _narrow(grounds, current) & grounds.sound
+    if np.count_nonzero(hidden):
+        good &= ~(hidden.take(table.unknown, axis=-1) & ~table.offset) & ~_lost_with(state, hidden)
+    if np.count_nonzero(poor):
+        good &= ~poor.take(table.coefficient, axis=-1)
+    codes = np.zeros(good.shape, np.uint8)
+    if np.count_nonzero(good) < good.size:
+        reasons = _reasons(state, grounds, current, inflation, buried, poor)
+        np.copyto(codes, reasons, where=~good)
+    changed, stale = current.time - state.changed_at < SETTLING, now - current.time > STALE
+    if np.count_nonzero(changed | stale):
+        codes[changed] = status.CHANGED
+        codes[stale] = status.STALE
+    return codes
 
 
-def _lost_with(state: State, hidden: Flags) -> Flags:
-    """(K, D) offsets that hold what a hidden slope (K, P) of their coefficient does."""
-    table = state.model.table
-    return np.asarray(((hidden @ state.plan.mine) > 0.0)[:, table.coefficient] & table.offset)
+def _narrow(grounds: Grounds, current: Present) -> Flags:
+    """(..., D) whether standard errors are small enough, and no rounding; and intervals have an end."""
+    squares, allowed = current.values * current.values, grounds.allowed
+    if grounds.relative is not None:
+        allowed = np.maximum(allowed, np.minimum(grounds.relative * squares, grounds.longest))
+    narrow: Flags = current.variances <= allowed
+    squares *= NARROWEST**2
+    narrow &= current.variances > squares
+    return narrow
 
 
-def _reasons(
-    state: State,
-    renewed: Renewed,
-    grounds: Grounds,
-    current: Present,
-    inflation: Array,
-    buried: Flags,
-    poor: Flags,
-) -> NDArray[np.object_]:
-    """(K, D) what speaks against each.
-
-    ``inflation`` (K, P) of its unknown's variance, a regressor ``buried`` (K, P) in noise, ``poor`` (K, D), and more.
-    """
-    table, c = state.model.table, state.model.table.coefficient
-    inflation, buried = inflation[:, table.unknown], buried[:, table.unknown] & ~table.offset
-    reasons = np.full(poor.shape, "converging", dtype=object)
-    # what is found later counts more
-    reasons[poor] = "outside model"
-    collinear = (inflation > COLLINEAR) & ~table.offset
-    if collinear.any():
-        rivals = regression.rivals(state.plan, current.solution)[:, table.unknown]
-        names = np.array([f"collinear with {name}" for name in state.plan.regressors], dtype=object)
-        reasons[collinear] = names[rivals[collinear]]
-    reasons[buried] = "not excited"
-    reasons[:, grounds.spoilt] = [f"{renewed.timing.blamed[i]} not on time" for i in c[grounds.spoilt].tolist()]
-    reasons[:, (renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = "converging"
-    if not state.thrust_known:
-        reasons[:, table.needs_thrust] = "thrust not measured"
-    reasons[:, grounds.flaws != ""] = grounds.flaws[grounds.flaws != ""]
-    reasons[:, renewed.doubted[c]] = "contradicted"
-    reasons[:, renewed.lost[c]] = "outside model"
-    return reasons
-
-
-def _poor(plan: Plan, flat: Array, residual: Array) -> Flags:
-    """(K, C) whether the model leaves most of a coefficient's motion unexplained: then its interval means nothing."""
-    motion = flat.take(plan.square, axis=1)
-    poor: Flags = (residual > POOR * motion) & (motion > regression.TINY)
+def _poor(current: Present) -> Flags:
+    """(..., C) whether the model leaves most of a coefficient's motion unexplained: its interval means nothing then."""
+    residual, motion = current.solution.residual, current.solution.motion
+    poor: Flags = residual > POOR * np.maximum(motion, regression.TINY)
     return poor
 
 
-def _whole(state: State, last: float, now: float, usable: bool) -> str:
-    """What holds of all estimates of one moment alike, if anything does."""
-    if now - last > STALE:
-        return "stale input"
-    if last - state.changed_at < SETTLING:
-        return "changed"
-    return "" if usable else "not excited"
+def _lost_with(state: State, hidden: Flags) -> Flags:
+    """(..., D) offsets that hold what a hidden slope (..., P) of their coefficient does."""
+    table = state.model.table
+    return np.asarray(((hidden @ state.plan.mine) > 0.0).take(table.coefficient, axis=-1) & table.offset)
+
+
+def _reasons(state: State, grounds: Grounds, current: Present, inflation: Array, buried: Flags, poor: Flags) -> Codes:
+    """(..., D) what speaks against each.
+
+    ``inflation`` (..., P) of its unknown's variance, a regressor ``buried`` (..., P) in noise, a ``poor`` (..., C) fit.
+    """
+    table, slope = state.model.table, ~state.model.table.offset
+    # what is found later counts more
+    reasons = np.where(poor.take(table.coefficient, axis=-1), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
+    collinear = (inflation.take(table.unknown, axis=-1) > COLLINEAR) & slope
+    if collinear.any():
+        rivals = regression.rivals(state.plan, current.solution).take(table.unknown, axis=-1)
+        reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
+    reasons[buried.take(table.unknown, axis=-1) & slope] = status.NOT_EXCITED
+    np.copyto(reasons, grounds.against, where=grounds.against != status.OK)
+    reasons[~current.solution.usable] = status.NOT_EXCITED
+    return reasons

@@ -28,17 +28,17 @@ class CoefficientGap(NamedTuple):
 def model_gap(state: State, current: Present | None) -> list[CoefficientGap]:
     """Gap of every coefficient whose equation can be formed, at the moment ``current``; empty before there is one."""
     renewed = state.renewed
-    if current is None or renewed is None or not current.solution.usable[0]:
+    if current is None or renewed is None or not current.solution.usable:
         return []
     plan, (values, precisions) = state.plan, state.model.believed
     start, _, stop = state.model.settings.frequencies
     per_energy = 2.0 * (stop - start) / max(float(renewed.total.traces.sum()), 1e-12)
-    gram, theta = current.gram[0], current.solution.theta[0]
+    gram, theta = current.gram, current.solution.theta
     v = regression.misfits(plan, values)
     energy = np.maximum(((gram @ v) * v).sum(axis=0), 0.0)
-    motion = gram.take(plan.square)
+    motion = current.solution.motion
     relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))
-    spread = np.sqrt(np.maximum(current.variance[0], 0.0) + _tolerances(precisions))
+    spread = np.sqrt(np.maximum(current.slopes, 0.0) + _tolerances(precisions))
     deviations = np.where(plan.mine > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()
     names = [f"{c}_{plan.regressors[i]}" for c, i in zip(plan.coefficients, worst, strict=True)]

@@ -1,10 +1,12 @@
-"""The least-squares solution with all samples so far, at one moment or at several since the last renewal."""
+"""The solution with all samples so far: every derivative and its variance, at one moment or at several.
+
+Several moments since the last renewal stand along an axis in front of all others (...); one moment has none.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from sysid_node.online import regression, transform
 from sysid_node.online.information import products
 from sysid_node.online.prior import weighed
-from sysid_node.online.regression import Solution
+from sysid_node.online.regression import Plan, Solution
 from sysid_node.online.signals import OFFSET
 from sysid_node.online.state import Renewed, State
 
@@ -21,65 +23,65 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Present:
-    """What is solved for at K moments: P unknowns, C coefficients, W signals."""
+    """What is solved for: D derivatives, P unknowns, C coefficients, W signals."""
 
-    time: Array  # (K,) s, of the last sample
-    solution: Solution  # of K moments
-    variance: Array  # (K, P, C) squared standard errors
-    gram: Array  # (K, W, W)
-    integrals: Array  # (K, T) of the present segment's transformed signals
-    diagonal: Array  # (K, P) size of the inverse's diagonal
+    time: Any  # (...) s, of the last sample
+    values: Array  # (..., D)
+    variances: Array  # (..., D) squared standard errors
+    solution: Solution
+    slopes: Array  # (..., P, C) squared standard errors of the solution, before beliefs are counted in
+    gram: Array  # (..., W, W)
+    diagonal: Array  # (..., P) size of the inverse's diagonal
 
 
 def present(state: State) -> Present | None:
     """Solve for the derivatives with every sample so far; None before the first half second of data."""
-    return present_at(state, [transform.current(state.transform)], [state.transform.last])
+    return present_at(state, transform.current(state.transform), state.transform.last)
 
 
-def present_at(state: State, lines: Sequence[Array], times: Sequence[float]) -> Present | None:
-    """The same at K ``times`` (s) since the last renewal, at which the transform was ``lines`` (2F + 1, T)."""
-    renewed, rate = state.renewed, state.model.spectrum.rate
+def present_at(state: State, lines: Array, time: Any) -> Present | None:
+    """The same at ``time`` (...) s since the last renewal, when the transform was ``lines`` (..., 2F + 1, T)."""
+    renewed, plan = state.renewed, state.plan
     if renewed is None:
         return None
-    part = np.array(lines)
-    if rate:
-        left = np.array([math.exp(0.5 * rate * (state.segment_start - time)) for time in times])
-        part -= state.segment * left[:, None, None]
-    else:
-        part -= state.segment
-    gram = products(part, state.model.auxiliary)
+    gram = products(lines, state.model.auxiliary)
     gram += renewed.base
     # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
-    energy, since = renewed.total.energy, renewed.time
-    growth = np.array([[[(energy + max(time - since, 0.0)) / max(energy, 1e-9)]] for time in times])
-    noise = renewed.compensation
-    solution = regression.solve(state.plan, gram, None if noise is None else noise * growth)
-    diagonal = np.abs(solution.inverse.diagonal(axis1=1, axis2=2))
-    variance = renewed.factors * solution.residual[:, None]
-    variance *= diagonal[:, :, None] / growth
-    return Present(np.array(times), solution, variance, gram, part[:, -1], diagonal)
+    energy, noise = renewed.total.energy, renewed.compensation
+    growth = (energy + (time - renewed.time)) / max(energy, 1e-9)
+    if lines.ndim > 2:
+        growth = growth[:, None, None]
+    solution = regression.solve(plan, gram, None if noise is None else noise * growth)
+    diagonal = np.abs(solution.inverse.diagonal(axis1=-2, axis2=-1))
+    slopes = renewed.factors * solution.residual[..., None, :]
+    slopes *= diagonal[..., :, None] / growth
+    theta, variances = solution.theta, slopes
+    if state.model.settings.use_prior:
+        theta, variances = _with_beliefs(state, renewed, theta)
+    P, C = plan.mine.shape
+    found = np.empty((*theta.shape[:-2], 2, P + 1, C))  # values and variances of slopes, and below them of offsets
+    found[..., 0, :P, :], found[..., 1, :P, :] = theta, variances
+    found[..., 0, P, :], found[..., 1, P, :] = _offsets(plan, renewed, lines[..., -1, :], theta)
+    table = found.reshape(*found.shape[:-2], -1).take(state.model.table.place, axis=-1)
+    return Present(time, table[..., 0, :], np.maximum(table[..., 1, :], 0.0), solution, slopes, gram, diagonal)
 
 
-def with_beliefs(state: State, renewed: Renewed, theta: Array) -> tuple[Array, Array]:
-    """(K, P, C) the solutions ``theta`` weighed with the aircraft file's derivatives, and their variances."""
-    several = [weighed(state.plan, one, renewed.uncertainty.covariance, *state.model.believed) for one in theta]
-    variances = [covariance.diagonal(axis1=1, axis2=2).T for _, covariance in several]
-    return np.array([values for values, _ in several]), np.array(variances)
+def _with_beliefs(state: State, renewed: Renewed, theta: Array) -> tuple[Array, Array]:
+    """(..., P, C) the solutions ``theta`` weighed with the aircraft file's derivatives, and their variances."""
+    values, covariance = weighed(state.plan, theta, renewed.uncertainty.covariance, *state.model.believed)
+    return values, covariance.diagonal(axis1=1, axis2=2).T
 
 
-def offsets(state: State, renewed: Renewed, current: Present, theta: Array) -> tuple[Array, Array]:
-    """(K, C) offsets and their variances, from the signals' integrals: k C_0 = y - sum k C_j x_j at zero frequency.
+def _offsets(plan: Plan, renewed: Renewed, integrals: Array, theta: Array) -> tuple[Array, Array]:
+    """(..., C) offsets and their variances, from the ``integrals`` (..., T) of the present segment's signals.
 
-    The slopes ``theta`` are (K, P, C).
+    At zero frequency k C_0 = y - sum k C_j x_j, with the slopes ``theta`` (..., P, C).
     """
-    plan = state.plan
-    past = renewed.total.integrals - (state.present.integrals if state.present is not None else 0.0)
-    integrals = past + current.integrals
-    weight = np.where(integrals[:, OFFSET] > 0.0, integrals[:, OFFSET], np.nan)[:, None]
-    x = integrals[:, plan.columns] / weight
-    values = integrals[:, plan.outputs] / weight - (x[:, None] @ theta)[:, 0]
-    covariance = renewed.uncertainty.covariance
-    P = plan.columns.size
-    spread = (covariance.reshape(-1, P) @ x[:, :, None]).reshape(len(x), -1, P) @ x[:, :, None]
-    variance = renewed.uncertainty.bands[:, 0] * (renewed.total.energy / weight**2) + spread[:, :, 0]
-    return values, np.where(np.isnan(variance), np.inf, variance)
+    integrals = renewed.integrals + integrals
+    weight = integrals[..., OFFSET, None]
+    means = integrals / weight
+    x = means.take(plan.columns, axis=-1)
+    values = means.take(plan.outputs, axis=-1) - (x[..., None, :] @ theta)[..., 0, :]
+    covariance, column = renewed.uncertainty.covariance, x[..., None, :, None]
+    spread = (x[..., None, None, :] @ (covariance @ column))[..., 0, 0]
+    return values, spread + renewed.trim_noise / (weight * weight)

@@ -49,9 +49,10 @@ class Plan:
     mine: Array  # (P, C) 1 where the unknown belongs to the coefficient
     width: int  # W
     # flat indices into the Gram matrix; transposed, so that LAPACK takes what is gathered as it lies
-    entries: Index = field(init=False)  # (2, P + C, P) of A'A above A'y, and of Z'A above Z'y; (1, ...) where Z is A
+    entries: Index = field(init=False)  # (2, P + C, P) of A'A above A'y, and of Z'A above Z'y
     square: Index = field(init=False)  # (C,) of y'y
-    counted: Array = field(init=False)  # (P + C, P) 1 where the entry lies in a block
+    energy: Index = field(init=False)  # (P,) of x'x
+    counted: Array = field(init=False)  # (2, P + C, P) 1 where the entry lies in a block, of A'y 2: see ``solve``
     unit: Array = field(init=False)  # (P, P)
     known: Array = field(init=False)  # (P + C, P) the unit matrix, and room for what is known
     instrumented: NDArray[np.bool_] = field(init=False)  # (C,) whether any of its regressors has an instrument
@@ -61,10 +62,12 @@ class Plan:
     def __post_init__(self) -> None:
         both = np.concatenate([self.columns, self.outputs])[:, None]
         plain = bool((self.columns == self.instruments).all())
-        sources = [self.columns] if plain else [self.columns, self.instruments]
+        sources = self.columns, self.instruments
         object.__setattr__(self, "entries", np.stack([both + rows * self.width for rows in sources]))
         object.__setattr__(self, "square", self.outputs * (self.width + 1))
-        object.__setattr__(self, "counted", np.vstack([self.same, self.mine.T]))
+        object.__setattr__(self, "energy", self.columns * (self.width + 1))
+        counted = [np.vstack([self.same, times * self.mine.T]) for times in (2.0, 1.0)]
+        object.__setattr__(self, "counted", np.stack(counted))
         object.__setattr__(self, "unit", np.eye(self.columns.size))
         object.__setattr__(self, "known", np.eye(both.size, self.columns.size))
         object.__setattr__(self, "instrumented", (self.mine.T @ (self.columns != self.instruments)) > 0.0)
@@ -120,6 +123,7 @@ class Solution:
     theta: Array  # (P, C), zero where an unknown does not belong
     inverse: Array  # (P, P) of Z'A (of A'A in least squares)
     residual: Array  # (C,) sum of squares
+    motion: Array  # (C,) sum of squares of what is to be explained
     usable: NDArray[np.bool_]  # ()
 
 
@@ -132,7 +136,7 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     flat = gram.reshape(*several, gram.shape[-1] ** 2)
     gathered = flat.take(plan.entries, axis=-1)
     gathered *= plan.counted
-    normal, cross = gathered[..., 0, :, :], gathered[..., -1, :, :]
+    normal, cross = gathered[..., 0, :, :], gathered[..., 1, :, :]
     if bias is not None:
         cross = cross - bias
     if several:
@@ -141,19 +145,18 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
         solved, fine = _factorised(plan, cross)
         usable = np.array(fine)
     theta = solved[..., P:]
-    # |y - A theta|^2, with the noise in it
-    misfit = theta.swapaxes(-1, -2) @ normal[..., :P, :]
+    # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
+    row = theta.swapaxes(-1, -2)
+    misfit = row @ normal[..., :P, :]
     misfit -= normal[..., P:, :]
-    misfit -= normal[..., P:, :]
-    misfit *= theta.swapaxes(-1, -2)
-    squares = flat.take(plan.square, axis=-1)
-    residual = np.maximum(squares + misfit.sum(axis=-1), ROUNDING * squares)
-    return Solution(theta, solved[..., :P], residual, usable)
+    motion = flat.take(plan.square, axis=-1)
+    residual: Array = np.maximum(motion + np.vecdot(misfit, row), ROUNDING * motion)
+    return Solution(theta, solved[..., :P], residual, motion, usable)
 
 
 def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """``_factorised`` of each of K moments."""
-    solved, usable = np.empty((len(cross), cross.shape[2], cross.shape[1])), np.empty(len(cross), dtype=bool)
+    """``_factorised`` of each of K moments, each laid out in memory as one alone is: equal bits need equal strides."""
+    solved, usable = np.empty(cross.shape).swapaxes(-1, -2), np.empty(len(cross), dtype=bool)
     for k, one in enumerate(cross):
         solved[k], usable[k] = _factorised(plan, one)
     return solved, usable
@@ -185,8 +188,7 @@ def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
 
 def bias_of(plan: Plan, bias: Array) -> Array:
     """(P + C, P) the entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts."""
-    entries: Array = bias.take(plan.entries[-1])
-    return entries * plan.counted
+    return np.asarray(bias.take(plan.entries[1]) * plan.counted[1])
 
 
 def misfits(plan: Plan, theta: Array) -> Array:

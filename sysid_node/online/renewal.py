@@ -56,9 +56,9 @@ def renew(state: State, last: bool = False) -> None:
         _look_for_changes(state, lines)
     if last:
         finish_segment(state)
-        begin_segment(state, lines, time)
+        begin_segment(state, time)
     else:
-        _begin_piece(state, lines, time)
+        _begin_piece(state)
 
 
 def reach(time: Any, step: Any) -> Any:
@@ -72,16 +72,18 @@ def _is_due(state: State) -> bool:
     return renewed is None or state.pieces - renewed.pieces >= 1 + int(renewed.total.energy / SOON)
 
 
-def begin_segment(state: State, lines: Array, time: float) -> None:
-    """Begin a segment and a piece of the watch at ``time`` (s), where the transform is ``lines``."""
-    state.segment, state.segment_start, state.samples, state.intervals = lines, time, 0, 0.0
+def begin_segment(state: State, time: float) -> None:
+    """Begin a segment, of which alone the transform is, and a piece of the watch at ``time`` (s)."""
+    transform.restart(state.transform, time)
+    state.segment_start, state.samples, state.intervals = time, 0, 0.0
     state.uneven, state.weighed_until = Unevenness(), time
     state.recent.clear()
-    _begin_piece(state, lines, time)
+    _begin_piece(state)
 
 
-def _begin_piece(state: State, lines: Array, time: float) -> None:
-    state.piece, state.piece_start, state.renew_at = lines, time, time + PIECE
+def _begin_piece(state: State) -> None:
+    time = state.transform.last
+    state.piece, state.piece_start, state.renew_at = transform.current(state.transform), time, time + PIECE
 
 
 def _fading(state: State, since: float) -> float:
@@ -119,8 +121,7 @@ def _measure_segment(state: State, lines: Array) -> Information:
     """What the present segment says up to now."""
     model = state.model
     begin, end = state.segment_start, state.transform.last
-    part = lines - state.segment * _fading(state, begin)
-    info = information.measure(part, model.auxiliary, model.spectrum, begin, end)
+    info = information.measure(lines, model.auxiliary, model.spectrum, begin, end)
     samples = max(state.samples, 1)
     mean = info.integrals / information.window_energy(end - begin, 0.5 * model.spectrum.rate)
     per_line_second = noise.gram_bias(
@@ -175,6 +176,8 @@ def _solve_all(state: State, segment: Information) -> None:
         uncertainty=spread,
         compensation=compensation,
         base=past.grams.sum(axis=0),
+        integrals=past.integrals,
+        trim_noise=spread.bands[:, 0] * total.energy,
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
         timing=timing,
         hold=hold,
@@ -250,17 +253,18 @@ def _begin_anew(state: State, lines: Array, since: float) -> None:
     now = state.transform.last
     _weigh_recent(state)
     kept = [piece * _fading(state, start + PIECE) for start, piece in state.watch.pieces if start >= since - 1e-6]
-    then = lines - np.sum(kept, axis=0)
-    _learn_before(state, then / _fading(state, since), since)
+    before = lines - np.sum(kept, axis=0)
+    _learn_before(state, before / _fading(state, since), since)
     # what is counted of the present segment is taken as even over its time
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
     state.uneven = state.uneven * share
     state.past = information.nothing(state.model.layout)
     state.inside.clear()
-    state.segment, state.segment_start = then, since
+    state.segment_start = since
+    transform.take_out(state.transform, before)
     state.watch = Watch()
-    _solve_all(state, _measure_segment(state, lines))
+    _solve_all(state, _measure_segment(state, transform.current(state.transform)))
 
 
 def _learn_before(state: State, lines: Array, end: float) -> None:
@@ -268,8 +272,7 @@ def _learn_before(state: State, lines: Array, end: float) -> None:
     begin, model = state.segment_start, state.model
     if end - begin < PIECE:
         return
-    part = lines - state.segment * math.exp(0.5 * model.spectrum.rate * (begin - end))
-    learn(state.experiences, information.measure(part, model.auxiliary, model.spectrum, begin, end), end)
+    learn(state.experiences, information.measure(lines, model.auxiliary, model.spectrum, begin, end), end)
 
 
 def finish_segment(state: State) -> None:
@@ -280,5 +283,5 @@ def finish_segment(state: State) -> None:
         change.compare(state.model.plan, state.watch, state.experiences, _memory(state))
         if state.model.settings.window:
             state.inside.append((state.transform.last, state.present))
-        state.renewed.base = state.past.grams.sum(axis=0)
+        state.renewed.base, state.renewed.integrals = state.past.grams.sum(axis=0), state.past.integrals
     state.present = None

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.online.status import OK, Codes, Vocabulary
 from sysid_node.online.types import DerivativeEstimate, FitQuality
 
 Array = NDArray[np.float64]
@@ -54,13 +55,16 @@ class _Rows(Mapping[str, T]):
 
 
 class DerivativeRows(_Rows[DerivativeEstimate]):
-    """D derivatives: ``numbers`` (4, D) are value, standard error, lower and upper end of the interval."""
+    """D derivatives: ``numbers`` (4, D) are value, standard error, lower and upper end of the interval.
 
-    __slots__ = ("numbers", "statuses")
+    ``codes`` (D,) are their statuses in the words of ``vocabulary``.
+    """
 
-    def __init__(self, names: tuple[str, ...], numbers: Array, statuses: tuple[str, ...]) -> None:
+    __slots__ = ("codes", "numbers", "vocabulary")
+
+    def __init__(self, names: tuple[str, ...], numbers: Array, codes: Codes, vocabulary: Vocabulary) -> None:
         super().__init__(names)
-        self.numbers, self.statuses = numbers, statuses
+        self.numbers, self.codes, self.vocabulary = numbers, codes, vocabulary
 
     def _made(self) -> Iterator[DerivativeEstimate]:
         return map(DerivativeEstimate, self.names, *self.numbers.tolist(), self.valid, self.statuses)
@@ -68,7 +72,12 @@ class DerivativeRows(_Rows[DerivativeEstimate]):
     @property
     def valid(self) -> list[bool]:
         """(D,) whether each is to be believed."""
-        return [status == "ok" for status in self.statuses]
+        return [code == OK for code in self.codes.tolist()]
+
+    @property
+    def statuses(self) -> tuple[str, ...]:
+        """(D,) statuses in words."""
+        return self.vocabulary.texts(self.codes)
 
 
 class FitRows(_Rows[FitQuality]):

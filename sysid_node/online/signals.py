@@ -65,13 +65,13 @@ class Layout:
         """Number of columns that are transformed; the instruments, behind them, are made of their lines."""
         return self.width - len(self.instrumented)
 
-    @property
+    @cached_property
     def deflections(self) -> slice:
         """Columns of the controls."""
         end = OUTPUTS + len(NUISANCES) + len(self.regressors)
         return slice(end - len(self.timed), end)
 
-    @property
+    @cached_property
     def rates(self) -> slice:
         """Columns of the controls' rates, in the same order."""
         return slice(self.deflections.stop, self.deflections.stop + len(self.timed))

@@ -19,6 +19,7 @@ from sysid_node.online.reconstruction import Reconstruction
 from sysid_node.online.regression import Hold, Plan, Solution, Uncertainty
 from sysid_node.online.settings import Settings
 from sysid_node.online.signals import Layout, MomentumGain, ScalarSignals
+from sysid_node.online.status import Codes, Vocabulary
 from sysid_node.online.table import Table
 from sysid_node.online.timing import Timing
 from sysid_node.online.transform import Transform
@@ -36,6 +37,7 @@ class Model:
     layout: Layout
     plan: Plan
     table: Table
+    vocabulary: Vocabulary
     spectrum: Spectrum
     lowest: tuple[float, ...]  # what each value of a sample must lie above
     signals: ScalarSignals
@@ -50,12 +52,12 @@ class Model:
 class Grounds:
     """What the judgement of the D estimates rests on between renewals."""
 
-    sound: NDArray[np.bool_]  # (D,) nothing speaks against it but its own error
-    spoilt: NDArray[np.bool_]  # (D,) by a control that is not on time
-    flaws: NDArray[np.object_]  # (D,) what the lack of a flow angle's sensor takes away, "" for nothing
+    sound: NDArray[np.bool_]  # (D,) nothing speaks against it but what the present says
+    against: Codes  # (D,) status of those against which something else speaks, 0 where nothing does
     squares: Array  # (D,) of half of Student's interval over a standard error
-    allowed: Array  # (D,) the largest standard error of a valid estimate
-    relative: Array | None  # (D,) ... and its largest share of the estimate, where there is one
+    longest: Array  # (D,) the largest squared standard error of an interval that has an end
+    allowed: Array  # (D,) the largest squared standard error of a valid estimate
+    relative: Array | None  # (D,) ... as a share of the estimate's square, where that may be larger
     floor: Array  # (P,) energy under which a regressor is buried in noise
     fits: list[tuple[float, float, int]]  # by coefficient: what ``FitQuality`` says besides R squared
 
@@ -72,6 +74,8 @@ class Renewed:
     uncertainty: Uncertainty
     compensation: Array | None  # noise's part of the normal equations, see ``regression.bias_of``
     base: Array  # (W, W) Gram matrix of the finished segments
+    integrals: Array  # (T,) of the finished segments' signals
+    trim_noise: Array  # (C,) squared error of the coefficients' integrals
     factors: Array  # (P, C) squared standard error over (P_jj residual)
     timing: Timing  # whether the controls are felt when they are measured
     hold: Hold  # of the instruments on the regressors
@@ -87,7 +91,7 @@ class State:
     """All that the estimator remembers. Times in s."""
 
     model: Model
-    transform: Transform
+    transform: Transform  # of the present segment
     plan: Plan  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
     flow: Reconstruction  # of the flow angles that are not measured
@@ -95,7 +99,6 @@ class State:
     inside: deque[tuple[float, Information]] = field(
         default_factory=deque
     )  # end and content of those inside the window
-    segment: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the segment's start
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan

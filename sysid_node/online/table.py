@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,11 @@ class Table:
     ]  # (D,) ... and its largest share of the estimate, where nothing is believed of the size
     needs_thrust: NDArray[np.bool_]  # (D,) meaningless without a measured thrust
     unformed: tuple[str, ...]  # derivatives whose equation cannot be formed
+
+    @cached_property
+    def all_names(self) -> tuple[str, ...]:
+        """Of the D derivatives, and behind them of those whose equation cannot be formed."""
+        return self.names + self.unformed
 
 
 def table(aircraft: Aircraft, plan: Plan, valid_fraction: float) -> Table:

@@ -82,17 +82,16 @@ def lines(start_hz: float, step_hz: float, stop_hz: float) -> Lines:
 def weights(grid: Lines, middle: float, step: float, out: Array) -> None:
     """Weights of an interval's area and slant into ``out`` (2, rows); ``middle`` and ``step`` in s."""
     square, P = step * step, grid.padded.size
-    phase = grid.padded * middle
-    wave = np.empty((2, 2 * P))
-    wave[0, :P] = wave[1, P:] = np.cos(phase)
-    wave[0, P:] = wave[1, :P] = np.sin(phase)
+    phase, waves = grid.padded * middle, out[:, :-1]
+    waves[0, :P] = waves[1, P:] = np.cos(phase)
+    waves[0, P:] = waves[1, :P] = np.sin(phase)
     gains = grid.series[2] * square
     gains += grid.series[1]
     gains *= square
     gains += grid.series[0]
     if step > grid.longest:
         gains = _exact_gains(grid, step)
-    np.multiply(wave, gains, out=out[:, :-1])
+    waves *= gains
 
 
 def weights_of_many(grid: Lines, middles: Array, steps: Array) -> Array:
@@ -208,6 +207,18 @@ def _unfinished(state: Transform) -> Array:
 def _finish_block(state: Transform) -> None:
     state.done += _unfinished(state)
     state.count = 0
+
+
+def restart(state: Transform, time: float) -> None:
+    """Forget all; the transform goes on at ``time`` (s)."""
+    state.done[:], state.count, state.last = 0.0, 0, time
+
+
+def take_out(state: Transform, part: Array) -> None:
+    """Forget a ``part`` (2F + 1, width) of the transform up to the last sample, such as all up to some time ago."""
+    counted = np.delete(np.arange(state.grid.rows), state.grid.padding)
+    growth = math.exp((state.last - state.base) / (2.0 * state.memory)) if math.isfinite(state.memory) else 1.0
+    state.done[counted] -= growth * part
 
 
 def decay(state: Transform, time: float) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flat
 from sysid_node.online import estimator, intake, schedule
-from sysid_node.online.estimates import estimates_of
+from sysid_node.online.estimates import estimate_of
 from sysid_node.online.model_gap import CoefficientGap, model_gap
 from sysid_node.online.present import Present, present
 from sysid_node.online.settings import Settings
@@ -58,7 +58,7 @@ class Session:
         last = self.schedule.previous
         assert last is not None
         current = present(self.state)
-        estimates = estimates_of(self.state, current, [self.state.transform.last], [last + silence])[0]
+        estimates = estimate_of(self.state, current, last + silence)
         return Due(intake.stamp_of(self.intake, last), estimates, current)
 
     def gap(self, due: Due) -> Sequence[CoefficientGap]:

@@ -93,6 +93,14 @@ def test_what_a_change_leaves_behind_is_forgotten() -> None:
     assert watched["Cl_da"].value == pytest.approx(TRUTH["Cl_da"], rel=0.1)
 
 
+def test_a_memory_that_fades_forgets_a_change_as_well() -> None:
+    """Three seconds after the elevator's loss the lines hold the new aircraft alone: one model explains them."""
+    after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
+    time, flights = fly(AIRCRAFT, multisteps(33.0, RATE), RATE, 1, seed=5, after=after)
+    fading = Settings(method="sls_rft", forgetting_time=10.0)
+    assert run(AIRCRAFT, fading, time, flights[0], time[-1:])[0].fits["Cm"].r_squared > 0.97
+
+
 @pytest.mark.parametrize("gusts", [0.0, 1.5])
 def test_no_change_is_announced_in_unchanged_flight(gusts: float) -> None:
     """Three flights of two minutes, autopilot in the loop; the bench over hours stands apart."""

@@ -29,7 +29,7 @@ LINES = 2 * SPECTRUM.omega.size
 def reference(theta: Array, covariance: Array, density: float = 1.0, freedom: float = 50.0) -> Reference:
     """Estimates of one density in all bands."""
     C, P = PLAN.outputs.size, PLAN.columns.size
-    solution = Solution(theta, np.eye(P), np.ones(C), np.array(True))
+    solution = Solution(theta, np.eye(P), np.ones(C), np.ones(C), np.array(True))
     bands = np.full((C, BANDS), density)
     return Reference(0.0, PLAN, solution, Uncertainty(covariance, bands[:, 0], bands, np.full(C, freedom)))
 

@@ -89,7 +89,7 @@ def test_between_renewals_estimates_use_every_sample(flown: tuple[Array, Array],
     now = present(state)
     assert now is not None
     assert state.renewed is not None
-    np.testing.assert_allclose(now.solution.theta[0], state.renewed.solution.theta, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(now.solution.theta, state.renewed.solution.theta, rtol=1e-6, atol=1e-9)
 
 
 def test_nothing_is_known_before_half_a_second_of_data() -> None:

@@ -46,7 +46,7 @@ def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -
 def test_the_sensors_part_of_a_residual_is_their_noise() -> None:
     """The gyro's noise differentiated, and the accelerometer's, against noise passed through the coefficients."""
     plan = regression.plan({"CL": ("alpha",), "Cm": ("alpha",)}, signals := layout(AIRCRAFT, ()))
-    still = Solution(np.zeros((1, 2)), np.zeros((1, 1)), np.zeros(2), np.array(True))
+    still = Solution(np.zeros((1, 2)), np.zeros((1, 1)), np.zeros(2), np.zeros(2), np.array(True))
     omega, step = np.array([3.0, 4.0, 5.0]), 0.01
     nothing = np.zeros((signals.width, signals.width))
     lift, pitch = exogeneity.sensed(AIRCRAFT, plan, still, nothing, Unevenness(), step, omega)

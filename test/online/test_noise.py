@@ -93,7 +93,7 @@ def test_all_that_the_residual_holds_is_allowed() -> None:
     bias = np.zeros((layout.width, layout.width))
     p = layout.column("p")
     bias[p, p] = 3.0
-    solution = regression.Solution(np.array([[2.0]]), np.eye(1), np.ones(1), True)
+    solution = regression.Solution(np.array([[2.0]]), np.eye(1), np.ones(1), np.ones(1), True)
     np.testing.assert_allclose(noise.allowed(plan, solution, np.array([12.0]), bias), 1.0)
     share = noise.allowed(plan, solution, np.array([4.0]), bias)
     assert share[p] == pytest.approx(np.sqrt(4.0 / 12.0))

@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 
 from sysid_node.online.rows import DerivativeRows, FitRows
+from sysid_node.online.status import NOT_EXCITED, OK, WORDS, Vocabulary
 from sysid_node.online.types import DerivativeEstimate, FitQuality
 
 NUMBERS = np.array([[-1.0, 0.5], [0.1, np.inf], [-1.2, -np.inf], [-0.8, np.inf]])
@@ -15,7 +16,8 @@ ROWS = {
 
 
 def rows() -> DerivativeRows:
-    return DerivativeRows(("Cm_q", "Cm_de"), NUMBERS, ("ok", "not excited"))
+    codes = np.array([OK, NOT_EXCITED], np.uint8)
+    return DerivativeRows(("Cm_q", "Cm_de"), NUMBERS, codes, Vocabulary(WORDS, len(WORDS)))
 
 
 def test_are_the_mapping_that_a_dictionary_of_them_is():

@@ -118,7 +118,8 @@ def test_repeated_and_too_early_times() -> None:
     assert_same(AIRCRAFT, Settings(), time, samples, np.maximum.accumulate(time)[order])
 
 
-def test_an_abrupt_change() -> None:
+@pytest.mark.parametrize("memory", [{}, {"forgetting_time": 8.0}])
+def test_an_abrupt_change(memory: dict[str, float]) -> None:
     time, samples = flight(3)
     rows = time >= 8.0
     samples[rows] = exact_flight(
@@ -129,7 +130,7 @@ def test_an_abrupt_change() -> None:
         time[rows],
         3,
     )
-    assert_same(AIRCRAFT, Settings(), time, samples, np.arange(5.0, SECONDS, 0.25))
+    assert_same(AIRCRAFT, Settings(**memory), time, samples, np.arange(5.0, SECONDS, 0.25))
 
 
 def test_chunks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -178,3 +178,29 @@ def test_phases_are_right_after_ten_hours() -> None:
     mean, half = 0.5 * (x[1:] + x[:-1])[:, 0], 0.5 * np.diff(x[:, 0])
     direct = (h * np.exp(-1j * phase) * (mean * gain - 1j * half * slope)).sum(axis=1)
     assert abs(found - direct).max() < 1e-9 * abs(direct).max()
+
+
+@pytest.mark.parametrize("memory", [math.inf, 2.0])
+@pytest.mark.parametrize("cut", [BLOCK - 3, 2 * BLOCK + 5])
+def test_what_is_taken_out_leaves_what_came_after(memory: float, cut: int) -> None:
+    """All up to some time, as it has faded since: what is left is the transform of the rest."""
+    time = irregular(4 * BLOCK)
+    signals = np.random.default_rng(8).normal(size=(time.size, 3))
+    whole = fed(GRID, time, signals, memory)
+    before = transform.current(fed(GRID, time[: cut + 1], signals[: cut + 1], memory))
+    transform.take_out(whole, before * math.exp((time[cut] - time[-1]) / (2.0 * memory)))
+    after = transform.current(fed(GRID, time[cut:], signals[cut:], memory))
+    np.testing.assert_allclose(transform.current(whole), after, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("memory", [math.inf, 2.0])
+def test_after_a_restart_nothing_is_left_of_what_was_before(memory: float) -> None:
+    time = irregular(3 * BLOCK)
+    signals = np.random.default_rng(9).normal(size=(time.size, 3))
+    again = fed(GRID, time[:20], signals[:20], memory)
+    transform.restart(again, float(time[20]))
+    for (begin, end), (one, other) in zip(pairwise(time[20:].tolist()), pairwise(signals[20:]), strict=True):
+        step = end - begin
+        transform.add(again, begin, end, 0.5 * step * (one + other), 0.5 * step**2 * (other - one))
+    expected = transform.current(fed(GRID, time[20:], signals[20:], memory))
+    np.testing.assert_allclose(transform.current(again), expected, rtol=1e-12, atol=1e-14)

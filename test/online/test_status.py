@@ -1,0 +1,85 @@
+"""Statuses as numbers and as words, and what is decided of them at every sample."""
+
+import numpy as np
+import pytest
+from plant import exact_flight, fly, made_aircraft, multisteps
+
+from sysid_node.online import estimator, regression, signals, status
+from sysid_node.online.estimates import estimate, estimate_of
+from sysid_node.online.judgement import SETTLING, STALE, judge
+from sysid_node.online.present import present
+from sysid_node.online.settings import METHODS, Settings
+from sysid_node.online.state import State
+from sysid_node.online.status import vocabulary
+
+AIRCRAFT = made_aircraft()
+PLAN = regression.plan(AIRCRAFT.structure, signals.layout(AIRCRAFT))
+
+
+def flown(seconds: float, method: str = "iv_rft") -> State:
+    """The state after 3-2-1-1s in light turbulence."""
+    time, flights = fly(AIRCRAFT, multisteps(seconds, 100.0), gusts=0.5, closed_loop=False)
+    state = estimator.init(AIRCRAFT, Settings(method=method))
+    for t, sample in zip(time.tolist(), flights[0].tolist(), strict=True):
+        estimator.update(state, t, sample)
+    return state
+
+
+def test_every_number_has_its_word() -> None:
+    words = vocabulary(AIRCRAFT, PLAN)
+    assert words.words[status.OK] == "ok"
+    assert words.words[status.INERTIA] == "inertia unknown"
+    assert words.words[words.collinear + PLAN.regressors.index("beta")] == "collinear with beta"
+    assert words.code("dr not on time") == len(words.words) - 1
+    assert len(words.words) < 256, "they are kept in bytes"
+    codes = np.array([status.STALE, status.OK], np.uint8)
+    assert words.texts(codes) == ("stale input", "ok")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seconds", [3.0, 8.0, 25.0])
+def test_what_is_decided_at_a_sample_is_what_is_published_of_it(method: str, seconds: float) -> None:
+    state = flown(seconds, method)
+    current, renewed = present(state), state.renewed
+    assert current is not None and renewed is not None
+    codes = judge(state, renewed, current, state.transform.last)
+    told = estimate(state).derivatives
+    assert state.model.vocabulary.texts(codes) == tuple(d.status for d in told.values())
+    assert [code == status.OK for code in codes.tolist()] == [d.valid for d in told.values()]
+    np.testing.assert_array_equal(current.values, [d.value for d in told.values()])
+    np.testing.assert_array_equal(np.sqrt(current.variances), [d.standard_error for d in told.values()])
+
+
+def test_what_holds_of_a_moment_holds_of_all_estimates() -> None:
+    state = flown(12.0)
+    current, renewed, last = present(state), state.renewed, state.transform.last
+    assert current is not None and renewed is not None
+    assert set(judge(state, renewed, current, last + 1.01 * STALE)) == {status.STALE}
+    state.changed_at = last - 0.99 * SETTLING
+    assert set(judge(state, renewed, current, last)) == {status.CHANGED}
+
+
+def test_intervals_without_an_end_are_not_valid() -> None:
+    """However small the standard error is said to be that is allowed."""
+    state = flown(25.0)
+    current, renewed = present(state), state.renewed
+    assert current is not None and renewed is not None
+    good = judge(state, renewed, current, state.transform.last) == status.OK
+    assert good.any()
+    renewed.bend = renewed.bend._replace(curve=np.full(good.shape, 1e12))
+    renewed.grounds = None
+    assert not (judge(state, renewed, current, state.transform.last) == status.OK).any()
+    assert all(np.isinf(d.upper) for d in estimate_of(state, current).derivatives.values())
+
+
+def test_where_equations_cannot_be_solved_nothing_is_excited() -> None:
+    """Nothing moves at all: no line has any energy."""
+    time = np.arange(0.0, 3.0, 0.01)
+    still = np.tile(exact_flight(AIRCRAFT, time[:2])[:1], (time.size, 1))
+    state = estimator.init(AIRCRAFT, Settings(method="sls_rft"))
+    for t, sample in zip(time.tolist(), still.tolist(), strict=True):
+        estimator.update(state, t, sample)
+    current, renewed = present(state), state.renewed
+    assert current is not None and renewed is not None
+    current.solution.usable = np.array(False)
+    assert set(judge(state, renewed, current, state.transform.last)) == {status.NOT_EXCITED}
