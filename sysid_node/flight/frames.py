@@ -41,6 +41,17 @@ def euler_from_quaternion(quaternion: Array, frame: BodyFrame) -> Array:
     return np.column_stack([phi, theta, psi])
 
 
+def tilt_from_quaternion(quaternion: tuple[float, float, float, float], frame: BodyFrame) -> tuple[float, float]:
+    """Roll and pitch of ``euler_from_quaternion`` of one quaternion, without arrays: for every message in flight."""
+    length = math.hypot(*quaternion)
+    if not abs(length - 1.0) < 0.01:
+        return math.nan, math.nan
+    x, y, z, w = (part / length for part in quaternion)
+    phi = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    theta = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+    return phi, -theta if frame == "flu" else theta
+
+
 def quaternion_from_euler(euler: Array, frame: BodyFrame) -> Array:
     """Quaternions x y z w (N, 4) of Euler angles phi theta psi (N, 3) rad: the way back."""
     phi, theta, psi = euler.T / 2.0

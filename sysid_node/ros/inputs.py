@@ -7,10 +7,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from sysid_node.flight.cdr_single import Text
-from sysid_node.flight.frames import euler_from_quaternion
+from sysid_node.flight.frames import tilt_from_quaternion
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 Numbers = tuple[Any, ...]
@@ -46,9 +44,10 @@ def imu(numbers: Numbers, sign: float) -> tuple[int, tuple[float, ...]]:
 
 def imu_and_attitude(numbers: Numbers) -> tuple[int, tuple[float, ...], tuple[float, float]]:
     """As ``imu`` of forward-left-up axes, by ``ATTITUDE_FIELDS``; roll and pitch (rad), NaN without orientation."""
-    orientation, measured = np.array([numbers[2:6]]), numbers[6] >= 0.0  # REP-145: -1 where it is not
-    phi, theta = euler_from_quaternion(orientation, "flu")[0, :2].tolist() if measured else (math.nan, math.nan)
-    return *imu((*numbers[:2], *numbers[6 + _COVARIANCE :]), -1.0), (phi, theta)
+    x, y, z, w, covariance = numbers[2:7]
+    measured = covariance >= 0.0  # REP-145: -1 where it is not
+    tilt = tilt_from_quaternion((x, y, z, w), "flu") if measured else (math.nan, math.nan)
+    return *imu((*numbers[:2], *numbers[6 + _COVARIANCE :]), -1.0), tilt
 
 
 def air_data(numbers: Numbers) -> tuple[int, tuple[float, ...]]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler, turn_vectors
+from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler, tilt_from_quaternion, turn_vectors
 
 #: Axes of FRD in FLU, and of NED in ENU, one a column (REP-103).
 FRD_IN_FLU = np.diag([1.0, -1.0, -1.0])
@@ -43,3 +43,12 @@ def test_heading_north_is_facing_along_enu_y():
 
 def test_no_rotation_no_attitude():
     assert np.isnan(euler_from_quaternion(np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.1]]), "flu")).all()
+
+
+@pytest.mark.parametrize("frame", ["flu", "frd"])
+def test_one_tilt_is_that_of_many_attitudes(angles, frame):
+    quaternions = 1.005 * quaternion_from_euler(angles, frame)
+    one_by_one = [tilt_from_quaternion(tuple(row), frame) for row in quaternions.tolist()]
+    np.testing.assert_allclose(one_by_one, euler_from_quaternion(quaternions, frame)[:, :2], atol=1e-12)
+    for strange in ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.1), (np.nan, 0.0, 0.0, 1.0), (np.inf, 0.0, 0.0, 1.0)):
+        assert np.isnan(tilt_from_quaternion(strange, frame)).all()
