@@ -22,11 +22,11 @@ from scipy.optimize import minimize
 from withheld import judging
 from withheld.scoreboard import calibration
 
-from sysid_node.gap.credence import WEIGHTS, Grounds
+from sysid_node.gap.credence import PLIABLE, WEIGHTS, Grounds
 
 Array = NDArray[np.float64]
 
-_NAMES = ("a constant", "logarithm of the nats", "derivatives beyond their tolerances")
+_NAMES = ("a constant", "logarithm of the nats", "an effect that works through the derivatives")
 
 
 def main() -> None:
@@ -54,7 +54,8 @@ def causes(text: str) -> Iterator[tuple[str, Grounds, bool]]:
         if first <= int(path.stem) <= last and said.exists():
             label, document = (json.loads(p.read_text(encoding="utf-8")) for p in (path, said))
             for cause in (*document["causes"], *document["doubted"]):
-                grounds = Grounds(*(cause["grounds"][name] for name in ("foretold", "misfit", "denied")))
+                own = cause["grounds"]
+                grounds = Grounds(own["foretold"], own["misfit"], cause["effect"] in PLIABLE)
                 if not judging.always_there(label, cause):
                     yield f"{name}/{path.stem}", grounds, judging.there(label, cause)
 

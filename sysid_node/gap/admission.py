@@ -14,8 +14,9 @@ from sysid_node.gap.view import View
 #: Travel below which no surface counts as moved, rad.
 _TRAVEL = 0.004
 
-#: Ratio of measured to expected mean lift beyond which a flight is another aircraft's.
-_LIFT = 2.5
+#: Ratio of measured to expected mean lift beyond which a flight is another aircraft's, unless a vane that is off by so
+#: much (rad) would account for it.
+_LIFT, _VANE = 2.5, 0.06
 
 
 def require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
@@ -41,7 +42,9 @@ def admitted(view: View) -> View:
             "(sysid excite designs one)"
         )
     lift, expected = view.series[:, 0].mean(), view.predicted_series(view.simulator.neutral())[:, 0].mean()
-    if not 1.0 / _LIFT < lift / expected < _LIFT:
+    slope = view.simulator.aircraft.derivatives.get("CL_alpha")
+    by_a_vane = slope is not None and abs(lift - expected) < _VANE * slope.value and not view.flight.inferred
+    if not (1.0 / _LIFT < lift / expected < _LIFT or by_a_vane):
         raise InputError(
             f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
             f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "

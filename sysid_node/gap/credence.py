@@ -17,9 +17,12 @@ import numpy as np
 from sysid_node.gap.adequacy import Adequacy
 from sysid_node.gap.nuisance import WIDENED
 
-#: Weights of a constant, of the logarithm of the nats, and of derivatives beyond their tolerances, which the file
-#: itself says are improbable (bench/gap_credence.py).
-WEIGHTS = (-3.74, 0.98, -0.26)
+#: Effects that work through the file's own derivatives, as other values of these: together they bend to much that is
+#: something else.
+PLIABLE = frozenset({WIDENED, "inertia_error", "mass_error", "cg_shift"})
+
+#: Weights of a constant, of the logarithm of the nats, and of pliability (bench/gap_credence.py).
+WEIGHTS = (-2.02, 0.73, -1.83)
 
 #: Amplitude of what goes with a cause and is left, as a share of what it does, from which its law is refuted.
 REFUTED = 0.3
@@ -40,19 +43,19 @@ class Grounds:
 
     foretold: float  # nats by which it accounts better for what the commands foretell, the other causes given
     misfit: float  # of what it does, what is left that goes with it: amplitude, on the channels where any is left
-    denied: bool  # by the aircraft file's own tolerances
+    pliable: bool  # as what works through the file's own derivatives is
 
     @classmethod
     def of(cls, effect: str, foretold: float, adequacy: Adequacy) -> Grounds:
         """From the effect, the nats, and what it leaves."""
         seen = (adequacy.done > _COUNTS * adequacy.done.sum()) & (adequacy.deviations > _DEVIATIONS)
         misfit = np.sqrt(adequacy.left[seen].sum() / adequacy.done[seen].sum()) if seen.any() else 0.0
-        return cls(foretold, float(misfit), effect == WIDENED)
+        return cls(foretold, float(misfit), effect in PLIABLE)
 
     @property
     def regressors(self) -> tuple[float, float, float]:
         """What the weights belong to."""
-        return 1.0, float(np.log(max(self.foretold, 1.0))), float(self.denied)
+        return 1.0, float(np.log(max(self.foretold, 1.0))), float(self.pliable)
 
     @property
     def refuted(self) -> bool:
@@ -75,5 +78,5 @@ class Grounds:
 
 
 def prior(effect: str) -> float:
-    """Odds of an effect before any flight, beside those that the aircraft file says nothing of."""
-    return float(np.exp(WEIGHTS[2])) if effect == WIDENED else 1.0
+    """Odds of an effect before any flight, beside those that are not pliable."""
+    return float(np.exp(WEIGHTS[2])) if effect in PLIABLE else 1.0

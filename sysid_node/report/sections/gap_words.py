@@ -35,8 +35,10 @@ _RESPONSES = {
     "pitch response": ("q", "theta", "alpha", "az"),
     "roll response": ("p", "phi"),
     "yaw response": ("r", "beta", "ay"),
-    "speed": ("V", "ax"),
+    "forward motion": ("V", "ax"),
 }
+
+_TIMES = ("before", "after")
 
 #: Motion of the air that is not worth a word, m/s rms.
 _STILL = 0.2
@@ -48,23 +50,25 @@ def paragraph(found: Diagnosis) -> str:
 
 
 def _off(found: Diagnosis) -> str:
-    """How far off the simulator is, and where most."""
+    """How far off the simulator is, and where most: of what is mended, where causes were found."""
     gap = found.size
     if found.flown:
-        sizes = {words: _together(gap, names) for words, names in _RESPONSES.items()}
+        before, after = ({words: _together(gap, n, when) for words, n in _RESPONSES.items()} for when in _TIMES)
+        mended = {words: before[words] ** 2 - after[words] ** 2 for words in _RESPONSES}
+        sizes = mended if found.attribution.causes else before
         worst = max(sizes, key=lambda words: sizes[words])
         return (
             f"Begun anew every {WINDOW:g} s in the flight's own state, the simulator's {worst} is "
-            f"{percent(sizes[worst])} off, {percent(gap.before)} over all readings"
+            f"{percent(before[worst])} off, {percent(gap.before)} over all readings"
         )
     worst = max(gap.per_channel, key=lambda c: gap.per_channel[c]["before"], default="")
     size = gap.per_channel[worst]["before"] if worst else gap.before
     return f"The simulator's {WORDS.get(worst, 'response')} is {percent(size)} off"
 
 
-def _together(gap: Gap, names: tuple[str, ...]) -> float:
-    """Error before of some readings together; 0 where none of them moved."""
-    own = [gap.per_channel[name]["before"] for name in names if name in gap.per_channel]
+def _together(gap: Gap, names: tuple[str, ...], when: str) -> float:
+    """Error of some readings together, ``before`` or ``after``; 0 where none of them moved."""
+    own = [gap.per_channel[name][when] for name in names if name in gap.per_channel]
     return float(np.sqrt(np.mean(np.square(own)))) if own else 0.0
 
 

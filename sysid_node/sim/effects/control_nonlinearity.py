@@ -11,7 +11,7 @@ EFFECT = Effect(
     summary="Large deflections do less, per radian, than small ones.",
     equation="delta' = delta (1 - cubic delta^2)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (polynomial terms)",
-    parameters=per_control("1/rad^2", "cubic term", 3.0, lower=-30.0, upper=30.0),
+    parameters=per_control("1/rad^2", "cubic term", 3.0, lower=-100.0, upper=100.0),
 )
 
 
