@@ -36,6 +36,9 @@ _CLOSED = 50.0
 #: Percentage of what could be closed, below which derivatives within their tolerances surely do not close all of it.
 _ALL_BUT = 90.0
 
+#: Error beyond the noise, as a share of the motion, that derivatives within their tolerances may not leave.
+_LEFT = 0.1
+
 #: A rival with this probability is named.
 _NAMED = 0.03
 
@@ -73,9 +76,15 @@ def wanting(attribution: Attribution) -> bool:
 
 
 def far_off(check: Check) -> bool:
-    """Whether the simulator is further off than chance, noise and weather make it, with nothing found to blame."""
+    """Whether the simulator is further off than chance, noise and weather make it, with nothing found to blame.
+
+    However much of the gap the derivatives close, where surely a tenth of the motion is left beyond the noise.
+    """
     gap = check.flown
-    return gap is not None and gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT
+    if gap is None:
+        return False
+    surely = gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > _LEFT**2
+    return surely or (gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT)
 
 
 def unexplained(attribution: Attribution) -> bool:
