@@ -8,7 +8,8 @@ from pathlib import Path
 from sysid_node.cli.faults_bag import FAULTS, FAULTS_TYPE, fault_messages
 from sysid_node.faults.record import Said
 from sysid_node.flight.bag_writer import add_topic, new_bag
-from sysid_node.flight.messages import StoreTypes, type_store
+from sysid_node.flight.cdr import definitions_of
+from sysid_node.flight.messages import type_store
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE
 from sysid_node.online.types import Estimates
@@ -30,7 +31,7 @@ def write_estimates(
     ``stamps_ns`` (K,) of ``history`` (K,). ``faults`` are put on /fault_monitor/faults alike. Raises InputError where
     the bag exists or cannot be written.
     """
-    messages = EstimatesSerialiser(StoreTypes(type_store()), aircraft, method).many(history, stamps_ns, frame_id)
+    messages = EstimatesSerialiser(definitions_of(type_store()), aircraft, method).many(history, stamps_ns, frame_id)
     with new_bag(path) as writer:
         topic = add_topic(writer, DERIVATIVES, DERIVATIVES_TYPE)
         for stamp, data in zip(stamps_ns.tolist(), messages, strict=True):

@@ -17,7 +17,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.bag import HEADING_UNKNOWN
 from sysid_node.flight.cdr import encode
 from sysid_node.flight.frames import BodyFrame, quaternion_from_euler, turn_vectors
-from sysid_node.flight.messages import StoreTypes, type_store
+from sysid_node.flight.messages import message_layout, type_store
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Stamps, Stream, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
@@ -77,7 +77,7 @@ def stamp_columns(stamps: Stamps) -> dict[str, NDArray[Any]]:
 
 
 def _encode(store: Typestore, msgtype: str, template: Any, stream: Stream, columns: Mapping[str, Any]) -> list[bytes]:
-    layout = StoreTypes(store).layout(msgtype, template)
+    layout = message_layout(store, msgtype, template)
     return encode(layout, {**stamp_columns(stream.arrival.stamp_ns), **columns}, len(stream.arrival))
 
 

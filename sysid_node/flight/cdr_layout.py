@@ -56,6 +56,14 @@ NUMBERS: Mapping[str, Number] = {
 }
 
 
+#: What ``struct`` calls the numbers that NumPy calls so.
+CODES: Mapping[str, str] = {
+    **{"f8": "d", "i8": "q", "u8": "Q"},
+    **{"f4": "f", "i4": "i", "u4": "I"},
+    **{"i2": "h", "u2": "H", "i1": "b", "u1": "B"},
+}
+
+
 @dataclass(frozen=True)
 class Layout:
     """The places of a message's numbers, by dotted path: ``header.stamp.sec``, ``derivatives.3.value``."""

@@ -26,19 +26,9 @@ def type_store() -> Typestore:
     return store
 
 
-class StoreTypes:
-    """Messages of a store by the name of their type: ``sensor_msgs/msg/Imu``."""
-
-    def __init__(self, store: Typestore) -> None:
-        self._store = store
-
-    def make(self, msgtype: str, /, **fields: Any) -> Any:
-        """A message."""
-        return self._store.types[msgtype](**fields)
-
-    def layout(self, msgtype: str, message: Any) -> Layout:
-        """The layout of a message once it is serialised."""
-        return layout_of(definitions_of(self._store), msgtype, bytes(self._store.serialize_cdr(message, msgtype)))
+def message_layout(store: Typestore, msgtype: str, message: Any) -> Layout:
+    """The layout of a message once it is serialised."""
+    return layout_of(definitions_of(store), msgtype, bytes(store.serialize_cdr(message, msgtype)))
 
 
 def message_folder() -> Path:

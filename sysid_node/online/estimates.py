@@ -30,8 +30,7 @@ def estimate_of(state: State, current: Present | None, now: float | None = None)
     time, renewed = state.transform.last, state.renewed
     if current is None or renewed is None:
         return Estimates(time, _nothing_known(state), {})
-    numbers, codes, explained = _told(state, renewed, current, time if now is None else now)
-    return _named(state, renewed, time, numbers, codes, explained)
+    return _named(state, time, *_told(state, renewed, current, time if now is None else now))
 
 
 def estimates_at(
@@ -42,30 +41,33 @@ def estimates_at(
     if current is None or renewed is None:
         return [Estimates(time, _nothing_known(state), {}) for time in times]
     told = _told(state, renewed, current, np.array(nows))
-    return [_named(state, renewed, time, *one) for time, *one in zip(times, *told, strict=True)]
+    return [_named(state, time, *one) for time, *one in zip(times, *told, strict=True)]
 
 
 def _told(state: State, renewed: Renewed, current: Present, now: Any) -> tuple[Array, Codes, Array]:
-    """(..., 4, D) values, standard errors, lower and upper ends, (..., D) statuses, and (..., C) R squared."""
+    """(..., D, 4) numbers and (..., D) statuses of the derivatives, (..., C, 4) numbers of the fits; see ``rows``."""
     codes = judge(state, renewed, current, now)
     values, variances = current.values, current.variances
-    below, above = interval.reach(grounds_of(state, renewed).squares * variances, renewed.bend)
-    numbers = np.stack([values, np.sqrt(variances), values - below, values + above], axis=-2)
+    grounds, solution = grounds_of(state, renewed), current.solution
+    below, above = interval.reach(grounds.squares * variances, renewed.bend)
+    numbers = np.stack([values, np.sqrt(variances), values - below, values + above], axis=-1)
     missing = len(state.model.table.unformed)
     if missing:
-        lacking = np.repeat([[math.nan], [math.inf], [-math.inf], [math.inf]], missing, axis=1)
-        numbers = np.concatenate([numbers, np.broadcast_to(lacking, (*numbers.shape[:-1], missing))], axis=-1)
+        lacking = np.array([math.nan, math.inf, -math.inf, math.inf])
+        numbers = np.concatenate([numbers, np.broadcast_to(lacking, (*codes.shape[:-1], missing, 4))], axis=-2)
         unknown = np.full((*codes.shape[:-1], missing), status.INERTIA, codes.dtype)
         codes = np.concatenate([codes, unknown], axis=-1)
-    explained = 1.0 - current.solution.residual / np.maximum(current.solution.motion, 1e-300)
-    return numbers, codes, np.minimum(np.maximum(explained, 0.0), 1.0)
+    fits = np.empty((*solution.motion.shape, 4))
+    explained = 1.0 - solution.residual / np.maximum(solution.motion, 1e-300)
+    fits[..., 0], fits[..., 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), grounds.fits
+    return numbers, codes, fits
 
 
-def _named(state: State, renewed: Renewed, time: float, numbers: Array, codes: Codes, explained: Array) -> Estimates:
+def _named(state: State, time: float, numbers: Array, codes: Codes, fits: Array) -> Estimates:
     """The estimates of one moment, of which ``_told`` has told."""
-    table, words = state.model.table, state.model.vocabulary
-    fits = FitRows(state.plan.coefficients, explained, grounds_of(state, renewed).fits)
-    return Estimates(time, DerivativeRows(table.all_names, numbers, codes, words), fits)
+    model = state.model
+    derivatives = DerivativeRows(model.table.all_names, numbers, codes, model.vocabulary)
+    return Estimates(time, derivatives, FitRows(model.plan.coefficients, fits))
 
 
 def _nothing_known(state: State) -> dict[str, DerivativeEstimate]:

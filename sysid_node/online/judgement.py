@@ -55,7 +55,7 @@ def _weigh(state: State, renewed: Renewed) -> Grounds:
         allowed=np.minimum(table.allowed**2 / caution, longest),
         relative=table.relative**2 / caution if table.relative.any() else None,
         floor=np.maximum(BURIED * renewed.total.bias.take(plan.energy), regression.TINY),
-        fits=[(*both, samples) for both in zip(stds.tolist(), freedom.tolist(), strict=True)],
+        fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
     )
 
 

@@ -55,7 +55,7 @@ class _Rows(Mapping[str, T]):
 
 
 class DerivativeRows(_Rows[DerivativeEstimate]):
-    """D derivatives: ``numbers`` (4, D) are value, standard error, lower and upper end of the interval.
+    """D derivatives: ``numbers`` (D, 4) are value, standard error, lower and upper end of the interval.
 
     ``codes`` (D,) are their statuses in the words of ``vocabulary``.
     """
@@ -67,7 +67,7 @@ class DerivativeRows(_Rows[DerivativeEstimate]):
         self.numbers, self.codes, self.vocabulary = numbers, codes, vocabulary
 
     def _made(self) -> Iterator[DerivativeEstimate]:
-        return map(DerivativeEstimate, self.names, *self.numbers.tolist(), self.valid, self.statuses)
+        return map(DerivativeEstimate, self.names, *self.numbers.T.tolist(), self.valid, self.statuses)
 
     @property
     def valid(self) -> list[bool]:
@@ -81,16 +81,14 @@ class DerivativeRows(_Rows[DerivativeEstimate]):
 
 
 class FitRows(_Rows[FitQuality]):
-    """C coefficients: ``r_squared`` (C,), and the rest of each fit's quality."""
+    """C coefficients: ``numbers`` (C, 4) are R squared, residual's standard deviation, degrees of freedom, samples."""
 
-    __slots__ = ("r_squared", "rest")
+    __slots__ = ("numbers",)
 
-    def __init__(self, names: tuple[str, ...], r_squared: Array, rest: list[tuple[float, float, int]]) -> None:
+    def __init__(self, names: tuple[str, ...], numbers: Array) -> None:
         super().__init__(names)
-        self.r_squared, self.rest = r_squared, rest
+        self.numbers = numbers
 
     def _made(self) -> Iterator[FitQuality]:
-        return (
-            FitQuality(name, share, *rest)
-            for name, share, rest in zip(self.names, self.r_squared.tolist(), self.rest, strict=True)
-        )
+        *numbers, samples = self.numbers.T.tolist()
+        return map(FitQuality, self.names, *numbers, map(int, samples))

@@ -59,7 +59,7 @@ class Grounds:
     allowed: Array  # (D,) the largest squared standard error of a valid estimate
     relative: Array | None  # (D,) ... as a share of the estimate's square, where that may be larger
     floor: Array  # (P,) energy under which a regressor is buried in noise
-    fits: list[tuple[float, float, int]]  # by coefficient: what ``FitQuality`` says besides R squared
+    fits: Array  # (C, 3) what ``FitQuality`` says besides R squared
 
 
 @dataclass

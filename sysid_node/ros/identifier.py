@@ -31,7 +31,7 @@ from sysid_node.ros.estimates_cdr import EstimatesSerialiser
 from sysid_node.ros.inputs import UNREADABLE, Numbers, Texts
 from sysid_node.ros.lifecycle import CarefulNode
 from sysid_node.ros.loop_node import SENSOR_QOS
-from sysid_node.ros.message_types import RosTypes, fields_of
+from sysid_node.ros.message_types import fields_of
 from sysid_node.ros.monitor import Durations, TopicMonitor
 from sysid_node.ros.parameters import estimation_settings
 from sysid_node.ros.save import save_estimates
@@ -83,7 +83,7 @@ class Identifier(CarefulNode):
         self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
         self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
-        self._serialiser = EstimatesSerialiser(RosTypes(), aircraft.name, self._session.settings.method)
+        self._serialiser = EstimatesSerialiser(fields_of, aircraft.name, self._session.settings.method)
         self._inputs = [
             self._listen(Imu, IMU, self._on_imu),
             self._listen(AirData, AIR_DATA, self._on_air_data),

@@ -1,4 +1,4 @@
-"""ROS's message classes, their fields and their serialised layout: what ``flight.messages`` is to bags."""
+"""The fields of ROS's message classes: what ``flight.cdr.definitions_of`` is to bags."""
 
 from __future__ import annotations
 
@@ -7,26 +7,13 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from rclpy.serialization import serialize_message
 from rosidl_parser.definition import AbstractNestedType, AbstractString, BasicType, NamespacedType
 from rosidl_parser.definition import Array as FixedArray
 
-from sysid_node.flight.cdr_layout import NUMBERS, Array, Kind, Layout, Part, String, layout_of
+from sysid_node.flight.cdr_layout import NUMBERS, Array, Kind, Part, String
 
 #: IDL's names of what message definitions call otherwise.
 _IDL = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
-
-
-class RosTypes:
-    """Messages by the name of their type: ``sensor_msgs/msg/Imu``."""
-
-    def make(self, msgtype: str, /, **fields: Any) -> Any:
-        """A message."""
-        return _class_of(msgtype)(**fields)
-
-    def layout(self, msgtype: str, message: Any) -> Layout:
-        """The layout of a message once it is serialised."""
-        return layout_of(fields_of, msgtype, serialize_message(message), spare=True)
 
 
 @cache

@@ -1,14 +1,13 @@
 """Single messages. Truth: rosbags' own serialisation."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
 from sysid_node.flight.cdr import definitions_of
-from sysid_node.flight.cdr_layout import DamageError, layout_of
-from sysid_node.flight.cdr_single import SingleReader, SingleWriter
+from sysid_node.flight.cdr_layout import DamageError
+from sysid_node.flight.cdr_single import SingleReader
 from sysid_node.flight.messages import type_store
 
 STORE = type_store()
@@ -48,18 +47,6 @@ def test_what_is_no_whole_message_is_refused(spoil: Callable[[bytes], bytes]) ->
     reader.read(raw)
     with pytest.raises(DamageError):
         reader.read(spoil(raw))
-
-
-def test_what_is_written_is_read_by_rosbags() -> None:
-    raw = joints(["elevator", "aileron"], [0.0, 0.0])
-    layout = layout_of(FIELDS, JOINTS, raw)
-    writer = SingleWriter(layout, ["header.stamp.sec"], ["position"])
-    found: list[Any] = writer.write(np.array([[5], [6]]), np.array([[0.1, 0.2], [np.nan, -3.0]]))
-    read = [STORE.deserialize_cdr(data, JOINTS) for data in found]
-    assert [m.header.stamp.sec for m in read] == [5, 6]
-    assert [m.name for m in read] == [["elevator", "aileron"]] * 2
-    np.testing.assert_array_equal([m.position for m in read], [[0.1, 0.2], [np.nan, -3.0]])
-    assert raw == joints(["elevator", "aileron"], [0.0, 0.0])
 
 
 def test_bytes_behind_a_message_mean_nothing() -> None:

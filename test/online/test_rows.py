@@ -8,7 +8,7 @@ from sysid_node.online.rows import DerivativeRows, FitRows
 from sysid_node.online.status import NOT_EXCITED, OK, WORDS, Vocabulary
 from sysid_node.online.types import DerivativeEstimate, FitQuality
 
-NUMBERS = np.array([[-1.0, 0.5], [0.1, np.inf], [-1.2, -np.inf], [-0.8, np.inf]])
+NUMBERS = np.array([[-1.0, 0.1, -1.2, -0.8], [0.5, np.inf, -np.inf, np.inf]])
 ROWS = {
     "Cm_q": DerivativeEstimate("Cm_q", -1.0, 0.1, -1.2, -0.8, True, "ok"),
     "Cm_de": DerivativeEstimate("Cm_de", 0.5, np.inf, -np.inf, np.inf, False, "not excited"),
@@ -23,7 +23,7 @@ def rows() -> DerivativeRows:
 def test_are_the_mapping_that_a_dictionary_of_them_is():
     assert rows() == ROWS and list(rows()) == list(ROWS) and len(rows()) == 2
     assert isinstance(rows()["Cm_q"].value, float) and rows()["Cm_q"].valid is True
-    fits = FitRows(("Cm",), np.array([0.9]), [(1e-3, 7.5, 12)])
+    fits = FitRows(("Cm",), np.array([[0.9, 1e-3, 7.5, 12.0]]))
     assert fits == {"Cm": FitQuality("Cm", 0.9, 1e-3, 7.5, 12)}
 
 

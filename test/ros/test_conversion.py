@@ -10,7 +10,7 @@ from sysid_msgs.msg import DerivativeEstimates
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.ros import conversion
 from sysid_node.ros.estimates_cdr import EstimatesSerialiser
-from sysid_node.ros.message_types import RosTypes
+from sysid_node.ros.message_types import fields_of
 
 
 @pytest.mark.parametrize("nanoseconds", [0, 1, 999_999_999, 10**9, START_NS + 123])
@@ -27,7 +27,7 @@ def test_estimates_survive_to_the_last_bit() -> None:
         },
         {"Cm": FitQuality("Cm", 0.9, 1e-3, 7.5, 12)},
     )
-    raw = EstimatesSerialiser(RosTypes(), "cdrw", "sls_rft").one(estimates, START_NS + 100_000_000, "base_link")
+    raw = EstimatesSerialiser(fields_of, "cdrw", "sls_rft").one(estimates, START_NS + 100_000_000, "base_link")
     message = deserialize_message(raw, DerivativeEstimates)
     assert (message.header.frame_id, message.aircraft, message.method) == ("base_link", "cdrw", "sls_rft")
     assert conversion.estimates_from_message(message, START_NS) == estimates
