@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -267,12 +268,21 @@ def endure(minutes: float) -> str:
         for name, process in loop.processes.items():
             share = 100.0 * (_seconds(loop)[name] - used[name]) / passed
             said = [line for _, node, line in loop.said if node == name]
-            late = sum(bool(re.search(r"\blate\b|lost|silent|not flown|no commands", line)) for line in said)
+            late = [line for line in said if re.search(r"\blate\b|lost|silent|not flown|no commands", line)]
             memory = [f"{first[name]:.1f}", f"{_memory(process.pid):.1f}"]
-            rows.append([name, *memory, f"{share:.0f}", f"{late} of {len(said)}", _slowest(loop, name)])
+            told = f"{len(late)} of {len(said)}{_what(late)}"
+            rows.append([name, *memory, f"{share:.0f}", told, _slowest(loop, name)])
         skipped = _skipped(loop)
     heads = ("MB after a minute", "MB at the end", "processor, %", "times lateness was said", "step p99, ms")
     return table(("node", *heads), rows) + f"\n\n{skipped} {_machine()}"
+
+
+def _what(late: list[str]) -> str:
+    """Which topics were late, lost or silent, and how often that was said of each."""
+    found = Counter(
+        topic for line in late for topic in set(re.findall(r"([\w/]+) (?:up to|\d+ %|was silent|silent)", line))
+    )
+    return f" ({', '.join(f'{topic} {count}' for topic, count in found.most_common())})" if found else ""
 
 
 def _slowest(loop: Loop, name: str) -> str:
