@@ -180,8 +180,9 @@ def _basis(view: View, weight: Array, *, commanded: bool) -> dict[int, Array]:
 
 
 def _spectra_of_instruments(view: View, *, commanded: bool) -> list[Complex]:
-    """``instruments`` by window and line, each (W, L, M)."""
-    return [view.windows.transform(table) for table in instruments(view, commanded=commanded)]
+    """``instruments`` by window and line, each (W, L, M); empty where there are none."""
+    tables = instruments(view, commanded=commanded)
+    return [view.windows.transform(t) if t.size else np.empty((0, 0, 0), complex) for t in tables]
 
 
 def instruments(view: View, *, commanded: bool = False) -> tuple[Array, Array]:

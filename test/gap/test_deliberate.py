@@ -3,6 +3,9 @@
 import pytest
 
 from sysid_node.gap.deliberate import deliberate, driven_by_weather, purposeful
+from sysid_node.gap.fit import blank, polish
+from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.structure import structure_of, unbiased
 from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
@@ -22,6 +25,13 @@ def test_an_autopilot_alone_in_gusts_tells_nothing(seen) -> None:
     view = seen([])
     assert driven_by_weather(view) and not purposeful(view)
     assert deliberate(view).all.shape[1] == 0
+
+
+def test_a_flight_that_tells_nothing_is_judged_all_the_same(seen) -> None:
+    view = seen([])
+    fit = polish(blank([view], nuisances_of(view.simulator.aircraft, view)), rounds=1)
+    left = structure_of(unbiased(fit))
+    assert not left.coherent.any()
 
 
 def test_steps_are_deliberate_though_the_autopilot_flies_too(seen) -> None:
