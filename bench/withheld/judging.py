@@ -20,7 +20,10 @@ _WITHIN, _ONSET = 0.15, 2.0  # share by which a parameter may be off; seconds of
 #: Parameters that only shape an effect, or that the drawn value does not determine.
 _SHAPES = frozenset({"alpha_star", "frequency", "slope", "onset", "damping"})
 
-_TIMES = frozenset({"command_delay.delay", "actuator_lag.time_constant"})
+_TIMES, _STAMPS = (
+    frozenset({"command_delay.delay", "actuator_lag.time_constant"}),
+    frozenset({"actuator_stamp_delay.delay"}),
+)
 
 
 @dataclass(frozen=True)
@@ -154,9 +157,18 @@ def _parameters(label: Mapping[str, Any], said: Mapping[str, Any]) -> list[tuple
                 rows.append((full, 1.0 / true, value, error))
             elif key in found and key not in _SHAPES and not (cause["effect"] == "stuck_surface" and key == "rudder"):
                 value, error = found[key]
-                more = label["servo_lag"] if full in _TIMES and value > true else 0.0
-                rows.append((full, min(true + more, value) if more else true, value, error))
+                rows.append((full, _shown(full, true, value, label["servo_lag"]), value, error))
     return rows
+
+
+def _shown(name: str, true: float, found: float, servo_lag: float) -> float:
+    """A time as a flight shows it: later by as much of the servo's own lag as is found, or stamps less late by it.
+
+    What stamps are late by makes a response seem early, and the servo makes it late.
+    """
+    if name in _TIMES:
+        return min(max(found, true), true + servo_lag)
+    return max(min(found, true), true - servo_lag) if name in _STAMPS else true
 
 
 def _close(name: str, true: float, found: float, error: float) -> bool:

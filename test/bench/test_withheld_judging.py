@@ -55,6 +55,13 @@ def test_a_rate_is_compared_by_its_reciprocal_and_a_lag_with_the_servos_own() ->
     assert lag.parameters[0][1] == pytest.approx(0.047)
 
 
+@pytest.mark.parametrize(("found", "shown"), [(0.07, 0.06), (0.055, 0.055), (0.04, 0.053)])
+def test_late_stamps_are_shown_less_late_by_the_servos_lag(found, shown) -> None:
+    label = _label("one", {"actuator_stamp_delay": {"delay": 0.06}})
+    said = _said("explained", ("actuator_stamp_delay", 0.9, {"delay": [found, 0.001]}, []))
+    assert judge(label, said).parameters[0][1] == pytest.approx(shown)
+
+
 def test_both_of_two_effects_must_be_named() -> None:
     label = _label("two", {"mass_error": {"error": 0.2}, "cg_shift": {"x": 0.02}})
     first = ("mass_error", 0.9, {"error": [0.2, 0.01]}, [])
