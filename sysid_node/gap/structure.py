@@ -121,13 +121,13 @@ def equations(fit: Fit, powers: tuple[Array, ...], *, commanded: bool = False) -
 def within_limits(seen: Equations, fit: Fit) -> Array:
     """The step (unknowns,) of least squares that leaves every unknown within its limits."""
     spread = np.diag(seen.information) ** -0.5
-    root = np.linalg.cholesky(seen.information).T
+    root = np.linalg.cholesky(seen.information * np.outer(spread, spread)).T
     low, high = bounds(fit.views[0].simulator, fit.indices)
     now, _, limit = fit.stacked
     lowest = np.concatenate([low - fit.values, -limit - now]) / spread
     highest = np.concatenate([high - fit.values, limit - now]) / spread
-    target = np.linalg.solve(root.T, seen.right)
-    found = lsq_linear(root * spread, target, (np.minimum(lowest, -_ROOM), np.maximum(highest, _ROOM)))
+    target = np.linalg.solve(root.T, seen.right * spread)
+    found = lsq_linear(root, target, (np.minimum(lowest, -_ROOM), np.maximum(highest, _ROOM)))
     return np.asarray(found.x * spread)
 
 
