@@ -2,12 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from sysid_node.gap.close import Gap
 from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.flown import WINDOW, drawn, flown, foreseen
+from sysid_node.gap.verdict import far_off
 from sysid_node.gap.view import View
 from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
@@ -72,3 +75,11 @@ def test_weather_is_foreseen_and_effects_are_not(aircraft, make_flight) -> None:
     assert foreseen([view_of(simulator, weather)])
     slow = make_flight({"structural_mode": {"gain": 0.3}}, seed=6)
     assert not foreseen([view_of(simulator, slow)])
+
+
+@pytest.mark.parametrize(("after", "told"), [((0.15, 0.18), True), ((0.09, 0.12), False)])
+def test_a_tenth_of_the_motion_beyond_the_noise_is_far_off_however_much_is_closed(after, told) -> None:
+    """0.15 less a floor of at most 0.08 leaves 0.13; 0.09 leaves 0.04."""
+    intervals = {"before": (2.5, 3.0), "tolerances": after, "after": after, "noise_floor": (0.05, 0.08)}
+    gap = Gap(2.7, 0.16, 0.16, 0.066, 96.0, (95.0, 97.0), {}, intervals)
+    assert far_off(SimpleNamespace(flown=gap)) is told

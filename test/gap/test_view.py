@@ -23,7 +23,7 @@ def test_slopes_agree_with_differences(plain_view) -> None:
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
 
 
-def testkinematics_depend_on_no_other_entries_than_those_named(plain_view) -> None:
+def test_kinematics_depend_on_no_other_entries_than_those_named(plain_view) -> None:
     simulator = plain_view.simulator
     entries = np.setdiff1d(np.arange(len(simulator.names)), kinematic(simulator.layout))
     somewhere = simulator.neutral() + 0.1 * np.random.default_rng(0).random(len(simulator.names))
