@@ -8,6 +8,9 @@ of Economics and Statistics 94, 2012). A stretch that is moved in the same way i
 that is moved on purpose speaks for itself: along a direction in which its blocks say lambda times as much as those that
 were learned from, 1 / lambda of the shift is left in it, and that it contradicts the rest means nothing. What was
 learned from holds bursts of deliberate motion, too, so that a few times its mean counts as moved in the same way.
+
+Beside the correlation that is always there, a few gusts in a row make one by chance, which the dozen derivatives of a
+whole axis take up, whatever its direction (``surprise``).
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from sysid_node.faults.terms import Terms
 
 Array = NDArray[np.float64]
 
+BY_CHANCE = 0.1  # of the residuals of a single stretch with all of an axis's regressors, beside what they always have
 CORRELATION = 0.5  # of residuals with regressors; in moderate turbulence 0.1 to 1 were seen, by coefficient and flight
 ALIKE = 3.0  # times what a block that was learned from says, up to which a stretch is moved in the same way
 LEAST = 20.0  # blocks, of which something is learned
@@ -49,6 +53,17 @@ def doubt(held: Held, information: Array) -> Array:
         mine = terms.output[slopes] == output
         moved[terms.offset_of(output)] = -held.regressors[slopes[mine]] @ shift[mine]
     return np.asarray(moved @ moved.T)
+
+
+def surprise(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:
+    """(H,) how large each shift's mean square score may be in a stretch of so many blocks where nothing has failed.
+
+    ``usual`` (H,) is what it was of late. Damage of a ``whole`` axis (H,) takes up what a few gusts in a row do to any
+    of its derivatives, as one direction hardly does: a correlation of rho adds rho^2 for every block.
+    """
+    found = np.maximum(usual, 1.0)
+    found[whole] = np.maximum(found[whole], 1.0 + BY_CHANCE**2 * blocks)
+    return np.asarray(found)
 
 
 def _of_slopes(J: Array, terms: Terms, slopes: NDArray[np.intp]) -> Array:

@@ -4,8 +4,9 @@ Every one of these leaves the equations linear: a surface that does the share 1 
 derivatives away; one that stands at an angle takes all of them away and puts the angle's moments into the offsets; a
 vane that reads off, too, moves offsets; an airspeed that is wrong scales all that dynamic pressure multiplies. So every
 surface and sensor has a direction of its own in the space of all coefficients' derivatives, and that tells them apart.
-Damage is any shift of an axis's derivatives; and, as one that explains less but asks for less proof, a share of a
-single stiffness or damping, which is what a shifted mass or a torn-off part of a tail does first of all.
+Damage is any shift of an axis's derivatives; and, as what explains less but asks for less proof, a share of the
+stiffness about an axis, of the damping, or of both, which is what a shifted mass or a torn-off part of a tail does
+first of all.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ class Hypothesis:
     part: str
     shift: Shift
     limit: float = 0.0  # rad, of a surface's travel
+    whole: bool = False  # all derivatives of an axis, which can take up anything
 
 
 def hypotheses(aircraft: Aircraft, terms: Terms, held: Array) -> list[Hypothesis]:
@@ -51,14 +53,22 @@ def hypotheses(aircraft: Aircraft, terms: Terms, held: Array) -> list[Hypothesis
     for vane in ("alpha", "beta"):
         if terms.of(vane).any():
             found.append(Hypothesis(VANE_OFFSET, vane, _free([_turned(vane, terms, held)], [TURNED])))
-    found += [_damage(axis, names, terms, held) for axis, names in _AXES if _columns(names, terms).size]
-    singles = [(axis, name) for axis, names in _SINGLES for name in names if name in terms.names]
-    return found + [Hypothesis(DAMAGE, axis, _single(name, terms, held)) for axis, name in singles]
+    for axis, names in _AXES:
+        columns = _columns(names, terms)
+        if columns.size:
+            found.append(Hypothesis(DAMAGE, axis, _changed(columns, terms, held), whole=True))
+    for axis, those in _STIFFNESS:
+        present = [[terms.names.index(name) for name in names] for names in those if set(names) <= set(terms.names)]
+        found += [Hypothesis(DAMAGE, axis, _changed(np.array(columns), terms, held)) for columns in present]
+    return found
 
 
 _AXES = (("longitudinal", LONGITUDINAL), ("lateral", LATERAL))
-#: Stiffness and damping about each axis.
-_SINGLES = (("longitudinal", ("Cm_alpha", "Cm_q")), ("lateral", ("Cl_beta", "Cl_p", "Cn_beta", "Cn_r")))
+#: Stiffness and damping about each axis, alone and together.
+_STIFFNESS = (
+    ("longitudinal", (("Cm_alpha",), ("Cm_q",), ("Cm_alpha", "Cm_q"))),
+    ("lateral", (("Cl_beta",), ("Cl_p",), ("Cl_beta", "Cl_p"), ("Cn_beta",), ("Cn_r",), ("Cn_beta", "Cn_r"))),
+)
 
 
 def _of_surface(name: str, symbol: str, limit: float, terms: Terms, held: Array) -> list[Hypothesis]:
@@ -97,20 +107,12 @@ def _turned(vane: str, terms: Terms, held: Array) -> Array:
     return shift
 
 
-def _damage(axis: str, names: Sequence[str], terms: Terms, held: Array) -> Hypothesis:
-    columns = _columns(names, terms)
+def _changed(columns: NDArray[np.intp], terms: Terms, held: Array) -> Shift:
+    """Each of these derivatives by itself, of about the size that the others of its kind may change by."""
     free = np.zeros((held.size, columns.size))
     free[columns, np.arange(columns.size)] = 1.0
     spread = np.maximum(CHANGED * np.abs(held[columns]), 2.0 * terms.tolerance[columns])
-    return Hypothesis(DAMAGE, axis, Shift(np.zeros_like(held), free, spread))
-
-
-def _single(name: str, terms: Terms, held: Array) -> Shift:
-    """One derivative alone, of about the size that the others of its kind may change by."""
-    d = terms.names.index(name)
-    free = np.zeros((held.size, 1))
-    free[d] = 1.0
-    return Shift(np.zeros_like(held), free, np.array([max(CHANGED * abs(held[d]), 2.0 * terms.tolerance[d])]))
+    return Shift(np.zeros_like(held), free, spread)
 
 
 def _columns(names: Sequence[str], terms: Terms) -> NDArray[np.intp]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults import blocks, colour, held
+from sysid_node.faults import blocks, colour, gusts, held
 from sysid_node.faults.blocks import PERIOD, Block
 from sysid_node.faults.colour import ORDER
 from sysid_node.faults.evidence import Shifts
@@ -225,6 +225,8 @@ def _watch(state: State) -> None:
 def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
     """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
     threshold = state.settings.threshold
+    whole = np.array([hypothesis.whole for hypothesis in state.hypotheses])
+    usual = gusts.surprise(whole, usual, len(over.pieces))
     found = promising(state, over, usual, squares, threshold)
     best = float(stuck_vanes(state, over.pieces).max()) if len(over.pieces) >= PATIENT else 0.0
     if any(weighed.factor > threshold for weighed in found):
@@ -232,9 +234,8 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
         found = weights(state, over, usual)
     for place, weighed in enumerate(found):
         if weighed.factor > threshold:
-            left = max(excess(state, over, place, weighed), float(usual[place]), 1.0)
-            ratio = max(float(usual[place]), 1.0) / left
-            best = max(best, weighed.factor * ratio)
+            left = max(excess(state, over, place, weighed), float(usual[place]))
+            best = max(best, weighed.factor * float(usual[place]) / left)
     return best
 
 

@@ -147,7 +147,7 @@ def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
         one = weigh_loosely(*over.whole, hypothesis.shift, over.belief.precision, LOOSE * moved, scale)
-        if weighed.size.size > 1:
+        if hypothesis.whole:
             one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
         found.append(one)
     return found

@@ -7,8 +7,8 @@ from scipy.stats import chi2
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import gusts
-from sysid_node.faults.evidence import marginal
-from sysid_node.faults.gusts import ALIKE, CORRELATION
+from sysid_node.faults.evidence import Shift, Shifts, marginal, score_squares
+from sysid_node.faults.gusts import ALIKE, BY_CHANCE, CORRELATION
 from sysid_node.faults.state import State
 from sysid_node.faults.weighing import doubted, stretch
 
@@ -80,3 +80,20 @@ def test_a_burst_against_what_gusts_have_taught_proves_nothing(seed: int) -> Non
         surprise = [float(v @ np.linalg.pinv(J) @ v) for J, v in (before, (after.J, after.v))]
         assert surprise[0] > RARE
         assert surprise[1] < RARE if excused else surprise[1] == pytest.approx(surprise[0]), surprise
+
+
+def test_what_gusts_in_a_row_do_to_many_directions() -> None:
+    """The mean square of the score of residuals that go with the regressors by ``BY_CHANCE``, in 2,000 stretches."""
+    random, blocks, terms = np.random.default_rng(7), 80, 4
+    axis = Shift(np.zeros(terms), np.eye(terms), np.ones(terms))
+    shifts = Shifts([Shift(np.zeros(terms), np.eye(terms)[:, :1], np.ones(1)), axis])
+    squares = []
+    for _ in range(2000):
+        X = random.standard_normal((blocks, terms))
+        y = BY_CHANCE * X.sum(axis=1) + random.standard_normal(blocks)
+        squares.append(score_squares(X.T @ X, X.T @ y, shifts)[1])
+    whole = np.array([False, True])
+    allowed = gusts.surprise(whole, np.array([0.5, 0.5]), blocks)
+    assert allowed[0] == 1.0  # a single direction: no more than chance makes
+    assert allowed[1] == pytest.approx(np.mean(squares), rel=0.05)
+    np.testing.assert_array_equal(gusts.surprise(whole, np.array([3.0, 4.0]), blocks), [3.0, 4.0])
