@@ -24,7 +24,7 @@ from sysid_node.gap.fit import Fit, blank, polish, with_candidates
 from sysid_node.gap.flights import RATE, Flight, complete
 from sysid_node.gap.flown import flown
 from sysid_node.gap.nuisance import nuisances_of
-from sysid_node.gap.structure import unbiased
+from sysid_node.gap.sizes import unbiased
 from sysid_node.gap.view import View
 from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator

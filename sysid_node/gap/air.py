@@ -30,7 +30,8 @@ _FORCES = len(COEFFICIENTS)
 
 def calm_of(view: View) -> View:
     """The view with a long memory of the air: gusts are left in its readings."""
-    return replace(view, given=view.given._replace(fading=jnp.asarray(LONGEST)))
+    memory = view.given.memory._replace(observer=jnp.asarray(LONGEST))
+    return replace(view, given=view.given._replace(memory=memory))
 
 
 def gusts_of(view: View, theta: Array) -> float:

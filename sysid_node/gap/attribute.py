@@ -16,8 +16,9 @@ from sysid_node.gap.candidates import BETWEEN, candidates_of
 from sysid_node.gap.evidence import probabilities
 from sysid_node.gap.fit import Fit, blank, linearised
 from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.sizes import unbiased
 from sysid_node.gap.steps import Steps
-from sysid_node.gap.structure import Structure, structure_of, unbiased
+from sysid_node.gap.structure import Structure, structure_of
 from sysid_node.gap.trials import Progress, Trial, Trier, likeliest, narrowed
 from sysid_node.gap.view import View
 

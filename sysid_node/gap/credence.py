@@ -22,7 +22,7 @@ from sysid_node.gap.nuisance import WIDENED
 PLIABLE = frozenset({WIDENED, "inertia_error", "mass_error", "cg_shift"})
 
 #: Weights of a constant, of the logarithm of the nats, and of pliability (bench/gap_credence.py).
-WEIGHTS = (-2.02, 0.73, -1.83)
+WEIGHTS = (-4.17, 1.18, -1.33)
 
 #: Amplitude of what goes with a cause and is left, as a share of what it does, from which its law is refuted.
 REFUTED = 0.3

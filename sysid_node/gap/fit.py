@@ -26,8 +26,8 @@ from sysid_node.gap.view import CHANNELS, View
 #: Weighted residual beyond which a prediction has grown without end, as that of a mode that feeds itself does.
 _ENDLESS = 1e100
 
-#: Rounds of linearising the nuisances anew; a fourth changes nothing that matters.
-_ROUNDS = 3
+#: Most rounds of linearising the nuisances and weighing anew, and the deviance from which another changes nothing.
+_ROUNDS, _SETTLED = 8, 0.3
 
 #: Times that nuisances are put at their limits before what is left beyond is cut off.
 _BINDINGS = 6
@@ -180,14 +180,32 @@ def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisan
                    information=None, cost=np.inf)  # fmt: skip
 
 
-def polish(fit: Fit, rounds: int = _ROUNDS, reweigh: bool = True) -> Fit:
-    """The fit with everything it can move moved, and its weights those of its own residual."""
+def polish(fit: Fit, rounds: int = _ROUNDS) -> Fit:
+    """The fit with everything it can move moved, and its weights those of its own residual.
+
+    Weights and nuisances of one round may throw the next one back: the likeliest counts.
+    """
+    best, least, last = fit, np.inf, np.inf
     for _ in range(rounds):
         fit = _one_round(fit)
-        if reweigh:
-            residuals = (v.residual(p) for v, p in zip(fit.views, fit.points, strict=True))
-            fit = replace(fit, power=tuple(residual_power(v, r) for v, r in zip(fit.views, residuals, strict=True)))
-    return linearised(fit)
+        residuals = [v.residual(p) for v, p in zip(fit.views, fit.points, strict=True)]
+        fit = replace(fit, power=tuple(residual_power(v, r) for v, r in zip(fit.views, residuals, strict=True)))
+        raw = ((np.abs(residual) ** 2).mean(axis=0) for residual in residuals)
+        deviance = sum(_deviance(v, p) for v, p in zip(fit.views, raw, strict=True)) - 2.0 * fit.prior_score
+        if not deviance >= least:
+            best, least = fit, deviance
+        if not abs(deviance - last) >= _SETTLED:
+            break
+        last = deviance
+    return linearised(best)
+
+
+def _deviance(view: View, power: Array) -> float:
+    """Minus twice the log probability, up to a constant, of a remainder of power (L, 12), as of its own spectrum."""
+    floor = np.where(view.axes, np.maximum(view.windows.smoothed(power), view.noise), 1.0)
+    lines = np.ones((power.shape[0], 1))
+    lines[0] = 0.5
+    return 2.0 * SHARE * view.windows.count * float(np.sum(lines * (np.log(floor) + power / floor)))
 
 
 def _one_round(fit: Fit) -> Fit:
@@ -321,11 +339,7 @@ class Projected:
             shape = (view.windows.count, weight.size)
             own = rows[first : first + shape[0] * shape[1]].reshape(shape)
             first += own.size
-            power = np.mean(np.abs(amplitudes(own, weight)) ** 2, axis=0)
-            floor = np.where(view.axes, np.maximum(view.windows.smoothed(power), view.noise), 1.0)
-            lines = np.ones((power.shape[0], 1))
-            lines[0] = 0.5
-            total += 2.0 * SHARE * shape[0] * float(np.sum(lines * (np.log(floor) + power / floor)))
+            total += _deviance(view, np.mean(np.abs(amplitudes(own, weight)) ** 2, axis=0))
         return total
 
     def points(self, values: Array) -> tuple[Array, ...]:

@@ -12,7 +12,8 @@ from sysid_node.gap.close import Gap
 from sysid_node.gap.evidence import Evidence, groups_of, held_out
 from sysid_node.gap.flown import flown, foreseen
 from sysid_node.gap.nuisance import Nuisances
-from sysid_node.gap.structure import Structure, unbiased
+from sysid_node.gap.sizes import unbiased
+from sysid_node.gap.structure import Structure
 from sysid_node.gap.view import View
 
 

@@ -116,22 +116,55 @@ def undone(chain: Chain, motion: Motion) -> Sample:
     return Sample(inertial.force, inertial.rates, velocity, inertial.attitude, flow, reading)
 
 
-def flow_rate(chain: Chain, motion: Motion) -> Scalar:
-    """Rates (N, 3) of airspeed (m/s^2), alpha and beta (rad/s) at the probe, in still air, at the time of the samples.
+class FlowRates(NamedTuple):
+    """How fast the flow changes, at the time of the samples."""
 
-    By the inertial instruments: differentiated, the vanes' noise would pass for motion.
+    at_probe: Scalar  # (N, 3) of airspeed (m/s^2), alpha and beta (rad/s), in still air
+    alpha: Scalar  # (N,) rad/s at the CG, with as much of the air's own motion as the memory lets through
+
+
+def flow_rates(chain: Chain, motion: Motion, memory: Scalar | float) -> FlowRates:
+    """By the inertial instruments: differentiated, the vanes' noise would pass for motion.
+
+    What gusts do to alpha, the vane shows: beyond a memory (s) it is followed.
     """
-    return _flow_rate(chain, _inertial(chain, motion), _reading(chain, motion))
+    inertial, reading = _inertial(chain, motion), _reading(chain, motion)
+    at_probe = _flow_rate(chain, inertial, reading)
+    flow = sensors.before_lag(chain.effects, reading, at_probe, chain.step)
+    velocity = airflow.velocity_of(*flow.T).minus(inertial.rates.cross(_probe(chain)))
+    moving, _ = rates_of_change(velocity, inertial.attitude, inertial.force, inertial.rates)
+    _, still, _ = _rates_of_flow(velocity, moving)
+    _, alpha, _ = airflow.flow_angles(velocity)
+    return FlowRates(at_probe, _with_gusts(alpha, still, memory, chain.step))
+
+
+def _with_gusts(angle: Scalar, still: Scalar, memory: Scalar | float, step: Scalar) -> Scalar:
+    """Rate (N,) of an angle as the vane has it, from its rate in still air: a complementary filter."""
+
+    def advance(expected: Scalar, sample: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        seen, rate, remembered = sample
+        beyond = (seen - expected) / (remembered + step)
+        return expected + (rate + beyond) * step, rate + beyond
+
+    begun = jnp.minimum(jnp.arange(angle.size) * step, memory)
+    _, rates = jax.lax.scan(advance, angle[0], (angle, still, begun))
+    return rates
 
 
 def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
     force, rates, turning, attitude = inertial
-    u, v, w = velocity = airflow.velocity_of(*reading.T)
+    velocity = airflow.velocity_of(*reading.T)
     moving, _ = rates_of_change(velocity.minus(rates.cross(_probe(chain))), attitude, force, rates)
-    du, dv, dw = moving.plus(turning.cross(_probe(chain)))
-    forward, speed = jnp.hypot(u, w), reading[:, 0]
+    return jnp.stack(_rates_of_flow(velocity, moving.plus(turning.cross(_probe(chain)))), axis=1)
+
+
+def _rates_of_flow(velocity: Vector, rate: Vector) -> tuple[Scalar, Scalar, Scalar]:
+    """Of airspeed, alpha and beta, of a velocity (m/s) and its rate (m/s^2)."""
+    u, v, w = velocity
+    du, dv, dw = rate
+    forward, speed = jnp.hypot(u, w), jnp.sqrt(u * u + v * v + w * w)
     faster = (u * du + v * dv + w * dw) / speed
-    return jnp.stack([faster, (u * dw - w * du) / forward**2, (dv - v * faster / speed) / forward], axis=1)
+    return faster, (u * dw - w * du) / forward**2, (dv - v * faster / speed) / forward
 
 
 def _inertial(chain: Chain, motion: Motion) -> _Inertial:

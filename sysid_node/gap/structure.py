@@ -11,7 +11,7 @@ model of the aircraft beats.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -20,8 +20,7 @@ from scipy.signal import lfilter
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import bounds, prior
 from sysid_node.gap.deliberate import deliberate
-from sysid_node.gap.fit import Fit, linearised, moved, real_rows, weights
-from sysid_node.gap.nuisance import gusty
+from sysid_node.gap.fit import Fit, real_rows, weights
 from sysid_node.gap.spectra import Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
@@ -62,20 +61,6 @@ def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
     beyond = coherent - size
     chance = np.sqrt(2.0 * np.maximum(size, 1.0))
     return Structure(np.maximum(beyond, 0.0), total, beyond / chance, chance)
-
-
-def unbiased(fit: Fit) -> Fit:
-    """The fit as the instruments have it where the air moves; in still air least squares has no bias, and errs less."""
-    return instrumented(instrumented(fit)) if any(gusty(view) for view in fit.views) else fit
-
-
-def instrumented(fit: Fit) -> Fit:
-    """The fit with its unknowns as the instruments have them, which gusts do not bias; its errors are theirs too.
-
-    One Gauss-Newton step from where the fit stands, and everything linearised there.
-    """
-    seen = equations(fit, fit.power)
-    return replace(linearised(moved(fit, within_limits(seen, fit))), information=seen.information)
 
 
 @dataclass(frozen=True)

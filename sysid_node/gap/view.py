@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flights import Flight
-from sysid_node.gap.kinematics import READINGS, Motion, flow_rate, motion_of, reconstruct
+from sysid_node.gap.kinematics import READINGS, Motion, flow_rates, motion_of, reconstruct
 from sysid_node.gap.recent import Recent
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator, parameters
@@ -48,12 +48,19 @@ _BLOCK = 500
 _Kept = TypeVar("_Kept")
 
 
+class Memory(NamedTuple):
+    """How long what the inertial instruments tell of the air's motion is remembered, s."""
+
+    observer: Scalar | float  # before the air data are believed
+    vane: Scalar | float  # before the rate of alpha follows the vane
+
+
 class Given(NamedTuple):
     """All that a prediction takes from a flight."""
 
     signals: Signals  # padded
     motion: Motion | None  # padded; None without attitude
-    fading: Scalar  # s, of the observer
+    memory: Memory
     step: Scalar  # s
 
 
@@ -63,7 +70,8 @@ def _forces(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar
     signals = given.signals
     if given.motion is not None:
         chain = Chain.of(layout, model, theta, given.step, jnp.zeros(()))
-        signals = signals._replace(flow_rate=flow_rate(chain, given.motion))
+        rates = flow_rates(chain, given.motion, given.memory.vane)
+        signals = signals._replace(flow_rate=rates.at_probe, alpha_rate=rates.alpha)
     return coefficients(model, given.signals, predict(layout, model, theta, signals, given.step))
 
 
@@ -72,7 +80,7 @@ def _readings(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scal
     """Air data and attitude (N, 6) that parameters (P,) expect; nothing without attitude."""
     if given.motion is None:
         return jnp.zeros((given.signals.density.size, len(READINGS)))
-    return reconstruct(layout, model, theta, given.motion, given.fading, given.step)
+    return reconstruct(layout, model, theta, given.motion, given.memory.observer, given.step)
 
 
 @partial(jax.jit, static_argnums=(0, 1))
@@ -222,14 +230,19 @@ def _lanes(places: list[int]) -> Iterator[list[int]]:
 
 
 def bare(
-    simulator: Simulator, flight: Flight, record: FlightRecord, windows: Windows, axes: NDArray[np.bool_], fading: float
+    simulator: Simulator,
+    flight: Flight,
+    record: FlightRecord,
+    windows: Windows,
+    axes: NDArray[np.bool_],
+    memory: Memory,
 ) -> View:
     """A view that does not know its noise."""
-    given, series = _given(simulator, record, fading)
+    given, series = _given(simulator, record, memory)
     return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
 
 
-def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[Given, Array]:
+def _given(simulator: Simulator, record: FlightRecord, memory: Memory) -> tuple[Given, Array]:
     """What a prediction needs, padded, and the measured channels (N, 12)."""
     signals, short = signals_of(simulator, record), -len(record) % _BLOCK
     motion = motion_of(record)
@@ -238,7 +251,7 @@ def _given(simulator: Simulator, record: FlightRecord, fading: float) -> tuple[G
     forces = np.asarray(_reduced(simulator.model, signals, shown))[: len(record)]
     read = jnp.zeros((len(shown), len(READINGS))) if motion is None else jnp.hstack([motion.air, motion.attitude])
     readings = np.asarray(read)[: len(record)]
-    given = Given(signals, motion, jnp.asarray(fading), jnp.asarray(simulator.step))
+    given = Given(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
     return given, np.concatenate([forces, readings], axis=1)
 
 
@@ -247,4 +260,4 @@ def _padded(series: Scalar | Array, short: int) -> Scalar:
     return jnp.pad(jnp.asarray(series), [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge")
 
 
-__all__ = ["CHANNELS", "COEFFICIENTS", "LONGEST", "View", "bare", "kinematic"]
+__all__ = ["CHANNELS", "COEFFICIENTS", "LONGEST", "Memory", "View", "bare", "kinematic"]

@@ -11,8 +11,9 @@ from sysid_node.gap import inferred
 from sysid_node.gap.air import gusts_of, instruments_at_best, memory_of
 from sysid_node.gap.flights import Flight, thinned
 from sysid_node.gap.kinematics import motion_of
+from sysid_node.gap.nuisance import gusty
 from sysid_node.gap.spectra import Windows
-from sysid_node.gap.view import CHANNELS, COEFFICIENTS, LONGEST, View, bare
+from sysid_node.gap.view import CHANNELS, COEFFICIENTS, LONGEST, Memory, View, bare
 from sysid_node.sim import Simulator
 
 #: Channels of a flight without lateral measurements.
@@ -40,19 +41,20 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
     axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
     axes[[CHANNELS.index(name) for name in flight.inferred]] = False
-    calm = _measured_noise(bare(simulator, flight, record, windows, axes, LONGEST), seed)
+    calm = _measured_noise(bare(simulator, flight, record, windows, axes, Memory(LONGEST, LONGEST)), seed)
     instruments = instruments_at_best(calm)
     calm = replace(calm, gusts=gusts_of(calm, instruments))
     memory = memory_of(calm, instruments)
     if memory == LONGEST:
         return calm
-    shorter = bare(simulator, flight, record, windows, axes, memory)
+    vane = memory if gusty(calm) else LONGEST
+    shorter = bare(simulator, flight, record, windows, axes, Memory(memory, vane))
     return _measured_noise(replace(shorter, gusts=calm.gusts), seed)
 
 
 def view_like(view: View, record: FlightRecord) -> View:
     """Another record of the same length, seen as this one: with its noise and its observer."""
-    again = bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
+    again = bare(view.simulator, view.flight, record, view.windows, view.axes, view.given.memory)
     return replace(again, noise=view.noise)
 
 
@@ -67,7 +69,7 @@ def _noise_power(view: View, random: np.random.Generator) -> Array:
     power = np.zeros(clean.shape[1:])
     for _ in range(_REALISATIONS):
         record = thinned(noisier(view, random), view.simulator.rate)
-        again = bare(view.simulator, view.flight, record, view.windows, view.axes, float(view.given.fading))
+        again = bare(view.simulator, view.flight, record, view.windows, view.axes, view.given.memory)
         power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / _REALISATIONS
     return np.maximum(view.windows.smoothed(power), 1e-18)
 

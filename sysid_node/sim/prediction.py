@@ -53,6 +53,7 @@ class Signals(NamedTuple):
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     climb: Scalar  # (N,) m since the start
     flow_rate: Scalar | None = None  # (N, 3) rate of the flow at the probe, when it moved, m/s^2, rad/s
+    alpha_rate: Scalar | None = None  # (N,) rad/s, at the CG, when it moved
 
 
 class _Memory(NamedTuple):
@@ -175,7 +176,7 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
         rates=rates,
         density=signals.density,
         climb=signals.climb,
-        alpha_rate=slope(alpha, step),
+        alpha_rate=slope(alpha, step) if signals.alpha_rate is None else signals.alpha_rate,
         time=jnp.arange(signals.density.shape[0]) * step,
     )
 

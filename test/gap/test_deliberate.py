@@ -5,7 +5,8 @@ import pytest
 from sysid_node.gap.deliberate import deliberate, driven_by_weather, purposeful
 from sysid_node.gap.fit import blank, polish
 from sysid_node.gap.nuisance import nuisances_of
-from sysid_node.gap.structure import structure_of, unbiased
+from sysid_node.gap.sizes import unbiased
+from sysid_node.gap.structure import structure_of
 from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 

@@ -6,8 +6,8 @@ import pytest
 from sysid_node.gap.errors import standard_errors
 from sysid_node.gap.fit import blank
 from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.sizes import unbiased
 from sysid_node.gap.steps import Steps
-from sysid_node.gap.structure import unbiased
 from sysid_node.gap.trials import Trier
 from sysid_node.gap.view import View
 from sysid_node.gap.viewing import view_of

@@ -55,4 +55,4 @@ def test_gusts_are_measured_by_the_vanes(aircraft, plain_view) -> None:
     gusty = view_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
     assert plain_view.gusts < 0.1
     assert 0.3 < gusty.gusts < 1.5
-    assert float(gusty.given.fading) < float(plain_view.given.fading)
+    assert float(gusty.given.memory.observer) < float(plain_view.given.memory.observer)
