@@ -4,7 +4,8 @@ Simulator, online estimator, exciter and controller in one process, calling what
 30 s; the tracking error is that of the true attitude from the reference model's, over the seconds from 10 s after the
 failure on, while neither of the two flights compared is excited, and again all the while. `--draws 200` flies as many
 random failures, noises and turbulences, each with and without adaptation, and keeps its results in a file as they come;
-`--exciter` counts the seconds of excitation that stopping early saves.
+`--exciter` counts the seconds of excitation that stopping early saves. `--method iv_rft` has all of it flown with
+instrumental variables instead of least squares.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from evaluation.closed_loop import EXCITATION, RATE, Flown, Sortie, aft, baselin
 from evaluation.pages import publish, table
 from numpy.typing import NDArray
 
+from sysid_node.online.settings import METHODS
 from sysid_node.sim.live import Air
 from sysid_node.sim.picture import Panel, draw
 
@@ -42,11 +44,12 @@ FIXED = 60.0  # s of excitation when nobody looks
 ASKED = ("Cm_de", "Cm_alpha")
 
 
-def failures(turbulence: str, flights: int) -> str:
+def failures(turbulence: str, flights: int, method: str) -> str:
     """The table of failures: mean of several flights."""
     rows = []
     for name, effects in FAILURES.items():
-        pairs = [both(Sortie(effects, ONSET, END, Air(turbulence, seed=seed + 1))) for seed in range(flights)]
+        airs = [Air(turbulence, seed=seed + 1) for seed in range(flights)]
+        pairs = [both(Sortie(effects, ONSET, END, air, method=method)) for air in airs]
         whole = np.array([[flown.error(SETTLED, END) for flown in pair] for pair in pairs])
         rest = [pair for pair in pairs if calm(*pair) >= LEAST_CALM]
         quiet = np.array(
@@ -126,11 +129,11 @@ def random_sortie(seed: int) -> Sortie:
     return Sortie(effects, *DRAW, air, excitation=excitation, asked=draw.uniform(0.3, 1.3))
 
 
-def draws(count: int, results: Path) -> str:
+def draws(count: int, first: int, method: str, results: Path) -> str:
     """Fly what is not yet in the file of results, and sum up."""
     known = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
-    for seed in range(len(known) + 1, count + 1):
-        sortie = random_sortie(seed)
+    for seed in range(first + len(known), first + count):
+        sortie = replace(random_sortie(seed), method=method)
         fixed, adapted = both(sortie)
         row = {
             "seed": seed,
@@ -161,7 +164,7 @@ def _summary(rows: Sequence[dict[str, list[list[float]]]]) -> str:
     return table(("turbulence", *heads, "adapted over baseline: 5 %", "median", "95 %"), cells)
 
 
-def exciter(flights: int) -> str:
+def exciter(flights: int, method: str) -> str:
     """The table of excitation time."""
     rows = []
     for turbulence in ("none", "light"):
@@ -170,7 +173,8 @@ def exciter(flights: int) -> str:
             settings = replace(EXCITATION, manoeuvre=(spec,), derivatives=ASKED, accuracy=0.05, watch=False)
             took = []
             for seed in range(flights):
-                flown = fly(Sortie((), 1e9, FIXED + 4.0, Air(turbulence, seed=seed + 1), False, settings))
+                air = Air(turbulence, seed=seed + 1)
+                flown = fly(Sortie((), 1e9, FIXED + 4.0, air, False, settings, method=method))
                 ends = [event.time for event in flown.events if event.text.startswith("known")]
                 took.append(ends[0] - flown.events[0].time if ends else FIXED)
             known = sum(t < FIXED for t in took)
@@ -196,25 +200,30 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=4, help="for each row (default: 4)")
     parser.add_argument("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
     parser.add_argument("--draws", type=int, default=0, help="fly so many random failures instead")
+    parser.add_argument("--first", type=int, default=1, help="seed of the first of them (default: 1)")
     parser.add_argument("--results", type=Path, default=Path("out/closed_loop_draws.jsonl"), help="of the draws")
     parser.add_argument("--exciter", action="store_true", help="count seconds of excitation instead")
+    parser.add_argument("--method", choices=METHODS, default=Sortie.method, help="of the estimator (default: sls_rft)")
     parser.add_argument("--picture", type=Path, help="SVG file to draw instead")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     if args.picture:
         picture(args.picture)
-    elif args.draws:
+        return
+    publish(*_told(args), args.page)
+
+
+def _told(args: argparse.Namespace) -> tuple[str, str]:
+    """Name and table of what was asked for."""
+    by = "" if args.method == Sortie.method else f" --method {args.method}"
+    if args.draws:
         args.results.parent.mkdir(parents=True, exist_ok=True)
-        publish("bench/closed_loop.py --draws", draws(args.draws, args.results), args.page)
-    elif args.exciter:
-        publish("bench/closed_loop.py --exciter", exciter(args.flights), args.page)
-    else:
-        name = (
-            "bench/closed_loop.py"
-            if args.turbulence == "none"
-            else f"bench/closed_loop.py --turbulence {args.turbulence}"
-        )
-        publish(name, failures(args.turbulence, args.flights), args.page)
+        begun = "" if args.first == 1 else f" --first {args.first}"
+        return f"bench/closed_loop.py --draws{begun}{by}", draws(args.draws, args.first, args.method, args.results)
+    if args.exciter:
+        return f"bench/closed_loop.py --exciter{by}", exciter(args.flights, args.method)
+    air = "" if args.turbulence == "none" else f" --turbulence {args.turbulence}"
+    return f"bench/closed_loop.py{air}{by}", failures(args.turbulence, args.flights, args.method)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import LifecycleNode, Node
 
 CONFIG = Path(get_package_share_directory("sysid_node"), "config")
-FAILING = {"method": "sls_rft"}  # instruments are made of the aircraft file, which a failed aircraft is not
 RECORDED = (
     *("imu/data", "air_data", "actuators", "actuators/command", "actuators/excitation", "set_points"),
     *("identifier/derivatives", "adaptive_controller/tracking", "fault_monitor/faults", "pose", "/diagnostics"),
@@ -36,9 +35,10 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("aircraft", default_value="cdrw", description="a name, or an aircraft file"),
             DeclareLaunchArgument("turbulence", default_value="none", description="none, light, moderate or severe"),
             DeclareLaunchArgument("adapt", default_value="true", description="false: the aircraft file's gains"),
+            DeclareLaunchArgument("method", default_value="sls_rft", description="of the identifier; iv_rft in gusts"),
             DeclareLaunchArgument("bag", default_value="", description="folder to record into; empty: none"),
             Node(**described("flight_simulator", turbulence=LaunchConfiguration("turbulence"))),
-            LifecycleNode(namespace="", **described("identifier", **FAILING)),
+            LifecycleNode(namespace="", **described("identifier", method=LaunchConfiguration("method"))),
             Node(**described("exciter", watch=True, accuracy=0.15)),
             Node(**described("fault_monitor")),
             Node(**described("adaptive_controller", adapt=LaunchConfiguration("adapt"))),

@@ -28,8 +28,6 @@ RATE = 100.0  # Hz, of everything
 ESTIMATES = 20.0  # Hz
 BEGIN = 3.0  # s, when excitation begins
 ACTUATORS = "actuator_lag:time_constant=0.05"
-#: Least squares: instruments are made of the file's aircraft, which a failed one is not.
-METHOD = "sls_rft"
 #: Known well enough to fly on; what is lost later is excited again.
 EXCITATION = Excitation(accuracy=0.15, watch=True)
 
@@ -46,6 +44,7 @@ class Sortie:
     excitation: Excitation = EXCITATION
     asked: float = 1.0  # size of the set-points
     aircraft: str = "cdrw"
+    method: str = "sls_rft"  # least squares: instruments are made of the file's aircraft, which a failed one is not
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ def fly(sortie: Sortie) -> Flown:
     failed = live.vector(simulator, [ACTUATORS, *sortie.effects])
     flight = live.start(simulator, trim, sortie.air, sound)
     pilot = controller.init(aircraft, Control(adapt=sortie.adapt))
-    session = Session(aircraft, Estimation(method=METHOD), ESTIMATES)
+    session = Session(aircraft, Estimation(method=sortie.method), ESTIMATES)
     exciter = inflight.init(aircraft, sortie.excitation)
     command: Sequence[float] = trim.command.tolist()
     rows, lost = [], math.inf

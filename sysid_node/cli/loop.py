@@ -25,6 +25,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.apart import make_folder, own_domain
 from sysid_node.cli.processes import node_process
 from sysid_node.errors import InputError
+from sysid_node.online.settings import METHODS
 from sysid_node.report.loop import Episode, Event, write_loop
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ START_UP = 60.0  # s in which the first command must come
 WATCHED = ("Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
 NODES: Mapping[str, tuple[str, ...]] = {
     "flight_simulator": (f"effects:='{ACTUATORS}'",),
-    "identifier": ("method:=sls_rft",),
+    "identifier": (),
     "exciter": ("watch:=true", "accuracy:=0.15"),
     "fault_monitor": (),
     "adaptive_controller": (),
@@ -56,6 +57,7 @@ class Plan:
     seconds: float
     adapt: bool
     turbulence: str
+    method: str
     out: Path
 
 
@@ -68,6 +70,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--seconds", type=float, default=60.0, help="of flight (default: 60)")
     add("--fixed", dest="adapt", action="store_false", help="with the fixed gains of the aircraft file, to compare")
     add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
+    add("--method", choices=METHODS, default="sls_rft", help="of the identifier (default: sls_rft)")
     add("--out", metavar="DIR", type=Path, default=Path("out/loop"), help="default: out/loop")
     return parser
 
@@ -79,7 +82,7 @@ def run(args: argparse.Namespace) -> None:
     aircraft = load_aircraft(args.aircraft)
     make_folder(args.out)
     own_domain()
-    plan = Plan(aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.out)
+    plan = Plan(aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.method, args.out)
     episode = _fly(plan)
     write_loop(args.out, episode)
     print(_summary(plan, episode))
@@ -125,6 +128,8 @@ def _arguments(plan: Plan, name: str) -> list[str]:
     own = [f"aircraft:={plan.name}", *NODES[name]]
     if name == "flight_simulator":
         own.append(f"turbulence:={plan.turbulence}")
+    if name == "identifier":
+        own.append(f"method:={plan.method}")
     if name == "adaptive_controller":
         own.append(f"adapt:={str(plan.adapt).lower()}")
     return ["--ros-args", *(word for pair in own for word in ("-p", pair))]
