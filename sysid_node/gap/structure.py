@@ -21,7 +21,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import bounds, prior
 from sysid_node.gap.deliberate import deliberate
 from sysid_node.gap.fit import Fit, real_rows, weights
-from sysid_node.gap.spectra import Complex
+from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
@@ -39,6 +39,7 @@ class Structure:
     total: Array
     deviations: Array  # how many standard deviations the coherent power lies above chance
     chance: Array  # such a standard deviation, in noise levels
+    noise: Array  # of what no instrument foretells, in noise levels
 
     @property
     def share(self) -> Array:
@@ -47,20 +48,29 @@ class Structure:
 
 
 def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
-    """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare."""
+    """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare.
+
+    Least squares leaves less than the noise where it passed gusts off as derivatives; chance is that of what the
+    instruments' estimate leaves where they do not see (Basmann (1960), J. Am. Stat. Assoc. 55).
+    """
     seen = equations(fit, (like or fit).power)
     step = within_limits(seen, fit)
-    coherent, total, size = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
+    coherent, total, size, scatter = (np.zeros(len(CHANNELS)) for _ in range(4))
     for U, r, J in zip(seen.basis, seen.rows, seen.slopes, strict=True):
         left = r - J @ step
         for axis, directions in U.items():
             series = left[:, :, axis].ravel()
-            coherent[axis] += float(np.sum((directions.T @ series) ** 2))
-            total[axis] += float(np.sum(series**2))
-            size[axis] += directions.shape[1]
-    beyond = coherent - size
-    chance = np.sqrt(2.0 * np.maximum(size, 1.0))
-    return Structure(np.maximum(beyond, 0.0), total, beyond / chance, chance)
+            along, whole = float(np.sum((directions.T @ series) ** 2)), float(series @ series)
+            count = directions.shape[1]
+            others = max(SHARE * np.count_nonzero(series) - count, 1.0)
+            noise = max(1.0, (whole - along) / others)
+            coherent[axis] += along
+            total[axis] += whole
+            size[axis] += count * noise
+            scatter[axis] += 2.0 * count * noise**2
+    beyond, chance = coherent - size, np.sqrt(np.maximum(scatter, 2.0))
+    noise_levels = np.where(size > 0.0, 0.5 * scatter / np.maximum(size, 1.0), 1.0)
+    return Structure(np.maximum(beyond, 0.0), total, beyond / chance, chance, noise_levels)
 
 
 @dataclass(frozen=True)
