@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +13,16 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 
 from sysid_node.errors import InputError
+from sysid_node.flight.bag_messages import Messages, read_messages
 from sysid_node.flight.cdr import Fields, decode
 from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
 from sysid_node.flight.messages import type_store
 from sysid_node.flight.record import Array
-from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Streams
+from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
 #: Above this variance (rad^2) an IMU's heading counts as not measured.
 HEADING_UNKNOWN = 1.0e3
-
-
-@dataclass
-class _Raw:
-    """One topic's messages as bytes, in log order."""
-
-    data: list[bytes] = field(default_factory=list)
-    log_ns: list[int] = field(default_factory=list)
-    order: list[int] = field(default_factory=list)
 
 
 def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu") -> Streams:
@@ -44,7 +35,7 @@ def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, fram
     path, topics = Path(path), topics or topic_names()
     said = f"bag {path.name}"
     with _reading(path, said):
-        raw = _read_raw(path, topics, said)
+        raw = _read_messages(path, topics, said)
     with _reading(path, said):
         return Streams(
             _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA]), _joint_stream(raw[ACTUATORS]), said
@@ -83,22 +74,14 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _read_raw(path: Path, topics: Mapping[str, str], said: str) -> dict[str, _Raw]:
+def _read_messages(path: Path, topics: Mapping[str, str], said: str) -> dict[str, Messages]:
     """The bytes of all messages of the input topics."""
-    raw = {topic: _Raw() for topic in topics}
     with Reader(path) as reader:
-        chosen = _choose(reader, topics, said)
-        into = {connection.id: raw[topic] for topic, connections in chosen.items() for connection in connections}
-        every = [connection for connections in chosen.values() for connection in connections]
-        for place, (connection, log_ns, data) in enumerate(reader.messages(every)):
-            one = into[connection.id]
-            one.data.append(data)
-            one.log_ns.append(log_ns)
-            one.order.append(place)
-    for topic, one in raw.items():
-        if not one.data:
+        messages = read_messages(reader, _choose(reader, topics, said))
+    for topic, some in messages.items():
+        if not some.data:
             raise InputError(f"{said}: no messages on {topics[topic]}; record that topic too")
-    return raw
+    return messages
 
 
 def _choose(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, list[Connection]]:
@@ -121,14 +104,14 @@ def _choose(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, l
     return {topic: [c for c in reader.connections if c.topic == name] for topic, name in topics.items()}
 
 
-def _arrival(raw: _Raw, stamp_ns: NDArray[np.int64]) -> Arrival:
-    return Arrival(stamp_ns, np.array(raw.log_ns, np.int64), np.array(raw.order, np.int64))
+def _arrival(raw: Messages, stamp_ns: Stamps) -> Arrival:
+    return Arrival(stamp_ns, raw.log_ns, raw.order)
 
 
-def _stamps(fields: Fields) -> NDArray[np.int64]:
+def _stamps(fields: Fields) -> Stamps:
     """Header stamps, ns."""
     seconds = fields.numbers("header.stamp.sec").astype(np.int64)
-    nanoseconds: NDArray[np.int64] = seconds * 1_000_000_000 + fields.numbers("header.stamp.nanosec")
+    nanoseconds: Stamps = seconds * 1_000_000_000 + fields.numbers("header.stamp.nanosec")
     return nanoseconds
 
 
@@ -137,7 +120,7 @@ def _columns(fields: Fields, *paths: str) -> Array:
     return np.column_stack([fields.numbers(path) for path in paths]).astype(np.float64, copy=False)
 
 
-def _imu_stream(raw: _Raw, frame: BodyFrame) -> ImuStream:
+def _imu_stream(raw: Messages, frame: BodyFrame) -> ImuStream:
     count = len(raw.data)
     stamps, values, attitude = np.empty(count, np.int64), np.empty((count, 6)), np.empty((count, 3))
     frame_id = ""
@@ -160,7 +143,7 @@ def _attitude(fields: Fields, frame: BodyFrame) -> Array:
     return euler
 
 
-def _air_data_stream(raw: _Raw) -> AirDataStream:
+def _air_data_stream(raw: Messages) -> AirDataStream:
     stamps, values = np.empty(len(raw.data), np.int64), np.empty((len(raw.data), 4))
     for at, fields in decode(type_store(), INPUT_TOPICS[AIR_DATA], raw.data):
         stamps[at] = _stamps(fields)
@@ -168,7 +151,7 @@ def _air_data_stream(raw: _Raw) -> AirDataStream:
     return AirDataStream(_arrival(raw, stamps), values)
 
 
-def _joint_stream(raw: _Raw) -> JointStream:
+def _joint_stream(raw: Messages) -> JointStream:
     stamps = np.empty(len(raw.data), np.int64)
     parts: list[tuple[NDArray[np.intp], Sequence[str], NDArray[Any]]] = []
     for at, fields in decode(type_store(), INPUT_TOPICS[ACTUATORS], raw.data):
