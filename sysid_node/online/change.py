@@ -47,7 +47,7 @@ OUTLIER = 10.0  # an F beyond this is no usual one
 class Watch:
     """The last pieces of the transform, the estimates that belong to their starts, and what was found of the spans."""
 
-    pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, T)
+    pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, W)
     references: deque[Reference] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))  # (C,) F where nothing changes
     doubted: dict[int, Flags] = field(default_factory=dict)  # (C,) by span

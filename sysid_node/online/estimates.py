@@ -33,11 +33,9 @@ def estimate_of(state: State, current: Present | None, now: float | None = None)
     return _named(state, time, *_told(state, renewed, current, time if now is None else now))
 
 
-def estimates_at(
-    state: State, lines: Sequence[Array], times: Sequence[float], nows: Sequence[float]
-) -> list[Estimates]:
-    """The same at several ``times`` (s) since the last renewal, when the transform was ``lines`` (2F + 1, T)."""
-    current, renewed = present_at(state, np.array(lines), np.array(times)), state.renewed
+def estimates_at(state: State, lines: Array, times: Sequence[float], nows: Sequence[float]) -> list[Estimates]:
+    """The same at K ``times`` (s) since the last renewal, when the transform was ``lines`` (K, 2F + 1, W)."""
+    current, renewed = present_at(state, lines, np.array(times)), state.renewed
     if current is None or renewed is None:
         return [Estimates(time, _nothing_known(state), {}) for time in times]
     told = _told(state, renewed, current, np.array(nows))

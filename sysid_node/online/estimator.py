@@ -69,7 +69,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
     )
-    running = transform.start(grid, layout.transformed, memory)
+    running = transform.start(grid, layout.transformed, memory, len(layout.instrumented))
     nothing, flow = information.nothing(layout), reconstruction.init(aircraft)
     return State(model, running, plan, nothing, flow, experiences=experiences(plan, layout))
 

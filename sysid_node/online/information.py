@@ -20,11 +20,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dger
 
 from sysid_node.online.auxiliary import Auxiliary, fill_in
 from sysid_node.online.signals import OFFSET, Layout
@@ -32,6 +32,7 @@ from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
+_NUISANCES = slice(OFFSET, OFFSET + 3)
 BANDS = 6
 
 
@@ -45,7 +46,7 @@ class Information:
     trace_square: float  # of the noise covariance squared, over all lines
     energy: float  # s: integral of the window squared: the duration, where nothing is forgotten
     bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
-    integrals: Array  # (T,) of the transformed signals over time
+    integrals: Array  # (W,) of the transformed signals over time
     samples: float
     uneven: Unevenness = field(default_factory=Unevenness)
 
@@ -61,7 +62,7 @@ def nothing(layout: Layout) -> Information:
     """No information at all."""
     width = layout.width
     zeros = np.zeros((BANDS, width, width))
-    bias, none = np.zeros((width, width)), np.zeros(layout.transformed)
+    bias, none = np.zeros((width, width)), np.zeros(width)
     return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, 0.0)
 
 
@@ -100,30 +101,23 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
 
 
 def about_mean(transform: Array, model: Auxiliary | None) -> Array:
-    """(..., 2F, W) lines of transforms (..., 2F + 1, T) whose signals are taken about their means, and of instruments.
+    """(..., 2F, W) lines of transforms (..., 2F + 1, W) whose signals are taken about their means, and of instruments.
 
-    Nuisances are kept. The airspeed's noise is in k: fitting the offset to the lines of k would regress on noise.
+    The lines are made where the transforms lie, which must be in one piece. Nuisances are kept. The airspeed's noise is
+    in k: fitting the offset to the lines of k would regress on noise.
     """
-    T = transform.shape[-1]
-    share = transform[..., -1, :] / np.maximum(transform[..., -1, OFFSET, None], 1e-12)
-    share[..., OFFSET : OFFSET + 3] = 0.0
-    unit = _unit(T, T + (0 if model is None else model.gains.shape[1]))
-    change = np.empty((*transform.shape[:-2], *unit.shape))
-    change[...] = unit
-    change[..., OFFSET, :T] -= share
-    lines: Array = transform[..., :-1, :] @ change  # z - k share, and room for the instruments
+    for one in transform.reshape(-1, *transform.shape[-2:]):
+        share = one[-1] / max(one[-1, OFFSET], 1e-12)
+        share[_NUISANCES] = 0.0
+        dger(-1.0, share, one[:, OFFSET], a=one.T, overwrite_a=True)  # z - k share
+    lines = transform[..., :-1, :]
     if model is not None:
         fill_in(model, lines)
     return lines
 
 
-@cache
-def _unit(rows: int, columns: int) -> Array:
-    return np.eye(rows, columns)
-
-
 def project(lines: Array) -> Array:
-    """(2F, T) with constant and drift projected out of the other columns; they themselves are kept."""
+    """(2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
     n = lines[:, _N].copy()
     clean = lines - n @ (inverse2(n.T @ n) @ (n.T @ lines))
     clean[:, _N] = n
@@ -167,12 +161,15 @@ def window_energy(duration: float, rate: float) -> float:
 
 
 def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
-    """(2F, W) lines of a transform (2F + 1, T) without offset, constant and drift, and the instruments made of them."""
-    return project(about_mean(transform, model))
+    """(2F, W) lines of a transform (2F + 1, W) without offset, constant and drift, and the instruments made of them."""
+    return project(about_mean(transform.copy(), model))
 
 
 def products(transform: Array, model: Auxiliary | None) -> Array:
-    """(..., W, W) Gram matrices of transforms' (..., 2F + 1, T) clean lines, constant and drift projected out."""
+    """(..., W, W) Gram matrices of transforms' (..., 2F + 1, W) clean lines, constant and drift projected out.
+
+    The transforms are used up.
+    """
     lines = about_mean(transform, model)
     gram: Array = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
     border = gram[..., _N]
@@ -181,7 +178,7 @@ def products(transform: Array, model: Auxiliary | None) -> Array:
 
 
 def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
-    """What the transform (2F + 1, T) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
+    """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
     clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean

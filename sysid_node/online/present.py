@@ -40,10 +40,14 @@ def present(state: State) -> Present | None:
 
 
 def present_at(state: State, lines: Array, time: Any) -> Present | None:
-    """The same at ``time`` (...) s since the last renewal, when the transform was ``lines`` (..., 2F + 1, T)."""
+    """The same at ``time`` (...) s since the last renewal.
+
+    ``lines`` (..., 2F + 1, W): the transform then, which is used up.
+    """
     renewed, plan = state.renewed, state.plan
     if renewed is None:
         return None
+    integrals = renewed.integrals + lines[..., -1, :]
     gram = products(lines, state.model.auxiliary)
     gram += renewed.base
     # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
@@ -61,7 +65,7 @@ def present_at(state: State, lines: Array, time: Any) -> Present | None:
     P, C = plan.mine.shape
     found = np.empty((*theta.shape[:-2], 2, P + 1, C))  # values and variances of slopes, and below them of offsets
     found[..., 0, :P, :], found[..., 1, :P, :] = theta, variances
-    found[..., 0, P, :], found[..., 1, P, :] = _offsets(plan, renewed, lines[..., -1, :], theta)
+    found[..., 0, P, :], found[..., 1, P, :] = _offsets(plan, renewed, integrals, theta)
     table = found.reshape(*found.shape[:-2], -1).take(state.model.table.place, axis=-1)
     return Present(time, table[..., 0, :], np.maximum(table[..., 1, :], 0.0), solution, slopes, gram, diagonal)
 
@@ -73,11 +77,10 @@ def _with_beliefs(state: State, renewed: Renewed, theta: Array) -> tuple[Array, 
 
 
 def _offsets(plan: Plan, renewed: Renewed, integrals: Array, theta: Array) -> tuple[Array, Array]:
-    """(..., C) offsets and their variances, from the ``integrals`` (..., T) of the present segment's signals.
+    """(..., C) offsets and their variances, from the ``integrals`` (..., W) of all signals.
 
     At zero frequency k C_0 = y - sum k C_j x_j, with the slopes ``theta`` (..., P, C).
     """
-    integrals = renewed.integrals + integrals
     weight = integrals[..., OFFSET, None]
     means = integrals / weight
     x = means.take(plan.columns, axis=-1)

@@ -199,7 +199,7 @@ def _error_energies(
     off by d adds d times the integral of the roll rate to sideslip.
     """
     late = np.array([np.mean(lines.omega[band] ** -2.0) for band in lines.bands])  # s^2: what integrals have
-    integrated = late @ info.grams.diagonal(axis1=1, axis2=2)[:, : layout.transformed]
+    integrated = late @ info.grams.diagonal(axis1=1, axis2=2)
     slacks = _slack(aircraft, layout, "CL", "alpha"), _slack(aircraft, layout, "CY", "beta")
     *gains, count = _report(filter_, at)[1]
     energies = [
@@ -213,8 +213,8 @@ def _error_energies(
 
 
 def _slack(aircraft: Aircraft, layout: Layout, coefficient: str, of: str) -> Array:
-    """(T,) what the angle asked for is off by per unit of each signal; the offset's stands at its regressor k."""
-    slack, slope = np.zeros(layout.transformed), aircraft.derivatives[f"{coefficient}_{of}"].value
+    """(W,) what the angle asked for is off by per unit of each signal; the offset's stands at its regressor k."""
+    slack, slope = np.zeros(layout.width), aircraft.derivatives[f"{coefficient}_{of}"].value
     for name, derivative in aircraft.derivatives.items():
         of_coefficient, _, regressor = name.partition("_")
         if of_coefficient == coefficient and (regressor == "0" or regressor in layout.names):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,6 +22,7 @@ from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
 CHUNK = 512  # samples whose weights are held at once
+AT_ONCE = 48  # moments that are solved for at once: what they need stays in the processor's caches
 
 
 def run(
@@ -56,24 +57,34 @@ def run(
 
 
 class _Results:
-    """Collects the moments at which estimates are wanted; all that lean on the same renewal are solved for at once."""
+    """Collects the moments at which estimates are wanted; those of one renewal are solved for at once."""
 
     def __init__(self, state: State) -> None:
         self.state = state
         self.estimates: list[Estimates] = []
         self._lines: list[Array] = []
-        self._times: list[tuple[float, float]] = []
+        self._times: list[float] = []
+        self._nows: list[float] = []
 
-    def want(self, now: float) -> None:
-        """The estimates as they stand ``now`` (s)."""
-        self._lines.append(transform.current(self.state.transform))
-        self._times.append((self.state.transform.last, now))
+    def want(self, lines: Array, times: Sequence[float], nows: Sequence[float]) -> None:
+        """The estimates at ``times`` (K,) s, as they stood ``nows`` (K,) s.
+
+        ``lines`` (K, 2F + 1, W): the transform then.
+        """
+        if not len(lines):
+            return
+        self._lines.append(lines)
+        self._times += times
+        self._nows += nows
+        if len(self._times) >= AT_ONCE:
+            self.finish()
 
     def finish(self, state: State | None = None) -> None:
         """Solve for what is wanted so far, as the ``state`` stood then, if it is not what it was."""
         if self._lines:
-            self.estimates += estimates_at(state or self.state, self._lines, *zip(*self._times, strict=True))
-            self._lines, self._times = [], []
+            lines = np.concatenate(self._lines)
+            self.estimates += estimates_at(state or self.state, lines, self._times, self._nows)
+            self._lines, self._times, self._nows = [], [], []
 
     def renew(self) -> None:
         """Renew what is due to be; solve for what is wanted so far as it was before, where this changes anything."""
@@ -191,10 +202,19 @@ def _advance(results: _Results, chunk: _Chunk, first: int, stop: int, wanted: ND
         state.previous = chunk.last
 
 
-def _want(results: _Results, stops: deque[tuple[int, float]], begin: int) -> None:
-    """The estimates that are wanted before the usable sample ``begin``."""
-    while stops and stops[0][0] <= begin:
-        results.want(stops.popleft()[1])
+def _want(results: _Results, stops: deque[tuple[int, float]], count: int) -> None:
+    """The estimates that are wanted after ``count`` usable samples, all of which have been taken in."""
+    running = results.state.transform
+    for _, now in _popped(stops, count):
+        results.want(transform.current(running)[None], [running.last], [now])
+
+
+def _popped(stops: deque[tuple[int, float]], count: int) -> list[tuple[int, float]]:
+    """The ``stops`` up to ``count`` usable samples."""
+    found = []
+    while stops and stops[0][0] <= count:
+        found.append(stops.popleft())
+    return found
 
 
 def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: deque[tuple[int, float]]) -> int:
@@ -211,13 +231,11 @@ def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: de
     stop = begin + int(far[0]) + 1 if far.size else end
     gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
     stop = begin + int(gaps[0]) if gaps.size else stop
-    inside = [count for count, _ in stops if begin < count < stop]
-    for first, last in pairwise(dict.fromkeys([begin, *inside, stop])):
-        part = slice(first, last)
-        intervals = chunk.begins[part], chunk.time[part]
-        transform.add_many(state.transform, chunk.kernels[part], *intervals, chunk.areas[part], chunk.slants[part])
-        if last < stop:
-            _want(results, stops, last)
+    wanted, part = _popped(stops, stop), slice(begin, stop)
+    counts = [count - begin for count, _ in wanted]
+    intervals, moved = (chunk.begins[part], chunk.time[part]), (chunk.areas[part], chunk.slants[part])
+    lines = transform.add_many(state.transform, chunk.kernels[part], *intervals, *moved, counts)
+    results.want(lines, [float(intervals[1][count - 1]) for count in counts], [now for _, now in wanted])
     state.step = float(chunk.time[stop - 1] - chunk.begins[stop - 1])
     state.samples += stop - begin
     state.recent.extend(chunk.values[begin:stop])

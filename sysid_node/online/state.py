@@ -74,7 +74,7 @@ class Renewed:
     uncertainty: Uncertainty
     compensation: Array | None  # noise's part of the normal equations, see ``regression.bias_of``
     base: Array  # (W, W) Gram matrix of the finished segments
-    integrals: Array  # (T,) of the finished segments' signals
+    integrals: Array  # (W,) of the finished segments' signals
     trim_noise: Array  # (C,) squared error of the coefficients' integrals
     factors: Array  # (P, C) squared standard error over (P_jj residual)
     timing: Timing  # whether the controls are felt when they are measured

@@ -21,6 +21,7 @@ the finished blocks and the unfinished one, so the per-sample and the vectorised
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -131,19 +132,19 @@ class Transform:
     """Running transform: the finished blocks and the one being filled."""
 
     grid: Lines
-    width: int
+    width: int  # signals
     memory: float  # s: tau of the energy's decay, inf = none
-    done: Array  # (rows, width) at ``base``
+    done: Array  # (rows, width + room) at ``base``
     kernels: Array  # (BLOCK, 2, rows) weights of the unfinished block
-    values: Array  # (BLOCK, 2, width) areas and slants
+    values: Array  # (BLOCK, 2, width + room) areas and slants
     count: int = 0  # samples in the unfinished block
     base: float = 0.0  # s: time to which ``done`` has decayed
     last: float = 0.0  # s: end of the last interval
 
 
-def start(grid: Lines, width: int, memory: float = math.inf) -> Transform:
-    """Empty transform of ``width`` signals."""
-    done, values = np.zeros((grid.rows, width)), np.zeros((BLOCK, 2, width))
+def start(grid: Lines, width: int, memory: float = math.inf, room: int = 0) -> Transform:
+    """Empty transform of ``width`` signals, with ``room`` for further columns, which stay zero."""
+    done, values = np.zeros((grid.rows, width + room)), np.zeros((BLOCK, 2, width + room))
     return Transform(grid, width, memory, done, blank_kernels(grid, BLOCK), values)
 
 
@@ -154,28 +155,60 @@ def add(state: Transform, begin: float, end: float, area: Array, slant: Array) -
     _append(state, begin, end, area, slant)
 
 
-def add_many(state: Transform, kernels: Array, begins: Array, ends: Array, areas: Array, slants: Array) -> None:
-    """``add`` for consecutive intervals with weights (N, 2, rows) from ``weights_of_many``, to the last bit.
+def add_many(
+    state: Transform,
+    kernels: Array,
+    begins: Array,
+    ends: Array,
+    areas: Array,
+    slants: Array,
+    stops: Sequence[int] = (),
+) -> Array:
+    """``add`` for N consecutive intervals with weights (N, 2, rows) from ``weights_of_many``, to the last bit.
 
-    ``begins`` and ``ends`` (N,) s; ``areas`` and ``slants`` (N, width).
+    ``begins`` and ``ends`` (N,) s; ``areas`` and ``slants`` (N, width). Returns (K, 2F + 1, width + room) what
+    ``current`` is after so many of the intervals, at least one, as the K ``stops`` say, which do not decrease.
     """
-    if math.isfinite(state.memory):
-        for kernel, begin, end, area, slant in zip(kernels, begins.tolist(), ends.tolist(), areas, slants, strict=True):
-            state.kernels[state.count] = kernel
-            _append(state, begin, end, area, slant)
-        return
-    at = 0
-    while at < ends.size:
-        n = min(BLOCK - state.count, ends.size - at)
-        here, there = slice(state.count, state.count + n), slice(at, at + n)
-        state.kernels[here] = kernels[there]
-        state.values[here, 0] = areas[there]
-        state.values[here, 1] = slants[there]
-        state.count += n
-        at += n
-        if state.count == BLOCK:
-            _finish_block(state)
-    state.last = float(ends[-1])
+    add_some = _add_blocks if math.isinf(state.memory) else _add_singly
+    values = np.zeros((ends.size, *state.values.shape[1:]))
+    values[:, 0, : state.width], values[:, 1, : state.width] = areas, slants
+    found = add_some(state, kernels, begins, ends, values, stops)
+    return np.array(found).reshape(len(stops), 2 * state.grid.count + 1, values.shape[-1])
+
+
+def _add_singly(
+    state: Transform, kernels: Array, begins: Array, ends: Array, values: Array, stops: Sequence[int]
+) -> list[Array]:
+    """``add_many`` where weights depend on the time to which all has decayed."""
+    found: list[Array] = []
+    for i, (begin, end) in enumerate(zip(begins.tolist(), ends.tolist(), strict=True)):
+        state.kernels[state.count] = kernels[i]
+        _append(state, begin, end, *values[i, :, : state.width])
+        while len(found) < len(stops) and stops[len(found)] == i + 1:
+            found.append(current(state))
+    return found
+
+
+def _add_blocks(
+    state: Transform, kernels: Array, begins: Array, ends: Array, values: Array, stops: Sequence[int]
+) -> list[Array]:
+    """``add_many`` where nothing decays: all blocks that are finished on the way at once."""
+    before = state.count
+    kernels = np.concatenate([state.kernels[:before], kernels])
+    values = np.concatenate([state.values[:before], values])
+    blocks, rest = divmod(len(kernels), BLOCK)
+    whole = blocks * BLOCK
+    stacked = [part[:whole].reshape(blocks, 2 * BLOCK, part.shape[-1]) for part in (kernels, values)]
+    sums = stacked[0].swapaxes(1, 2) @ stacked[1]
+    done = np.add.accumulate(np.concatenate([state.done[None], sums]))
+    found = []
+    for stop in stops:
+        block, count = divmod(before + stop, BLOCK)
+        part = slice(block * BLOCK, block * BLOCK + count)
+        found.append(_counted(state.grid, _total(done[block], kernels[part], values[part])))
+    state.done[:], state.count, state.last = done[blocks], rest, float(ends[-1])
+    state.kernels[:rest], state.values[:rest] = kernels[whole:], values[whole:]
+    return found
 
 
 def _append(state: Transform, begin: float, end: float, area: Array, slant: Array) -> None:
@@ -188,8 +221,8 @@ def _append(state: Transform, begin: float, end: float, area: Array, slant: Arra
         kernel = state.kernels[i]
         kernel[:, :-1] *= growth
         kernel[0, -1] = growth
-    state.values[i, 0] = area
-    state.values[i, 1] = slant
+    state.values[i, 0, : state.width] = area
+    state.values[i, 1, : state.width] = slant
     state.count = i + 1
     state.last = end
     if state.count == BLOCK:
@@ -197,16 +230,22 @@ def _append(state: Transform, begin: float, end: float, area: Array, slant: Arra
         decay(state, end)
 
 
-def _unfinished(state: Transform) -> Array:
-    """(rows, width) the unfinished block's part."""
-    kernels, values = state.kernels[: state.count], state.values[: state.count]
-    part: Array = kernels.reshape(-1, state.grid.rows).T @ values.reshape(-1, state.width)
-    return part
+def _total(done: Array, kernels: Array, values: Array) -> Array:
+    """(rows, width + room) the finished blocks and the unfinished one's part, of n weights and values."""
+    if not len(kernels):
+        return done.copy()
+    total: Array = kernels.reshape(-1, kernels.shape[-1]).T @ values.reshape(-1, values.shape[-1])
+    total += done
+    return total
+
+
+def _counted(grid: Lines, total: Array) -> Array:
+    """The rows that are not there to fill registers."""
+    return np.delete(total, grid.padding, axis=0) if grid.padding.size else total
 
 
 def _finish_block(state: Transform) -> None:
-    state.done += _unfinished(state)
-    state.count = 0
+    state.done, state.count = _total(state.done, state.kernels, state.values), 0
 
 
 def restart(state: Transform, time: float) -> None:
@@ -229,12 +268,8 @@ def decay(state: Transform, time: float) -> None:
 
 
 def current(state: Transform) -> Array:
-    """(2F + 1, width) the transform up to the last sample: real parts, imaginary parts, integrals."""
-    if state.count:
-        total = _unfinished(state)
-        total += state.done
-    else:
-        total = state.done.copy()
+    """(2F + 1, width + room) the transform up to the last sample: real parts, imaginary parts, integrals."""
+    total = _total(state.done, state.kernels[: state.count], state.values[: state.count])
     if math.isfinite(state.memory):
         total *= math.exp((state.base - state.last) / (2.0 * state.memory))
-    return np.delete(total, state.grid.padding, axis=0) if state.grid.padding.size else total
+    return _counted(state.grid, total)

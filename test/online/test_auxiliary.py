@@ -57,7 +57,7 @@ def test_they_follow_the_motion_of_a_flight() -> None:
     rows, _ = signals.array_signals(AIRCRAFT)(list(samples.T))
     rows.insert(signals.OFFSET + 2, time)
     values, steps = np.stack(rows, axis=1), np.diff(time)
-    state = transform.start(grid, LAYOUT.transformed)
+    state = transform.start(grid, LAYOUT.transformed, room=len(LAYOUT.instrumented))
     transform.add_many(
         state,
         transform.weights_of_many(grid, time[:-1] + 0.5 * steps, steps),
