@@ -154,14 +154,18 @@ def _summary(rows: Sequence[dict[str, list[list[float]]]]) -> str:
         chosen = [row for row in rows if str(row["turbulence"]) == turbulence]
         lost = np.isfinite(np.array([row["lost"] for row in chosen], dtype=float))
         errors = np.array([row["errors"] for row in chosen], dtype=float)
+        size = np.hypot(errors[..., 0], errors[..., 1])
         with np.errstate(invalid="ignore"):
-            share = np.hypot(errors[:, 1, 0], errors[:, 1, 1]) / np.hypot(errors[:, 0, 0], errors[:, 0, 1])
+            share = size[:, 1] / size[:, 0]
         share = share[np.isfinite(share)]
+        middle = np.rad2deg(np.median(size, axis=0))
         quantiles = [f"{q:.2f}" for q in np.quantile(share, [0.05, 0.5, 0.95])]
         counts = [lost[:, 0].sum(), lost[:, 1].sum(), (lost[:, 1] & ~lost[:, 0]).sum()]
-        cells.append([turbulence, str(len(chosen)), *(str(int(n)) for n in counts), *quantiles])
+        error = f"{middle[0]:.2f} / {middle[1]:.2f}"
+        cells.append([turbulence, str(len(chosen)), *(str(int(n)) for n in counts), error, *quantiles])
     heads = ("flights", "lost by the baseline", "lost adapted", "... that the baseline kept")
-    return table(("turbulence", *heads, "adapted over baseline: 5 %", "median", "95 %"), cells)
+    tail = ("error: baseline / adapted, median, deg", "adapted over baseline: 5 %", "median", "95 %")
+    return table(("turbulence", *heads, *tail), cells)
 
 
 def exciter(flights: int, method: str) -> str:

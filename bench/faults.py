@@ -301,6 +301,8 @@ def hours(count: float, weathers: Sequence[str], first: int, results: Path) -> s
     rows = []
     for turbulence in WEATHERS:
         mine = [one["alarms"] for one in known if one["turbulence"] == turbulence]
+        if not mine:
+            continue
         flown = len(mine) * PART / HOUR
         rows.append([turbulence, f"{flown:.1f}", str(sum(mine)), f"{_most(sum(mine)) / flown:.2f}"])
     flown, alarms = sum(float(r[1]) for r in rows), sum(int(r[2]) for r in rows)
