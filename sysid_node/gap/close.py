@@ -88,7 +88,7 @@ def _bootstrap(errors: Callable[[Array, Array], Array], left: Structure, groups:
     """Errors (D, 4) in bootstraps of the groups, the structure left as uncertain as chance makes it."""
     random = np.random.default_rng(0)
     draws = random.multinomial(groups, np.ones(groups) / groups, _DRAWS)
-    shares = (left.deviations + random.standard_normal((_DRAWS, left.chance.size))) * left.chance
+    shares = left.beyond + random.standard_normal((_DRAWS, left.chance.size)) * left.chance
     shares = np.clip(shares / np.maximum(left.total, 1e-300), 0.0, 1.0)
     return np.array([errors(d.astype(float), share) for d, share in zip(draws, shares, strict=True)])
 

@@ -24,8 +24,7 @@ def advantage(fit: Fit, other: Fit) -> float:
     (quasi-likelihood: Burnham & Anderson (2002), Model Selection, sect. 2.5).
     """
     left = structure_of(fit)
-    directions = 0.5 * (left.chance / left.noise) ** 2
-    scatter = left.noise + left.coherent / directions
+    scatter = 1.0 + left.coherent / (0.5 * left.chance**2)
     powers = tuple(power * scatter for power in fit.power)
     return _evidence(fit, powers) - _evidence(other, powers)
 

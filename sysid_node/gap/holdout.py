@@ -61,9 +61,10 @@ def settled(
 ) -> tuple[Attribution, Check]:
     """What flight not fitted leaves of an explanation.
 
-    Nothing is blamed where weather and noise are all of the gap, nor what by neither measure predicts flight better than
-    the derivatives within their tolerances, or by one of them no better than the file; and derivatives that do worse
-    than the file leave the file as it is. (By frequency, derivatives that gusts have biased seem the better in gusts.)
+    Nothing is blamed where weather and noise are all of the gap, nor what by neither measure predicts flight better
+    than the derivatives within their tolerances, or by one of them no better than the file; and derivatives that do
+    worse than the file leave the file as it is. (In gusts derivatives that these have biased seem the better by
+    frequency.)
     """
     checked = check(attribution, unseen, own)
     if foreseen([*views, *unseen]):

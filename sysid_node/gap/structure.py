@@ -33,13 +33,27 @@ _ROOM = 1e-6
 
 @dataclass(frozen=True)
 class Structure:
-    """By coefficient (12,): power coherent with what was done, beyond chance, and all power, in noise levels."""
+    """By coefficient (12,): power coherent with what was done, less chance's, and all power, in noise levels."""
 
-    coherent: Array
+    beyond: Array
     total: Array
-    deviations: Array  # how many standard deviations the coherent power lies above chance
-    chance: Array  # such a standard deviation, in noise levels
-    noise: Array  # of what no instrument foretells, in noise levels
+    chance: Array  # its standard deviation in noise of that level
+    noise: Array  # level of what no instrument foretells
+
+    @property
+    def coherent(self) -> Array:
+        """Power that is structure."""
+        return np.maximum(self.beyond, 0.0)
+
+    @property
+    def deviations(self) -> Array:
+        """How many standard deviations the coherent power lies above chance.
+
+        Least squares leaves less than the noise where it passed gusts off as derivatives; chance is that of what the
+        instruments' estimate leaves where they do not see (Basmann (1960), J. Am. Stat. Assoc. 55).
+        """
+        expected = 0.5 * self.chance**2
+        return (self.beyond - (self.noise - 1.0) * expected) / (self.noise * self.chance)
 
     @property
     def share(self) -> Array:
@@ -48,29 +62,20 @@ class Structure:
 
 
 def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
-    """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare.
-
-    Least squares leaves less than the noise where it passed gusts off as derivatives; chance is that of what the
-    instruments' estimate leaves where they do not see (Basmann (1960), J. Am. Stat. Assoc. 55).
-    """
+    """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare."""
     seen = equations(fit, (like or fit).power)
     step = within_limits(seen, fit)
-    coherent, total, size, scatter = (np.zeros(len(CHANNELS)) for _ in range(4))
+    coherent, total, size, others = (np.zeros(len(CHANNELS)) for _ in range(4))
     for U, r, J in zip(seen.basis, seen.rows, seen.slopes, strict=True):
         left = r - J @ step
         for axis, directions in U.items():
             series = left[:, :, axis].ravel()
-            along, whole = float(np.sum((directions.T @ series) ** 2)), float(series @ series)
-            count = directions.shape[1]
-            others = max(SHARE * np.count_nonzero(series) - count, 1.0)
-            noise = max(1.0, (whole - along) / others)
-            coherent[axis] += along
-            total[axis] += whole
-            size[axis] += count * noise
-            scatter[axis] += 2.0 * count * noise**2
-    beyond, chance = coherent - size, np.sqrt(np.maximum(scatter, 2.0))
-    noise_levels = np.where(size > 0.0, 0.5 * scatter / np.maximum(size, 1.0), 1.0)
-    return Structure(np.maximum(beyond, 0.0), total, beyond / chance, chance, noise_levels)
+            coherent[axis] += float(np.sum((directions.T @ series) ** 2))
+            total[axis] += float(np.sum(series**2))
+            size[axis] += directions.shape[1]
+            others[axis] += SHARE * np.count_nonzero(series) - directions.shape[1]
+    noise = np.maximum((total - coherent) / np.maximum(others, 1.0), 1.0)
+    return Structure(coherent - size, total, np.sqrt(2.0 * np.maximum(size, 1.0)), noise)
 
 
 @dataclass(frozen=True)
