@@ -23,7 +23,7 @@ from sysid_node.sim.chain import Chain
 from sysid_node.sim.effects import air_data_lag, imu_lever_arm, imu_misalignment
 from sysid_node.sim.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.stations import airflow, sensors
-from sysid_node.sim.timing import shift_cubic
+from sysid_node.sim.timing import shift_cubic, slope
 
 #: Columns of ``reconstruct``: m/s and rad.
 READINGS = ("V", "alpha", "beta", "phi", "theta", "psi")
@@ -126,7 +126,7 @@ class FlowRates(NamedTuple):
 def flow_rates(chain: Chain, motion: Motion, memory: Scalar | float) -> FlowRates:
     """By the inertial instruments: differentiated, the vanes' noise would pass for motion.
 
-    What gusts do to alpha, the vane shows: beyond a memory (s) it is followed.
+    What gusts do to alpha, only the vane shows: it is followed beyond a memory (s), without one at every sample.
     """
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     at_probe = _flow_rate(chain, inertial, reading)
@@ -135,10 +135,11 @@ def flow_rates(chain: Chain, motion: Motion, memory: Scalar | float) -> FlowRate
     moving, _ = rates_of_change(velocity, inertial.attitude, inertial.force, inertial.rates)
     _, still, _ = _rates_of_flow(velocity, moving)
     _, alpha, _ = airflow.flow_angles(velocity)
-    return FlowRates(at_probe, _with_gusts(alpha, still, memory, chain.step))
+    followed = _followed(alpha, still, memory, chain.step)
+    return FlowRates(at_probe, jnp.where(memory > 0.0, followed, slope(alpha, chain.step)))
 
 
-def _with_gusts(angle: Scalar, still: Scalar, memory: Scalar | float, step: Scalar) -> Scalar:
+def _followed(angle: Scalar, still: Scalar, memory: Scalar | float, step: Scalar) -> Scalar:
     """Rate (N,) of an angle as the vane has it, from its rate in still air: a complementary filter."""
 
     def advance(expected: Scalar, sample: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar]:

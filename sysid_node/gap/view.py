@@ -52,7 +52,7 @@ class Memory(NamedTuple):
     """How long what the inertial instruments tell of the air's motion is remembered, s."""
 
     observer: Scalar | float  # before the air data are believed
-    vane: Scalar | float  # before the rate of alpha follows the vane
+    vane: Scalar | float  # before the rate of alpha follows the vane; zero: at once
 
 
 class Given(NamedTuple):

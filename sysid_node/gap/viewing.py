@@ -47,8 +47,8 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     memory = memory_of(calm, instruments)
     if memory == LONGEST:
         return calm
-    vane = memory if gusty(calm) else LONGEST
-    shorter = bare(simulator, flight, record, windows, axes, Memory(memory, vane))
+    followed = Memory(memory, 0.0 if gusty(calm) else LONGEST)
+    shorter = bare(simulator, flight, record, windows, axes, followed)
     return _measured_noise(replace(shorter, gusts=calm.gusts), seed)
 
 
