@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap.candidates import candidates_of
+from sysid_node.gap.fit import blank, polish, with_candidates
 from sysid_node.gap.kinematics import READINGS
+from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.view import CHANNELS, View
 from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
@@ -56,3 +59,12 @@ def test_gusts_are_measured_by_the_vanes(aircraft, plain_view) -> None:
     assert plain_view.gusts < 0.1
     assert 0.3 < gusty.gusts < 1.5
     assert float(gusty.given.memory.observer) < float(plain_view.given.memory.observer)
+
+
+def test_moment_with_the_rate_of_alpha_is_found_despite_the_vane_noise(aircraft) -> None:
+    """Truth: the simulator. By the vane's differences it is -5.0: what is differentiated is mostly noise."""
+    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"unsteady_aerodynamics": {"Cm_alphadot": -10.0}}))
+    nuisances = nuisances_of(aircraft, view)
+    candidates = [c for c in candidates_of(view.simulator, [view]) if c.effect == "unsteady_aerodynamics"]
+    found = polish(with_candidates(polish(blank([view], nuisances)), candidates, nuisances, [0.5, 1.0]))
+    assert found.values[1] == pytest.approx(-10.0, rel=0.1)
