@@ -41,8 +41,7 @@ def phase_error(start: float, rng: np.random.Generator) -> float:
     at, x = start + np.arange(round(MINUTE * RATE)) / RATE, rng.normal(size=round(MINUTE * RATE))
     state, steps = transform.start(grid, 1), np.diff(at)
     areas, slants = 0.5 * steps * (x[1:] + x[:-1]), 0.5 * steps**2 * np.diff(x)
-    kernels = transform.weights_of_many(grid, at[:-1] + 0.5 * steps, steps)
-    transform.add_many(state, kernels, at[:-1], at[1:], areas[:, None], slants[:, None])
+    transform.add_many(state, at[:-1], at[1:], areas[:, None], slants[:, None])
     lines, F = transform.current(state)[:, 0], grid.count
     phase = np.outer(grid.omega.astype(np.longdouble), at[:-1].astype(np.longdouble) + 0.5 * steps)
     wave = np.exp(-1j * np.remainder(phase, 2 * np.longdouble(np.pi)).astype(float))

@@ -13,8 +13,9 @@ that no derivatives explain are another matter: there the model itself does not 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import groupby, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,15 +84,30 @@ class Looking:
         part = sum(piece for _, piece in islice(pieces, len(pieces) - span, None))
         return pieces[-span][0], clean_lines(np.asarray(part), self.model)
 
-    def at(self, span: int, reference: Reference | None = None) -> Contradiction | None:
-        """How the last ``span`` pieces contradict the reference, else the estimates before them, if there are any."""
+    def before(self, span: int) -> Reference | None:
+        """The estimates from before the last ``span`` pieces, if there are any."""
         if span > len(self.watch.pieces):
             return None
         start = self.watch.pieces[-span][0]
-        known = reference or next((r for r in reversed(self.watch.references) if r.time <= start + 1e-6), None)
-        if known is None:
-            return None
-        return contradiction(known, self.lines(span)[1], self.spectrum, self.now - start)
+        return next((r for r in reversed(self.watch.references) if r.time <= start + 1e-6), None)
+
+    def _known(self, spans: Iterable[int]) -> Iterator[tuple[int, Reference]]:
+        """The ``spans`` up to the first without estimates from before them, and these."""
+        for span in spans:
+            reference = self.before(span)
+            if reference is None:
+                return
+            yield span, reference
+
+    def contradictions(self, spans: Iterable[int]) -> Iterator[tuple[int, Contradiction]]:
+        """How the last pieces contradict the estimates from before them: of the ``spans`` (rising) that have such."""
+        known = self._known(spans)
+        for _, pairs in groupby(known, key=lambda pair: id(pair[1].plan)):
+            alike, references = zip(*pairs, strict=True)
+            starts, lines = zip(*map(self.lines, alike), strict=True)
+            duration = self.now - np.array(starts)
+            found = contradiction(Reference.stacked(references), np.array(lines), self.spectrum, duration)
+            yield from zip(alike, found.each(), strict=True)
 
 
 def examine(looking: Looking, experiences: list[Experience]) -> Finding:
@@ -99,12 +115,7 @@ def examine(looking: Looking, experiences: list[Experience]) -> Finding:
     watch, C = looking.watch, len(looking.full.coefficients)
     watch.looks += 1
     surest = 1.0
-    for span in SPANS:
-        if watch.looks % max(span // EVERY, 1):
-            continue
-        found = looking.at(span)
-        if found is None:
-            break
+    for span, found in looking.contradictions(span for span in SPANS if not watch.looks % max(span // EVERY, 1)):
         known = found.freedom >= KNOWN
         usual = _usual(watch, span, C)
         watch.doubted[span] = known & (found.chance(usual) < DOUBT)
@@ -136,12 +147,8 @@ def _get_used_to(watch: Watch, found: Contradiction, C: int) -> None:
 
 def _onset(looking: Looking) -> int:
     """Pieces since the change: the shortest span that contradicts about as much as any."""
-    quadratics = []
-    for span in range(SPANS[0], len(looking.watch.pieces) + 1):
-        found = looking.at(span)
-        if found is None:
-            break
-        quadratics.append(float((found.statistic * found.count)[found.freedom >= KNOWN].max(initial=0.0)))
+    every = looking.contradictions(range(SPANS[0], len(looking.watch.pieces) + 1))
+    quadratics = [float((found.statistic * found.count)[found.freedom >= KNOWN].max(initial=0.0)) for _, found in every]
     return SPANS[0] + int(np.argmax(np.array(quadratics) >= AS_MUCH * max(quadratics)))
 
 

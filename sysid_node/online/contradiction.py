@@ -16,8 +16,10 @@ itself: air that has become rougher is no contradiction either.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,53 +45,81 @@ class Reference:
     solution: Solution
     uncertainty: Uncertainty
 
+    @classmethod
+    def stacked(cls, some: Sequence[Reference]) -> Reference:
+        """Estimates by the same equations with an axis in front."""
+        first = some[0]
+        if all(one is first for one in some):
+            return first
+        solution = Solution(*_columns([one.solution for one in some]))
+        return cls(first.time, first.plan, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
+
+
+def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
+    """Each field of the rows, with an axis in front."""
+    return (np.array([getattr(row, field.name) for row in rows]) for field in fields(rows[0]))
+
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Of C coefficients over one stretch."""
+    """Of C coefficients over one stretch, or over each of several (...)."""
 
-    statistic: Array  # (C,) F
+    statistic: Array  # (..., C) F
     count: Array  # (C,) derivatives, its first degrees of freedom
-    freedom: Array  # (C,) its second
-    unexplained: Array  # (C,) density that no derivatives explain, over the usual one
-    share: Array  # (C,) of the motion's energy that no derivatives explain
+    freedom: Array  # (..., C) its second
+    unexplained: Array  # (..., C) density that no derivatives explain, over the usual one
+    share: Array  # (..., C) of the motion's energy that no derivatives explain
 
     def chance(self, margin: Array | float) -> Array:
-        """(C,) probability of a statistic so large, ``margin`` times over, where nothing has changed."""
+        """(..., C) probability of a statistic so large, ``margin`` times over, where nothing has changed."""
         return np.asarray(fdtrc(self.count, np.maximum(self.freedom, 1.0), self.statistic / margin))
 
+    def each(self) -> Iterator[Contradiction]:
+        """Those of the several stretches, one by one."""
+        freedom = np.broadcast_to(self.freedom, self.statistic.shape)
+        for some in zip(self.statistic, freedom, self.unexplained, self.share, strict=True):
+            yield Contradiction(some[0], self.count, *some[1:])
 
-def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, duration: float) -> Contradiction:
-    """Test the clean ``lines`` (2F, W) of a stretch of ``duration`` (s)."""
+
+def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, duration: Any) -> Contradiction:
+    """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
     plan, known = reference.plan, reference.uncertainty
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
-    gram = lines.T @ lines
-    left_over = gram[:, plan.outputs] - gram[:, plan.columns] @ reference.solution.theta
+    gram = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
+    regressed = gram.take(plan.columns, axis=-1)
+    left_over = gram.take(plan.outputs, axis=-1) - regressed @ reference.solution.theta
     count = plan.mine.sum(axis=0)
-    rest = _unexplained(plan, reference, gram, left_over)
-    energy = 0.5 * len(lines) * duration
+    rest = _unexplained(plan, reference, regressed, left_over)
+    energy = 0.5 * lines.shape[-2] * np.asarray(duration)[..., None]
     density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
     excess = density / np.maximum(known.density, TINY)
-    Z = lines[:, plan.instruments]
-    noise = (Z.T * known.bands[:, None, _band_of_each(tuple(band.stop for band in spectrum.bands))]) @ Z
-    noise *= (density_per_gram * np.maximum(excess, 1.0))[:, None, None]
-    G = gram[plan.instruments[:, None], plan.columns] * plan.same
-    spread = noise + G @ known.covariance @ G.T
-    score = (left_over[plan.instruments] * plan.mine).T
-    motion = np.maximum(gram.take(plan.square), TINY)
+    Z = lines.take(plan.instruments, axis=-1)[..., None, :, :]
+    of_each = _band_of_each(tuple(band.stop for band in spectrum.bands))
+    noise = (Z.swapaxes(-1, -2) * known.bands.take(of_each, axis=-1)[..., None, :]) @ Z
+    noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
+    G = (regressed.take(plan.instruments, axis=-2) * plan.same)[..., None, :, :]
+    spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
+    score = (left_over.take(plan.instruments, axis=-2) * plan.mine).swapaxes(-1, -2)
+    motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(plan.outputs, axis=-1), TINY)
     return Contradiction(_normalised(plan, spread, score) / count, count, known.freedom, excess, rest / motion)
 
 
-def _unexplained(plan: Plan, reference: Reference, gram: Array, left_over: Array) -> Array:
-    """(C,) the least that any change of the derivatives would leave of the residuals' energy."""
-    misfit: Array = left_over[plan.outputs, np.arange(plan.outputs.size)]
-    score = left_over[plan.columns] * plan.mine
-    misfit -= (score * reference.solution.theta).sum(axis=0)
-    normal = gram[plan.columns[:, None], plan.columns] * plan.same
-    normal += plan.unit * (RIDGE * normal.diagonal() + TINY)
-    _, solved, _ = dposv(normal, score)
-    misfit -= (score * solved).sum(axis=0)
+def _unexplained(plan: Plan, reference: Reference, regressed: Array, left_over: Array) -> Array:
+    """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
+    misfit: Array = left_over.take(plan.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
+    score = left_over.take(plan.columns, axis=-2) * plan.mine
+    normal = regressed.take(plan.columns, axis=-2) * plan.same
+    normal += plan.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
+    solved = np.empty_like(score)
+    for one, right, found in zip(_each(normal), _each(score), _each(solved), strict=True):
+        found[:] = dposv(one, right)[1]
+    misfit -= (score * (reference.solution.theta + solved)).sum(axis=-2)
     return misfit
+
+
+def _each(matrices: Array) -> Array:
+    """(N, ., .) of (..., ., .), where they lie."""
+    return matrices.reshape(-1, *matrices.shape[-2:])
 
 
 @cache
@@ -99,14 +129,14 @@ def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
 
 
 def _normalised(plan: Plan, spread: Array, score: Array) -> Array:
-    """(C,) score' spread^-1 score of scores (C, P) over the unknowns that belong."""
+    """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong."""
     mine = plan.mine.T
-    variance = spread.diagonal(axis1=1, axis2=2) * mine
+    variance = spread.diagonal(axis1=-2, axis2=-1) * mine
     weight = np.where(variance > 0.0, 1.0 / np.sqrt(np.maximum(variance, TINY**2)), 0.0)
-    correlation = spread * weight[:, :, None] * weight[:, None, :]
-    correlation += plan.unit * (RIDGE + (weight == 0.0))[:, :, None]
+    correlation = spread * weight[..., None] * weight[..., None, :]
+    correlation += plan.unit * (RIDGE + (weight == 0.0))[..., None]
     scaled = score * weight
-    return np.asarray((scaled * np.linalg.solve(correlation, scaled[:, :, None])[:, :, 0]).sum(axis=1))
+    return np.asarray((scaled * np.linalg.solve(correlation, scaled[..., None])[..., 0]).sum(axis=-1))
 
 
 def disagreement(one: Reference, other: Reference) -> Array:

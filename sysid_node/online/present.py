@@ -81,10 +81,12 @@ def _offsets(plan: Plan, renewed: Renewed, integrals: Array, theta: Array) -> tu
 
     At zero frequency k C_0 = y - sum k C_j x_j, with the slopes ``theta`` (..., P, C).
     """
+    P, C = plan.mine.shape
     weight = integrals[..., OFFSET, None]
-    means = integrals / weight
-    x = means.take(plan.columns, axis=-1)
-    values = means.take(plan.outputs, axis=-1) - (x[..., None, :] @ theta)[..., 0, :]
-    covariance, column = renewed.uncertainty.covariance, x[..., None, :, None]
-    spread = (x[..., None, None, :] @ (covariance @ column))[..., 0, 0]
+    means = integrals.take(plan.sides, axis=-1) / weight
+    x = means[..., None, :P]
+    values = means[..., P:] - (x @ theta)[..., 0, :]
+    # x' covariance x as one product of all pairs
+    pairs = (x.swapaxes(-1, -2) * x).reshape(*x.shape[:-1], P * P)
+    spread = (pairs @ renewed.uncertainty.covariance.reshape(C, P * P).T)[..., 0, :]
     return values, spread + renewed.trim_noise / (weight * weight)

@@ -50,6 +50,7 @@ class Plan:
     width: int  # W
     # flat indices into the Gram matrix; transposed, so that LAPACK takes what is gathered as it lies
     entries: Index = field(init=False)  # (2, P + C, P) of A'A above A'y, and of Z'A above Z'y
+    sides: Index = field(init=False)  # (P + C,) columns of the regressors, then of the coefficients
     square: Index = field(init=False)  # (C,) of y'y
     energy: Index = field(init=False)  # (P,) of x'x
     counted: Array = field(init=False)  # (2, P + C, P) 1 where the entry lies in a block, of A'y 2: see ``solve``
@@ -63,6 +64,7 @@ class Plan:
         both = np.concatenate([self.columns, self.outputs])[:, None]
         plain = bool((self.columns == self.instruments).all())
         sources = self.columns, self.instruments
+        object.__setattr__(self, "sides", both[:, 0])
         object.__setattr__(self, "entries", np.stack([both + rows * self.width for rows in sources]))
         object.__setattr__(self, "square", self.outputs * (self.width + 1))
         object.__setattr__(self, "energy", self.columns * (self.width + 1))
@@ -138,7 +140,7 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     gathered *= plan.counted
     normal, cross = gathered[..., 0, :, :], gathered[..., 1, :, :]
     if bias is not None:
-        cross = cross - bias
+        cross -= bias
     if several:
         solved, usable = _each(plan, cross)
     else:

@@ -21,7 +21,7 @@ from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
-CHUNK = 512  # samples whose weights are held at once
+CHUNK = 1024  # samples whose signals are made at once
 AT_ONCE = 48  # moments that are solved for at once: what they need stays in the processor's caches
 
 
@@ -109,7 +109,6 @@ class _Chunk:
     values: Array  # (n, T) signals
     areas: Array  # (n, T), see ``transform``
     slants: Array  # (n, T)
-    kernels: Array  # (n, 2, rows)
     intervals: Array  # (n,) of the air data
     last: tuple[float, Array, tuple[float, ...]] | None
 
@@ -122,11 +121,9 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     time, columns = time[usable], [np.ascontiguousarray(column) for column in samples[usable].T]
     thrust = estimator.THRUST
     columns[thrust] = np.where(np.abs(columns[thrust]) < estimator.LIMIT, columns[thrust], 0.0)
-    grid = state.transform.grid
     if not time.size:
         empty = np.empty((0, state.model.layout.transformed))
-        kernels = np.empty((0, 2, grid.rows))
-        return _Chunk(given, kept, missing, time, time, time, empty, empty, empty, kernels, time, state.previous)
+        return _Chunk(given, kept, missing, time, time, time, empty, empty, empty, time, state.previous)
     rows, angles = signals.array_signals(state.model.aircraft)(columns)
     rows.insert(estimator.DRIFT, time)
     values = np.stack(rows, axis=1)
@@ -141,12 +138,9 @@ def _prepare(state: State, time: Array, samples: Array) -> _Chunk:
     steps = time - begins
     gain = np.stack(state.model.momentum(motion_before, motion), axis=1)
     areas, slants = estimator.over_interval(state.model.layout, steps[:, None], before, values, gain)
-    kernels = transform.weights_of_many(grid, begins + 0.5 * steps, steps)
     last = (float(time[-1]), values[-1], tuple(float(m[-1]) for m in motion))
     intervals = columns[estimator.INTERVAL]
-    return _Chunk(
-        given, kept, missing, time, begins, reach(time, steps), values, areas, slants, kernels, intervals, last
-    )
+    return _Chunk(given, kept, missing, time, begins, reach(time, steps), values, areas, slants, intervals, last)
 
 
 def _usable(state: State, time: Array, samples: Array) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
@@ -232,10 +226,9 @@ def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: de
     gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
     stop = begin + int(gaps[0]) if gaps.size else stop
     wanted, part = _popped(stops, stop), slice(begin, stop)
-    counts = [count - begin for count, _ in wanted]
-    intervals, moved = (chunk.begins[part], chunk.time[part]), (chunk.areas[part], chunk.slants[part])
-    lines = transform.add_many(state.transform, chunk.kernels[part], *intervals, *moved, counts)
-    results.want(lines, [float(intervals[1][count - 1]) for count in counts], [now for _, now in wanted])
+    moved = chunk.begins[part], chunk.time[part], chunk.areas[part], chunk.slants[part]
+    lines = transform.add_many(state.transform, *moved, [count - begin for count, _ in wanted])
+    results.want(lines, [float(chunk.time[count - 1]) for count, _ in wanted], [now for _, now in wanted])
     state.step = float(chunk.time[stop - 1] - chunk.begins[stop - 1])
     state.samples += stop - begin
     state.recent.extend(chunk.values[begin:stop])

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 BLOCK = 16
 _LANES = 8  # vectors are padded to whole SIMD registers: a value's bits then do not depend on its place
+_PORTION = 64  # intervals that are weighed at once: what they need stays in the processor's caches
 _SMALL = 0.15  # phi up to which the power series of sinc and s are right to 1e-8
 
 
@@ -98,10 +99,9 @@ def weights(grid: Lines, middle: float, step: float, out: Array) -> None:
 def weights_of_many(grid: Lines, middles: Array, steps: Array) -> Array:
     """(N, 2, rows) weights of N intervals, to the last bit those of ``weights``; middles and steps (N,) s."""
     kernels, P = blank_kernels(grid, steps.size), grid.padded.size
-    phase = grid.padded * middles[:, None]
+    phase, squares = grid.padded * middles[:, None], (steps * steps)[:, None, None]
     kernels[:, 0, :P] = kernels[:, 1, P:-1] = np.cos(phase)
     kernels[:, 0, P:-1] = kernels[:, 1, :P] = np.sin(phase)
-    squares = (steps * steps)[:, None, None]
     gains = grid.series[2] * squares
     gains += grid.series[1]
     gains *= squares
@@ -156,24 +156,25 @@ def add(state: Transform, begin: float, end: float, area: Array, slant: Array) -
 
 
 def add_many(
-    state: Transform,
-    kernels: Array,
-    begins: Array,
-    ends: Array,
-    areas: Array,
-    slants: Array,
-    stops: Sequence[int] = (),
+    state: Transform, begins: Array, ends: Array, areas: Array, slants: Array, stops: Sequence[int] = ()
 ) -> Array:
-    """``add`` for N consecutive intervals with weights (N, 2, rows) from ``weights_of_many``, to the last bit.
+    """``add`` for N consecutive intervals, to the last bit.
 
     ``begins`` and ``ends`` (N,) s; ``areas`` and ``slants`` (N, width). Returns (K, 2F + 1, width + room) what
     ``current`` is after so many of the intervals, at least one, as the K ``stops`` say, which do not decrease.
     """
     add_some = _add_blocks if math.isinf(state.memory) else _add_singly
-    values = np.zeros((ends.size, *state.values.shape[1:]))
-    values[:, 0, : state.width], values[:, 1, : state.width] = areas, slants
-    found = add_some(state, kernels, begins, ends, values, stops)
-    return np.array(found).reshape(len(stops), 2 * state.grid.count + 1, values.shape[-1])
+    found: list[Array] = []
+    for first in range(0, ends.size, _PORTION):
+        part = slice(first, first + _PORTION)
+        begin, end = begins[part], ends[part]
+        steps = end - begin
+        kernels = weights_of_many(state.grid, begin + 0.5 * steps, steps)
+        values = np.zeros((end.size, *state.values.shape[1:]))
+        values[:, 0, : state.width], values[:, 1, : state.width] = areas[part], slants[part]
+        inside = [stop - first for stop in stops if first < stop <= first + _PORTION]
+        found += add_some(state, kernels, begin, end, values, inside)
+    return np.array(found).reshape(len(stops), 2 * state.grid.count + 1, state.values.shape[-1])
 
 
 def _add_singly(
@@ -192,22 +193,23 @@ def _add_singly(
 def _add_blocks(
     state: Transform, kernels: Array, begins: Array, ends: Array, values: Array, stops: Sequence[int]
 ) -> list[Array]:
-    """``add_many`` where nothing decays: all blocks that are finished on the way at once."""
-    before = state.count
-    kernels = np.concatenate([state.kernels[:before], kernels])
-    values = np.concatenate([state.values[:before], values])
-    blocks, rest = divmod(len(kernels), BLOCK)
-    whole = blocks * BLOCK
-    stacked = [part[:whole].reshape(blocks, 2 * BLOCK, part.shape[-1]) for part in (kernels, values)]
-    sums = stacked[0].swapaxes(1, 2) @ stacked[1]
-    done = np.add.accumulate(np.concatenate([state.done[None], sums]))
-    found = []
-    for stop in stops:
-        block, count = divmod(before + stop, BLOCK)
-        part = slice(block * BLOCK, block * BLOCK + count)
-        found.append(_counted(state.grid, _total(done[block], kernels[part], values[part])))
-    state.done[:], state.count, state.last = done[blocks], rest, float(ends[-1])
-    state.kernels[:rest], state.values[:rest] = kernels[whole:], values[whole:]
+    """``add_many`` where nothing decays: whole blocks as they lie."""
+    found: list[Array] = []
+    at = 0
+    while at < ends.size:
+        held = state.count
+        size = min(BLOCK - held, ends.size - at)
+        block = kernels[at : at + size], values[at : at + size]
+        if size < BLOCK:
+            state.kernels[held : held + size], state.values[held : held + size] = block
+            block = state.kernels, state.values
+        while len(found) < len(stops) and stops[len(found)] <= at + size:
+            count = held + stops[len(found)] - at
+            found.append(_counted(state.grid, _total(state.done, block[0][:count], block[1][:count])))
+        at, state.count = at + size, held + size
+        if state.count == BLOCK:
+            state.done, state.count = _total(state.done, *block), 0
+    state.last = float(ends[-1])
     return found
 
 

@@ -36,7 +36,7 @@ class FitQuality(NamedTuple):
     samples: int  # in the window
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Estimates:
     """All that the estimator knows at one time (s, of the last sample included)."""
 

@@ -60,7 +60,6 @@ def test_they_follow_the_motion_of_a_flight() -> None:
     state = transform.start(grid, LAYOUT.transformed, room=len(LAYOUT.instrumented))
     transform.add_many(
         state,
-        transform.weights_of_many(grid, time[:-1] + 0.5 * steps, steps),
         time[:-1],
         time[1:],
         0.5 * steps[:, None] * (values[1:] + values[:-1]),

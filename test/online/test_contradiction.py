@@ -88,7 +88,7 @@ def flown(samples: Array, time: Array, method: str) -> State:
 def looked(state: State, span: int) -> Contradiction:
     model = state.model
     looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, math.inf)
-    found = looking.at(span)
+    found = next((found for _, found in looking.contradictions([span])), None)
     assert found is not None
     return found
 

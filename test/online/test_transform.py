@@ -158,11 +158,25 @@ def test_many_at_once_are_the_same_bits(memory: float, split: int) -> None:
     single = fed(GRID, time, signals, memory)
     many = transform.start(GRID, 3, memory)
     many.base = many.last = float(time[0])
-    kernels, areas, slants = parts(time, signals)
+    _, areas, slants = parts(time, signals)
     for some in (slice(0, split), slice(split, None)):
         intervals = time[:-1][some], time[1:][some]
-        transform.add_many(many, kernels[some], *intervals, areas[some], slants[some])
+        transform.add_many(many, *intervals, areas[some], slants[some])
     assert transform.current(single).tobytes() == transform.current(many).tobytes()
+
+
+@pytest.mark.parametrize("memory", [math.inf, 2.0])
+def test_many_at_once_tell_what_was_current_on_the_way(memory: float) -> None:
+    time = irregular(9 * BLOCK)
+    signals = np.random.default_rng(7).normal(size=(time.size, 3))
+    stops = [1, 5, 5, BLOCK, 4 * BLOCK - 1, 4 * BLOCK, 4 * BLOCK + 1, 8 * BLOCK, time.size - 1]
+    many = transform.start(GRID, 3, memory)
+    many.base = many.last = float(time[0])
+    _, areas, slants = parts(time, signals)
+    found = transform.add_many(many, time[:-1], time[1:], areas, slants, stops)
+    for stop, lines in zip(stops, found, strict=True):
+        one = fed(GRID, time[: stop + 1], signals[: stop + 1], memory)
+        assert lines.tobytes() == transform.current(one).tobytes()
 
 
 def test_phases_are_right_after_ten_hours() -> None:

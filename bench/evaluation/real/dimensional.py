@@ -86,7 +86,5 @@ def _measure(time: Array, columns: Array, sides: Array, rates: bool, grid: Lines
     if rates:
         areas[:, : len(sides)] = np.diff(sides, axis=1).T
     running = transform.start(grid, columns.shape[1])
-    middles = 0.5 * (time[1:] + time[:-1])
-    kernels = transform.weights_of_many(grid, middles, step[:, 0])
-    transform.add_many(running, kernels, time[:-1], time[1:], areas, slants)
+    transform.add_many(running, time[:-1], time[1:], areas, slants)
     return information.measure(transform.current(running), None, lines, float(time[0]), float(time[-1]))
