@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,17 +34,28 @@ def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, fram
     """
     path, topics = Path(path), topics or topic_names()
     said = f"bag {path.name}"
-    with _reading(path, said):
-        raw = _read_messages(path, topics, said)
-    with _reading(path, said):
+    with open_bag(path) as reader, reading(path):
+        raw = _read_messages(reader, topics, said)
         return Streams(
             _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA]), _joint_stream(raw[ACTUATORS]), said
         )
 
 
 @contextmanager
-def _reading(path: Path, said: str) -> Iterator[None]:
-    """Turns what goes wrong in reading into one line with a remedy."""
+def open_bag(path: Path) -> Iterator[Reader]:
+    """A bag, open for reading. Raises InputError where it is missing, empty or damaged; see ``reading``."""
+    with ExitStack() as stack:
+        with reading(path):
+            reader = stack.enter_context(Reader(path))
+            if not reader.message_count:
+                raise InputError(f"bag {path.name}: holds no messages; record imu/data, air_data and actuators")
+        yield reader
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turns what goes wrong in reading a bag into an InputError: one line with a remedy."""
+    said = f"bag {path.name}"
     try:
         yield
     except InputError:
@@ -74,10 +85,9 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _read_messages(path: Path, topics: Mapping[str, str], said: str) -> dict[str, Messages]:
+def _read_messages(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, Messages]:
     """The bytes of all messages of the input topics."""
-    with Reader(path) as reader:
-        messages = read_messages(reader, _choose(reader, topics, said))
+    messages = read_messages(reader, _choose(reader, topics, said))
     for topic, some in messages.items():
         if not some.data:
             raise InputError(f"{said}: no messages on {topics[topic]}; record that topic too")
@@ -86,8 +96,6 @@ def _read_messages(path: Path, topics: Mapping[str, str], said: str) -> dict[str
 
 def _choose(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, list[Connection]]:
     """The connections of each input topic. Raises InputError where one is missing or of another type."""
-    if not reader.message_count:
-        raise InputError(f"{said}: holds no messages; record imu/data, air_data and actuators")
     there = {name: {c.msgtype for c in info.connections} for name, info in reader.topics.items()}
     for topic, name in topics.items():
         wanted = INPUT_TOPICS[topic]

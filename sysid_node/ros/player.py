@@ -8,7 +8,6 @@ import struct
 import sys
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,10 @@ import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.utilities import remove_ros_args
-from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
-from sysid_node.errors import InputError
+from sysid_node.flight.bag import open_bag, reading
 from sysid_node.ros.conversion import NANOSECONDS, stamp_message
 from sysid_node.ros.spin import run_program
 
@@ -89,16 +88,11 @@ def shift_stamp(raw: bytes, shift: int) -> bytes:
     return raw[:4] + struct.pack(form, *moved) + raw[12:]
 
 
-@contextmanager
-def open_bag(path: Path) -> Iterator[Reader]:
-    """A bag, open for reading. Raises InputError where it is missing, empty or damaged."""
-    try:
-        with Reader(path) as reader:
-            if not reader.message_count:
-                raise InputError(f"bag {path}: holds no messages; give another")
-            yield reader
-    except (OSError, ReaderError) as error:
-        raise InputError(f"bag {path}: cannot be read: {error}; give a rosbag2 folder, .mcap or .db3 file") from error
+def recorded(bag: Reader, path: Path) -> Iterator[tuple[str, int, bytes]]:
+    """(topic, log time in ns, serialised message) of a bag at ``path``. Raises InputError where it is damaged."""
+    with reading(path):
+        for connection, log_ns, raw in bag.messages():
+            yield connection.topic, log_ns, raw
 
 
 def _message_class(type_name: str) -> Any:
@@ -145,8 +139,7 @@ def main() -> None:
         with open_bag(options.bag) as bag:
             player = Player({connection.topic: connection.msgtype for connection in bag.connections}, options.clock)
             player.await_listeners(options.wait)
-            messages = ((connection.topic, log_ns, raw) for connection, log_ns, raw in bag.messages())
-            count = player.play(messages, options.rate, options.restamp)
+            count = player.play(recorded(bag, options.bag), options.rate, options.restamp)
             player.get_logger().info(f"played {count} messages of {options.bag}")
 
     sys.exit(run_program(play))
