@@ -38,9 +38,13 @@ IMU_RATE, SLOW_EVERY = 400, 4
 PUBLISH_RATE = 50.0
 
 
+def fly(seconds: float, together: bool) -> None:
+    """``publish`` in a process of its own."""
+    sys.exit(run_program(lambda: publish(seconds, together)))
+
+
 def publish(seconds: float, together: bool) -> None:
     """Publish a made-up, well excited flight, each message stamped when it is published."""
-    rclpy.init()
     node = rclpy.create_node("flight")
     qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
     imu, air, joints = (
@@ -62,7 +66,6 @@ def publish(seconds: float, together: bool) -> None:
             publisher.publish(message)
         fast.header.stamp = stamp if together else stamp_message(time.time_ns())
         imu.publish(fast)
-    rclpy.shutdown()
 
 
 def motion(t):
@@ -161,16 +164,19 @@ def listen(node, flight: BaseProcess, pid: int) -> tuple[list[tuple[int, int]], 
 
 
 def main() -> None:
-    """Measure both kinds of sampling and print the table."""
+    """Entry point of the bench, and of the bare node that it starts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--bare-node", action="store_true", help="be the bare node (what the bench starts)")
     options = parser.parse_args()
     if options.bare_node:
         run_bare()
-    seconds = options.seconds
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    rclpy.init()
+    sys.exit(run_program(lambda: measure_all(options.seconds)))
+
+
+def measure_all(seconds: float) -> None:
+    """Measure both nodes under both kinds of sampling and print the table."""
     print(f"{seconds:g} s of {IMU_RATE} Hz IMU + 100 Hz air data + 100 Hz actuators, estimates at {PUBLISH_RATE:g} Hz")
     print(
         f"{'node':<12}{'sampling':<10}{'sent':>8}{'lost':>6}{'rejected':>10}{'estimates':>11}"
@@ -178,13 +184,12 @@ def main() -> None:
     )
     for bare, together in ((True, True), (False, True), (False, False)):
         measure(seconds, bare, together)
-    rclpy.shutdown()
 
 
 def measure(seconds: float, bare: bool, together: bool) -> None:
     """One node under one kind of sampling: a line of the table."""
     node = rclpy.create_node("bench")
-    flight = get_context("spawn").Process(target=publish, args=(seconds, together))
+    flight = get_context("spawn").Process(target=fly, args=(seconds, together), daemon=True)
     with started(bare) as process:
         flight.start()
         latencies, words, share = listen(node, flight, process.pid)
