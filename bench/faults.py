@@ -306,7 +306,8 @@ def hours(count: float, weathers: Sequence[str], first: int, results: Path) -> s
         flown = len(mine) * PART / HOUR
         rows.append([turbulence, f"{flown:.1f}", str(sum(mine)), f"{_most(sum(mine)) / flown:.2f}"])
     flown, alarms = sum(float(r[1]) for r in rows), sum(int(r[2]) for r in rows)
-    rows.append(["all", f"{flown:.1f}", str(alarms), f"{_most(alarms) / flown:.2f}"])
+    if len(rows) > 1:
+        rows.append(["all", f"{flown:.1f}", str(alarms), f"{_most(alarms) / flown:.2f}"])
     return table(("turbulence", "hours", "false alarms", "an hour, 95 % sure: less than"), rows)
 
 
