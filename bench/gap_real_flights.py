@@ -156,8 +156,8 @@ def section(folder: Path, flight: Flight) -> str:
         heads = ("cause", "probability", "parameters (s.e.)", "not told apart from")
         parts.append(table(heads, [_cause(cause) for cause in found["causes"]]))
     if found["doubted"]:
-        said = ", ".join(f"{c['label']} {c['probability']:.2f}" for c in found["doubted"])
-        parts.append(f"Predicts better, but is doubted, with its probability: {said}.")
+        heads = ("predicts better, but is doubted", "probability", "parameters (s.e.)", "not told apart from")
+        parts.append(table(heads, [_cause(cause) for cause in found["doubted"]]))
     if found["next_flight"]:
         parts.append(f"To fly next: {found['next_flight']}")
     best = found.get("candidates", [])[:6]

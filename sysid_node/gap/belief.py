@@ -13,6 +13,7 @@ from sysid_node.gap.adequacy import adequacy_of
 from sysid_node.gap.candidates import Candidate
 from sysid_node.gap.credence import LIKELY, Grounds, prior
 from sysid_node.gap.evidence import probabilities
+from sysid_node.gap.fit import Fit
 from sysid_node.gap.foretold import advantage
 from sysid_node.gap.rivals import Place, refined
 from sysid_node.gap.trials import Trial, Trier
@@ -33,6 +34,7 @@ class Cause:
     taken: Array  # power (12,) that it takes away on flight not fitted, the other causes given
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
     grounds: Grounds
+    fit: Fit  # of the explanation that it was part of when it was weighed
     rivals: tuple[Trial, ...] = ()  # what was tried in its stead
     made_way: bool = False  # for a rival that can be believed
 
@@ -123,7 +125,7 @@ def _cause(trier: Trier, chosen: Trial, place: Place, barred: frozenset[str]) ->
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
     taken = np.maximum(power_left(place.without.evidence) - power_left(chosen.evidence), 0.0)
     grounds = _grounds(chosen, place.without, candidate)
-    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), grounds, place.rivals)
+    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), grounds, chosen.fit, place.rivals)
 
 
 def _shares(sets: Sequence[Trial], others: Sequence[Trial]) -> Array:

@@ -11,6 +11,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.errors import standard_errors
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.flown import WINDOW
+from sysid_node.gap.sizes import unbiased
 from sysid_node.gap.verdict import explained, named, structured, wanting
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS
 
@@ -70,10 +71,11 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
 
 
 def _doubted(cause: Cause) -> dict[str, Any]:
-    """What predicts better, but is not named."""
+    """What predicts better, but is not named; its size in the explanation that it was part of."""
     return {
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
+        "parameters": parameters(unbiased(cause.fit), cause),
         "probability": cause.probability,
         "indistinguishable_from": named(cause),
         "grounds": {"share": cause.share, **asdict(cause.grounds)},

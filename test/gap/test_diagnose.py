@@ -1,6 +1,7 @@
 """What is put in is found again, by name and size, through derivatives that are wrong; truth: the effects flown."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -53,7 +54,8 @@ def test_what_is_doubted_is_told(lagging) -> None:
     attribution = replace(lagging.attribution, causes=(), doubted=lagging.attribution.causes)
     found = replace(lagging, attribution=attribution)
     assert [c["effect"] for c in document(found)["doubted"]] == ["actuator_lag"]
-    assert candidates(found)["doubted"].startswith("actuator lag (")
+    assert document(found)["doubted"][0]["parameters"] == document(lagging)["causes"][0]["parameters"]
+    assert re.match(r"actuator lag \(\S+; time constant 0\.0[78]\S* ± \S+ s\)", candidates(found)["doubted"])
     assert not candidates(lagging)["doubted"]
 
 

@@ -179,21 +179,27 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
     """Every effect that was fitted to the end, alone; and the causes with their parameters."""
     rows = [(words_of(label), f"{100 * p:.1f}", 100 * p) for label, p in found.attribution.table]
     said = document(found)
-    doubted = [f"{words_of(c['label'])} ({number(c['probability'], 2)})" for c in said["doubted"]]
+    doubted = [
+        f"{words_of(c['label'])} ({'; '.join([number(c['probability'], 2), *map(' '.join, _parameters(c))])})"
+        for c in said["doubted"]
+    ]
     causes = [
         {
             "name": words_of(c["label"]),
             "station": c["station"],
             "probability": number(c["probability"], 2),
-            "parameters": [
-                (words_of(n), with_interval(v, 1.96 * e), units_of(c["effect"]).get(n, ""))
-                for n, (v, e) in c["parameters"].items()
-            ],
+            "parameters": _parameters(c),
             "rivals": ", ".join(words_of(r) for r in c["indistinguishable_from"]),
         }
         for c in said["causes"]
     ]
     return {"rows": rows, "causes": causes, "doubted": ", ".join(doubted), "confusion": _confusion(found)}
+
+
+def _parameters(cause: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Name, value with its 95 % interval, and unit of each of a cause's parameters."""
+    units = units_of(cause["effect"])
+    return [(words_of(n), with_interval(v, 1.96 * e), units.get(n, "")) for n, (v, e) in cause["parameters"].items()]
 
 
 def _confusion(found: Diagnosis) -> Mapping[str, Any]:
