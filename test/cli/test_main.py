@@ -1,5 +1,6 @@
 """``sysid``: exit codes, one line a mistake, and no import that is not needed."""
 
+import os
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -117,3 +118,16 @@ def test_a_reader_that_leaves_is_no_error():
     assert process.stderr.read() == b""
     process.stderr.close()
     assert process.wait() == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3"), ({"OMP_NUM_THREADS": "2"}, None)]
+)
+def test_linear_algebra_has_one_thread_unless_told_otherwise(monkeypatch, capsys, given, expected) -> None:
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.setenv(name, "")  # whatever main sets is undone
+        monkeypatch.delenv(name)
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    assert main(["convert", "nowhere.csv", "--aircraft", "cdrw", "--out", "nowhere"]) == 2
+    assert os.environ.get("OPENBLAS_NUM_THREADS") == expected

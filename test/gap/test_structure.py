@@ -1,0 +1,33 @@
+"""When coherence is structure; truth: Monte Carlo of noise that is stronger than the level it is counted in."""
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.structure import Structure
+
+DIRECTIONS, ROWS = 37, 400
+
+
+def measured(random: np.random.Generator, strength: float, structure: float = 0.0) -> Structure:
+    """One channel of noise of so many levels, and structure of so many along the instruments' directions."""
+    series = np.sqrt(strength) * random.standard_normal(ROWS)
+    series[:DIRECTIONS] += np.sqrt(structure) * random.choice([-1.0, 1.0], DIRECTIONS)
+    inside, outside = float(np.sum(series[:DIRECTIONS] ** 2)), float(np.sum(series[DIRECTIONS:] ** 2))
+    noise = max(outside / (ROWS - DIRECTIONS), 1.0)
+    found = (inside - DIRECTIONS, inside + outside, np.sqrt(2.0 * DIRECTIONS), noise)
+    return Structure(*(np.array([value]) for value in found))
+
+
+@pytest.mark.parametrize("strength", [1.0, 1.8])
+def test_noise_is_chance_however_strong(strength: float) -> None:
+    """Basmann's statistic: zero on average, of unit spread, whatever level least squares took for the noise."""
+    random = np.random.default_rng(4)
+    found = np.array([measured(random, strength).deviations[0] for _ in range(2000)])
+    assert abs(found.mean()) < 0.2
+    assert found.std() == pytest.approx(1.0, abs=0.15)
+
+
+def test_structure_in_strong_noise_is_still_seen() -> None:
+    random = np.random.default_rng(5)
+    found = np.array([measured(random, 1.8, structure=4.0).deviations[0] for _ in range(200)])
+    assert np.median(found) > 4.5
