@@ -49,14 +49,11 @@ def margins(plant: Linear, K: Array, delay: float) -> Margins:
 def transfer(plant: Linear, K: Array, omega: Array) -> Complex:
     """(..., F, m, m) K (jw - A)^-1 B at frequencies (F,) rad/s."""
     terms, polynomial = _resolvent(plant.A)
-    numerators = [K @ term @ plant.B for term in terms]  # of s^(n-1) ... s^0
-    s = 1j * omega
-    top = np.zeros((*plant.A.shape[:-2], omega.size, len(K), len(K)), dtype=complex)
-    for numerator in numerators:
-        top = top * s[:, None, None] + numerator[..., None, :, :]
-    bottom = np.zeros((*plant.A.shape[:-2], omega.size), dtype=complex)
-    for coefficient in polynomial:
-        bottom = bottom * s + coefficient[..., None]
+    numerators = np.stack([K @ term @ plant.B for term in terms], axis=-3)  # (..., n, m, m) of s^(n-1) ... s^0
+    powers = (1j * omega[:, None]) ** np.arange(len(terms), -1, -1)  # (F, n + 1)
+    flat = numerators.reshape(*numerators.shape[:-2], -1)
+    top = (powers[:, 1:] @ flat).reshape(*flat.shape[:-2], omega.size, *numerators.shape[-2:])
+    bottom = np.stack(polynomial, axis=-1) @ powers.T
     return np.asarray(top / bottom[..., None, None])
 
 
@@ -72,18 +69,30 @@ def one_at_a_time(L: Complex) -> Complex:
 def crossings(L: Complex) -> tuple[Array, Array]:
     """(..., m) gain margin (factor) and phase margin (rad) of loops (..., F, m) by frequency; inf where none cross."""
     a, b = L[..., :-1, :], L[..., 1:, :]
+    gain, phase = np.full(a.shape, np.inf), np.full(a.shape, np.inf)
     # the negative real axis: gain margin, up or down
+    here = (a.imag * b.imag <= 0.0) & ((a.real < 0.0) | (b.real < 0.0))
+    gain[here] = _gain(a[here], b[here])
+    # the unit circle: phase margin, lag or lead
+    beyond = L.real**2 + L.imag**2 >= 1.0
+    here = beyond[..., :-1, :] != beyond[..., 1:, :]
+    phase[here] = _phase(a[here], b[here])
+    return gain.min(axis=-2), phase.min(axis=-2)
+
+
+def _gain(a: Complex, b: Complex) -> Array:
+    """(N,) gain margins where loops cross the negative real axis on the way from a to b (N,); inf: the positive one."""
     share = np.clip(a.imag / np.where(a.imag == b.imag, 1.0, a.imag - b.imag), 0.0, 1.0)
     real = a.real + share * (b.real - a.real)
-    crosses = (a.imag * b.imag <= 0.0) & (real < 0.0)
-    gain = np.where(crosses, np.exp(np.abs(np.log(np.maximum(-real, 1e-12)))), np.inf)
-    # the unit circle: phase margin, lag or lead
+    return np.where(real < 0.0, np.exp(np.abs(np.log(np.maximum(-real, 1e-12)))), np.inf)
+
+
+def _phase(a: Complex, b: Complex) -> Array:
+    """(N,) phase margins where loops cross the unit circle on the way from a to b (N,), in the logarithm of size."""
     size_a, size_b = np.log(np.abs(a) + 1e-300), np.log(np.abs(b) + 1e-300)
-    share = np.clip(size_a / np.where(size_a == size_b, 1.0, size_a - size_b), 0.0, 1.0)
+    share = size_a / (size_a - size_b)
     turn = np.angle(b * np.conj(a))
-    away = np.abs(np.angle(-a * np.exp(1j * share * turn)))
-    phase = np.where(size_a * size_b <= 0.0, away, np.inf)
-    return gain.min(axis=-2), phase.min(axis=-2)
+    return np.asarray(np.abs(np.angle(-a * np.exp(1j * share * turn))))
 
 
 def stable(plant: Linear, K: Array, delay: float) -> NDArray[np.bool_]:
