@@ -16,7 +16,7 @@ import argparse
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,6 @@ from sysid_node.faults.types import (
     STUCK,
     VANE_OFFSET,
     VANE_STUCK,
-    Fault,
 )
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -177,11 +176,25 @@ def monitored(seed: int, identified: bool) -> State:
 
 @dataclass(frozen=True)
 class Seen:
-    """Of one flight: alarms before the onset, when the first one after it came, what it was called at last."""
+    """Of one flight: alarms before the onset, when the first one after it came, what was named at last."""
 
     early: int
     after: float  # s, inf = never
-    fault: Fault | None
+    kind: str = ""
+    part: str = ""
+    size: float = math.nan
+    lower: float = math.nan
+    upper: float = math.nan
+    unit: str = ""
+
+    @property
+    def found(self) -> bool:
+        """Whether there was an alarm."""
+        return math.isfinite(self.after)
+
+    def names(self, case: Case) -> bool:
+        """Whether it was called what it is."""
+        return self.found and self.kind in case.kinds and self.part == case.part
 
 
 def watch(state: State, time: Array, samples: Array, onset: float) -> Seen:
@@ -197,16 +210,16 @@ def watch(state: State, time: Array, samples: Array, onset: float) -> Seen:
                 found = block.time
         if state.fault is not None and block.time >= onset and block.time <= found + JUDGED:
             named = state.fault
-    return Seen(early, found - onset, named)
+    said = (named.kind, named.part, named.size, named.lower, named.upper, named.unit) if named is not None else ()
+    return Seen(early, found - onset, *said)
 
 
-def watched(case: Case, turbulence: str, flights: int, identified: bool, end: float = END) -> list[Seen]:
+def watched(case: Case, turbulence: str, seeds: Sequence[int], identified: bool, end: float) -> list[Seen]:
     """What the monitor sees in flights of ``end`` s."""
     setting = Setting("", turbulence, seconds=end, later=case.effects, onset=ONSET)
     if not case.effects:
         setting = replace(setting, onset=math.inf)
-    seeds = range(1, flights + 1)
-    batch = fly(NAME, setting, list(seeds))
+    batch = fly(NAME, setting, seeds)
     seen = []
     for seed, samples in zip(seeds, batch.samples, strict=True):
         if case.broken is not None:
@@ -216,62 +229,77 @@ def watched(case: Case, turbulence: str, flights: int, identified: bool, end: fl
     return seen
 
 
-def power(flights: int, identified: bool, results: Path) -> str:
+@dataclass(frozen=True)
+class Series:
+    """So many flights of each fault; those that are in the file of results are not flown again."""
+
+    flights: int
+    identified: bool
+    end: float  # s
+    results: Path
+
+    def of(self, case: Case, turbulence: str) -> list[Seen]:
+        """What the monitor saw in each of the flights."""
+        this = {"fault": case.name, "turbulence": turbulence}
+        seen = {one["seed"]: Seen(**one["seen"]) for one in _kept(self.results) if this.items() <= one.items()}
+        seeds = [seed for seed in range(1, self.flights + 1) if seed not in seen]
+        if seeds:
+            seen |= zip(seeds, watched(case, turbulence, seeds, self.identified, self.end), strict=True)
+        for seed in seeds:
+            _keep(self.results, {**this, "seed": seed, "seen": asdict(seen[seed])})
+        return [seen[seed] for seed in range(1, self.flights + 1)]
+
+
+def power(series: Series) -> str:
     """How many faults of which size are found within which time."""
-    rows = _kept(results)
-    done = {one[0] for one in rows}
+    rows = []
     for case in GROWING:
-        if case.name in done:
-            continue
-        cells = [case.name]
-        for turbulence in BOUNDS:
-            seen = watched(case, turbulence, flights, identified, ONSET + WITHIN[-1])
-            cells += [str(sum(one.after <= within for one in seen)) for within in WITHIN]
-        rows.append(cells)
-        _keep(results, cells)
+        seen = [series.of(case, turbulence) for turbulence in BOUNDS]
+        counts = [sum(one.after <= within for one in flights) for flights in seen for within in WITHIN]
+        rows.append([case.name, *map(str, counts)])
     heads = [f"{turbulence}: {within:g} s" for turbulence in BOUNDS for within in WITHIN]
-    return table((f"found of {flights} within; turbulence", *heads), rows)
+    return table((f"found of {series.flights} within; turbulence", *heads), rows)
 
 
-def row(case: Case, turbulence: str, flights: int, identified: bool) -> list[str]:
+def row(case: Case, turbulence: str, seen: Sequence[Seen]) -> list[str]:
     """One line of the table."""
-    seen = watched(case, turbulence, flights, identified)
-    found = [one for one in seen if math.isfinite(one.after)]
-    right = [one.fault for one in found if one.fault and one.fault.kind in case.kinds and one.fault.part == case.part]
+    found = [one for one in seen if one.found]
     after = sorted(one.after for one in found)
     times = [f"{np.median(after):.1f}", f"{after[-1]:.1f}"] if after else ["-", "-"]
     return [
         f"{case.name}; {turbulence}",
+        str(len(found)),
         *times,
-        str(flights - len(found)),
-        str(len(found) - len(right)),
-        *_sizes(case, [fault for fault in right if fault is not None]),
+        str(sum(one.names(case) for one in found)),
+        *_sizes(case, [one for one in found if one.names(case)]),
         str(sum(one.early for one in seen)),
     ]
 
 
-def _sizes(case: Case, found: Sequence[Fault]) -> list[str]:
+def _sizes(case: Case, found: Sequence[Seen]) -> list[str]:
     """Median size, and how many intervals hold the true one."""
     if math.isnan(case.size) or not found:
         return ["-", "-"]
-    middle = float(np.median([fault.size for fault in found]))
-    inside = sum(fault.lower <= case.size <= fault.upper for fault in found)
-    degrees = found[0].unit == "rad"
-    said = f"{math.degrees(middle):+.1f} deg" if degrees else f"{100 * middle:.0f} %"
+    middle = float(np.median([one.size for one in found]))
+    inside = sum(one.lower <= case.size <= one.upper for one in found)
+    said = f"{math.degrees(middle):+.1f} deg" if found[0].unit == "rad" else f"{100 * middle:.0f} %"
     return [said, f"{inside} of {len(found)}"]
 
 
-def faults(flights: int, identified: bool, results: Path) -> str:
+def faults(series: Series) -> str:
     """The table of faults."""
-    rows = _kept(results)
-    done = {one[0] for one in rows}
-    for case in CASES:
-        for turbulence in BOUNDS:
-            if f"{case.name}; {turbulence}" not in done:
-                rows.append(row(case, turbulence, flights, identified))
-                _keep(results, rows[-1])
-    heads = ("fault; turbulence", "found after s: median", "longest", "missed", "wrongly isolated")
-    return table((*heads, "size, median", "true size in the interval", "alarms before"), rows)
+    rows = [row(case, turbulence, series.of(case, turbulence)) for case in CASES for turbulence in BOUNDS]
+    heads = (f"fault; turbulence: {series.flights} flights", "found", "after s: median", "longest", "named rightly")
+    return table((*heads, "size, median", "true size in the interval", "alarms before"), rows) + _shares(series.flights)
+
+
+def _shares(flights: int) -> str:
+    """Which shares a count of flights may stand for: Clopper & Pearson, Biometrika 26 (1934)."""
+    from scipy.stats import binomtest  # noqa: PLC0415  # only here
+
+    bounds = [(n, binomtest(n, flights).proportion_ci(0.95)) for n in range(flights, -1, -1)]
+    said = (f"{n}: {100 * share.low:.0f} to {100 * share.high:.0f} %" for n, share in bounds)
+    return f"\n\nWhat a count out of {flights} says of the share (95 %): {'; '.join(said)}."
 
 
 def _kept(results: Path) -> list[Any]:
@@ -335,12 +363,12 @@ def main() -> None:
         publish("bench/faults.py --hours", table_of_hours, args.page)
         return
     mode = " --identified" if args.identified else ""
-    results = args.results / f"faults{mode.replace(' --', '_')}_{args.flights}.jsonl"
+    kept = args.results / f"{'power' if args.power else 'faults'}{mode.replace(' --', '_')}.jsonl"
+    series = Series(args.flights, args.identified, ONSET + WITHIN[-1] if args.power else END, kept)
     if args.power:
-        results = args.results / f"power{mode.replace(' --', '_')}_{args.flights}.jsonl"
-        publish(f"bench/faults.py --power{mode}", power(args.flights, args.identified, results), args.page)
-        return
-    publish(f"bench/faults.py{mode}", faults(args.flights, args.identified, results), args.page)
+        publish(f"bench/faults.py --power{mode}", power(series), args.page)
+    else:
+        publish(f"bench/faults.py{mode}", faults(series), args.page)
 
 
 if __name__ == "__main__":
