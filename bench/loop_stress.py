@@ -53,8 +53,12 @@ class Relay:
         from sensor_msgs.msg import Imu, JointState  # noqa: PLC0415  # after the domain is set
         from sysid_msgs.msg import AirData  # noqa: PLC0415
 
+        from sysid_node.ros.arrivals import Arrivals  # noqa: PLC0415
         from sysid_node.ros.loop_node import SENSOR_QOS  # noqa: PLC0415
 
+        self.heard = {topic: Arrivals(topic, 1.0) for topic in RAW}
+        self.told: list[list[str]] = []  # of every second, what was wrong with what the simulator sent
+        self._second = time.monotonic()
         self.drop, self.jitter, self.shift_ns, self.silent = 0.0, 0.0, 0, ""
         self._random, self._order = random.Random(1), 0
         self._waiting: list[tuple[float, int, Any, Any]] = []
@@ -68,10 +72,17 @@ class Relay:
             _, _, to, message = heapq.heappop(self._waiting)
             to.publish(message)
 
+    def listen(self) -> None:
+        """Once a second, note how what came has come."""
+        if time.monotonic() - self._second >= 1.0:
+            self._second = time.monotonic()
+            self.told.append([words for one in self.heard.values() for words in one.troubles()])
+
     def _passing(self, topic: str, to: Any) -> Callable[[Any], None]:
         from sysid_node.ros.conversion import stamp_message, stamp_ns  # noqa: PLC0415
 
         def take(message: Any) -> None:
+            self.heard[topic].arrived(1e-9 * stamp_ns(message.header.stamp))
             if topic == self.silent or self._random.random() < self.drop:
                 return
             if self.shift_ns:
@@ -121,6 +132,7 @@ class Loop:
                     raise SystemExit(f"{name} died with code {process.returncode}; see {self.logs / name}.log")
             phase = int(time.monotonic() / 3.0) % 4
             self.watch.ask_for({"roll": (0.2, 0.0, -0.2, 0.0)[phase], "pitch": (0.12, 0.08, 0.05, 0.08)[phase]})
+            self.relay.listen()
             begun = time.monotonic()
             while time.monotonic() < min(begun + 0.1, end):
                 self.executor.spin_once(timeout_sec=0.002)
@@ -258,25 +270,32 @@ def _troubles(loop: Loop) -> Iterator[tuple[str, str, Callable[[], None]]]:
 
 
 def endure(minutes: float) -> str:
-    """The table of memory and lateness."""
+    """The table of memory and lateness, from the time on that all fly."""
     with flying() as loop:
+        said, told = len(loop.said), len(loop.relay.told)
         loop.run(30.0)
         loop.watch.excite()
         loop.run(30.0)
         first, used, begun = {n: _memory(p.pid) for n, p in loop.processes.items()}, _seconds(loop), time.monotonic()
         loop.run(60.0 * (minutes - 1.0))
-        passed = time.monotonic() - begun
+        passed, now = time.monotonic() - begun, _seconds(loop)
         rows = []
         for name, process in loop.processes.items():
-            share = 100.0 * (_seconds(loop)[name] - used[name]) / passed
-            said = [line for _, node, line in loop.said if node == name]
-            late = [line for line in said if re.search(r"\blate\b|lost|silent|not flown|no commands", line)]
+            share = 100.0 * (now[name] - used[name]) / passed
             memory = [f"{first[name]:.1f}", f"{_memory(process.pid):.1f}"]
-            told = f"{len(late)} of {len(said)}{_what(late)}"
-            rows.append([name, *memory, f"{share:.0f}", told, _slowest(loop, name)])
-        skipped = _skipped(loop)
+            late = _lateness([line for _, node, line in loop.said[said:] if node == name])
+            rows.append([name, *memory, f"{share:.0f}", late, _slowest(loop, name)])
+        heard = loop.relay.told[told:]
+        ours = f"The relay was late itself, or heard what was, in {sum(map(bool, heard))} of {len(heard)} seconds."
+        notes = f"{ours} {_skipped(loop)} {_machine()}"
     heads = ("MB after a minute", "MB at the end", "processor, %", "times lateness was said", "step p99, ms")
-    return table(("node", *heads), rows) + f"\n\n{skipped} {_machine()}"
+    return table(("node", *heads), rows) + f"\n\n{notes}"
+
+
+def _lateness(said: list[str]) -> str:
+    """How often a node said that something was late, lost or silent."""
+    late = [line for line in said if re.search(r"\blate\b|lost|silent|not flown|no commands|behind", line)]
+    return f"{len(late)} of {len(said)}{_what(late)}"
 
 
 def _what(late: list[str]) -> str:

@@ -20,6 +20,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.frames import quaternion_from_euler
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.ros.arrivals import LATE
 from sysid_node.ros.conversion import NANOSECONDS, header, stamp_message
 from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
 from sysid_node.ros.monitor import Durations
@@ -117,16 +118,20 @@ class FlightSimulator(LoopNode):
         """How it flies, and what a step costs."""
         p50, p99 = self._steps.percentiles()
         flown = self._flight.samples * self._simulator.step
+        behind = self._pace.tell()
         values = {
             "flight time (s)": flown,
             "step p50 (us)": 1e6 * p50,
             "step p99 (us)": 1e6 * p99,
             "commands": self._commands,
             "commands refused": self._refused,
+            "behind the clock at most (ms)": 1e3 * behind,
             "not flown (s)": self._pace.skipped,
         }
         skipped, self._told = self._pace.skipped - self._told, self._pace.skipped
         troubles = [f"{skipped:.1f} s were not flown, the machine is too slow"] if skipped else []
+        if behind > LATE:
+            troubles.append(f"up to {1e3 * behind:.0f} ms behind the clock")
         silence = time.monotonic() - self._commanded
         if self._commands and silence > COMMAND_AGE:
             troubles.append(f"no commands for {silence:.1f} s: the last one is held")

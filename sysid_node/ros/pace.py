@@ -22,10 +22,17 @@ class Pace:
     step: float
     speed: float = 1.0
     skipped: float = 0.0  # s of flight that were not flown
+    behind: float = 0.0  # s, the most by which the clock on the wall was ahead since it was last told
 
     def due(self, now: float, flown: int) -> int:
         """How many samples to fly at a time (s), after so many."""
         late = (now - self.begun) * self.speed - self.skipped - flown * self.step
+        self.behind = max(self.behind, late / self.speed)
         lost = max(late - MOST_BEHIND * self.speed, 0.0)
         self.skipped += lost
         return max(math.ceil(min(late - lost, AT_ONCE) / self.step - 1e-9), 0)
+
+    def tell(self) -> float:
+        """How far it was behind (s) at most since this was last asked."""
+        behind, self.behind = self.behind, 0.0
+        return behind

@@ -51,3 +51,14 @@ def test_a_machine_that_is_always_too_slow_flies_slower() -> None:
     assert most == round(AT_ONCE / STEP)
     assert samples == pytest.approx(0.2 * 10.0 / STEP, rel=0.05)
     assert pace.skipped == pytest.approx(8.0, abs=0.3)
+
+
+def test_how_far_it_was_behind_is_told_once() -> None:
+    """The most since it was last asked, by the clock on the wall, whatever the speed."""
+    pace = Pace(0.0, STEP, 2.0)
+    samples, _ = flown(pace, 0, 0.0, 1.0)
+    assert pace.tell() <= STEP
+    samples, _ = flown(pace, samples, 1.05, 2.0)
+    assert pace.tell() == pytest.approx(0.05, abs=STEP)
+    flown(pace, samples, 2.0025, 3.0)
+    assert pace.tell() <= STEP
