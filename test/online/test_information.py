@@ -22,7 +22,6 @@ WIDTH, OUTPUT, REGRESSOR = OFFSET + 5, 0, OFFSET + 3
 def transformed(time: Array, signals: Array, memory: float = math.inf) -> Array:
     """(2F + 1, W) transform of signals (N, W) on straight lines between the samples."""
     state = transform.start(GRID, signals.shape[1], memory)
-    state.base = state.last = float(time[0])
     steps = np.diff(time)
     areas = 0.5 * steps[:, None] * (signals[1:] + signals[:-1])
     slants = 0.5 * steps[:, None] ** 2 * (signals[1:] - signals[:-1])

@@ -1,6 +1,7 @@
 """Sensors' noise in the regressors: its expected energy, and the bias that its subtraction removes."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -34,8 +35,7 @@ def test_expected_energy_is_that_of_noisy_samples() -> None:
     level = np.tile(exact_flight(NOISY, np.array([0.0, 1.0]))[:1], (time.size, 1))
     level[:, 3:6] = 0.0
     clean, steps = signals_of(NOISY, time, level), np.diff(time)
-    kernels = transform.weights_of_many(grid, time[:-1] + 0.5 * steps, steps)
-    keep = np.setdiff1d(np.arange(grid.rows - 1), grid.padding)
+    waves = np.array([transform.exact(grid, begin, end)[0, :-1] for begin, end in pairwise(time.tolist())])
     sigma = [NOISY.noise[sensor] for sensor in ("gyro", "gyro", "gyro", "alpha", "beta")]
     energy = np.zeros((layout.width, layout.width))
     for _ in range(150):
@@ -43,7 +43,7 @@ def test_expected_energy_is_that_of_noisy_samples() -> None:
         samples[:, [3, 4, 5, 7, 8]] += rng.normal(size=(time.size, 5)) * sigma
         errors = signals_of(NOISY, time, samples) - clean
         areas = 0.5 * steps[:, None] * (errors[1:] + errors[:-1])
-        lines = kernels[:, 0, keep].T @ areas
+        lines = waves.T @ areas
         energy += lines.T @ lines
     per_line_second = energy / 150 / (grid.count * 10.0)
     expected = noise.gram_bias(NOISY, layout, clean.mean(axis=0), step, step)
