@@ -49,15 +49,16 @@ class Flight:
     noise: Mapping[str, float]  # 1 sigma as the record shows it between samples
 
 
+_THOR_NOISE = {"accel": 0.15, "gyro": 0.01, "airspeed": 0.2, "alpha": 0.006, "beta": 0.006, "attitude": 0.005}
+_THOR_HALVES = ((0.0, 82.5), (82.6, 165.4))
+
 FLIGHTS = {
     "hfb320": Flight(
         "hfb320.csv", known.hfb320, (0.0, 30.0), (30.0, 60.0), True,
         {"accel": 0.03, "gyro": 0.001, "airspeed": 0.1, "alpha": 0.001, "beta": 0.001, "attitude": 0.001},
     ),
-    "thor": Flight(
-        "thor_75a.csv", known.thor, (5.0, 55.0), (85.0, 135.0), False,
-        {"accel": 0.15, "gyro": 0.01, "airspeed": 0.2, "alpha": 0.006, "beta": 0.006, "attitude": 0.005},
-    ),
+    "thor": Flight("thor_75a.csv", known.thor, *_THOR_HALVES, False, _THOR_NOISE),
+    "thor_other_half": Flight("thor_75a.csv", known.thor, *_THOR_HALVES[::-1], False, _THOR_NOISE),
     "twin_otter": Flight(
         "twin_otter_018.csv", known.twin_otter, (0.0, 8.0), (0.0, 0.0), True,
         {"accel": 0.03, "gyro": 0.0005, "airspeed": 0.1, "alpha": 0.0005, "beta": 0.0005, "attitude": 0.001},
@@ -85,7 +86,7 @@ def balanced(aircraft: Aircraft, record: FlightRecord) -> Aircraft:
     names = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "V", "alpha", "beta")
     seen = np.nan_to_num(np.column_stack([record[name] for name in names]))
     controls = [np.nan_to_num(record[symbol]) for symbol in aircraft.control_symbols]
-    thrust = record["thrust"] if aircraft.throttle else np.zeros(len(record))
+    thrust = np.nan_to_num(record["thrust"])
     rate = 1.0 / float(np.median(np.diff(record.time)))
     inertia = aircraft.inertia
     known = replace(inertia, Ixx=np.nan_to_num(inertia.Ixx), Izz=np.nan_to_num(inertia.Izz))
@@ -96,7 +97,8 @@ def balanced(aircraft: Aircraft, record: FlightRecord) -> Aircraft:
     for i, coefficient in enumerate(("CL", "CD", "CY", "Cl", "Cm", "Cn")):
         name = f"{coefficient}_0"
         own = [(n.partition("_")[2], d.value) for n, d in derivatives.items() if n.startswith(f"{coefficient}_")]
-        if name in derivatives:
+        told = coefficient != "CD" or not aircraft.throttle or record.measured("thrust")
+        if name in derivatives and told:
             rest = found[:, i] - sum(value * x[regressor] for regressor, value in own if regressor != "0")
             derivatives[name] = replace(derivatives[name], value=float(np.mean(rest)))
     return replace(aircraft, derivatives=derivatives)

@@ -24,6 +24,9 @@ UNSEEN = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 #: as all but the airspeed comes from it then: what it does, the commands' does (``belief``).
 _OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"})
 
+#: Effects of thrust, which on a flight without one is only what is left of the forward force.
+_OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")
+
 #: Parameters that only shape an effect and stay as they are: the data of one flight seldom determine them.
 _HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
 
@@ -80,6 +83,7 @@ def candidates_of(simulator: Simulator, views: Sequence[View]) -> list[Candidate
     found: list[Candidate] = []
     length = max(view.windows.starts[-1] + view.windows.length for view in views)
     unseen = UNSEEN | (_OF_VANES if any(view.flight.inferred for view in views) else frozenset())
+    unseen |= frozenset() if all(view.flight.metered for view in views) else _OF_THRUST
     for effect in EFFECTS:
         if effect in unseen:
             continue

@@ -19,6 +19,7 @@ from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs import READERS, read_log
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap import inferred
+from sysid_node.gap.unmetered import unmetered, with_thrust
 
 #: Rate at which forces are predicted (Hz): six times the highest line that is compared, and more.
 RATE = 50.0
@@ -45,6 +46,7 @@ class Flight:
     source: str = ""
     filled: tuple[str, ...] = field(default=())  # columns that were not measured and are taken as zero
     inferred: tuple[str, ...] = field(default=())  # flow angles that no vane measured
+    metered: bool = True  # whether thrust is known, or else is what the file's drag leaves of the forward force
 
 
 def load_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> Flight:
@@ -61,11 +63,18 @@ def load_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None
 
 
 def complete(aircraft: Aircraft, flight: Flight) -> Flight:
-    """The flight with the lateral signals, where all are absent, as zeros. Raises InputError where one is missing."""
+    """The flight with the lateral signals, where all are absent, as zeros, and a thrust where nobody metered it.
+
+    Raises InputError where a signal is missing.
+    """
     flight = _with_flow_angles(aircraft, replace(flight, record=_first_run(flight.record)))
+    return _with_thrust(aircraft, _with_lateral(aircraft, flight))
+
+
+def _with_lateral(aircraft: Aircraft, flight: Flight) -> Flight:
     record = flight.record
     longitudinal = ("ax", "az", "q", "V", "alpha", "rho", *aircraft.control_symbols)
-    needed = [*longitudinal, *(["thrust"] if aircraft.throttle else [])]
+    needed = [*longitudinal, *(["thrust"] if aircraft.throttle and record.measured("thrust") else [])]
     lateral = all(np.isfinite(record[name]).all() for name in _LATERAL)
     absent = [name for name in needed if not np.isfinite(record[name]).all()]
     fillable = [name for name in absent if name in {"da", "dr"} and not lateral]
@@ -79,6 +88,13 @@ def complete(aircraft: Aircraft, flight: Flight) -> Flight:
     filled = (*(n for n in _LATERAL if not np.isfinite(record[n]).all()), *fillable)
     columns = {**record.columns, **{name: np.zeros(len(record)) for name in filled}}
     return replace(flight, record=replace(record, columns=columns), lateral=False, filled=filled)
+
+
+def _with_thrust(aircraft: Aircraft, flight: Flight) -> Flight:
+    """The flight with a thrust that keeps its airspeed, where the aircraft has an engine that nobody metered."""
+    if not unmetered(aircraft, flight.record):
+        return flight
+    return replace(flight, record=with_thrust(aircraft, flight.record), metered=False)
 
 
 def _with_flow_angles(aircraft: Aircraft, flight: Flight) -> Flight:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
+from sysid_node.gap import unmetered
 from sysid_node.gap.close import STAGES, Gap, gap_from
 from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.kinematics import motion_of
@@ -66,8 +67,9 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
         return None
     motion, noise, *errors = np.concatenate(tables, axis=1)
     lateral = all(view.flight.lateral for view in final.views)
-    inferred = {angle for view in final.views for angle in view.flight.inferred}
-    counted = np.array([(lateral or name in _LONGITUDINAL) and name not in inferred for name in READINGS])
+    unread = {angle for view in final.views for angle in view.flight.inferred}
+    unread |= unmetered.READINGS if any(not view.flight.metered for view in final.views) else set()
+    counted = np.array([(lateral or name in _LONGITUDINAL) and name not in unread for name in READINGS])
     counted &= motion.mean(axis=0) > _MOVED * noise.mean(axis=0)
     if not counted.any():
         return None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap import inferred
+from sysid_node.gap import inferred, unmetered
 from sysid_node.gap.air import gusts_of, instruments_at_best, memory_of
 from sysid_node.gap.flights import Flight, thinned
 from sysid_node.gap.kinematics import motion_of
@@ -41,6 +41,7 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
     axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
     axes[[CHANNELS.index(name) for name in flight.inferred]] = False
+    axes[CHANNELS.index(unmetered.CHANNEL)] &= flight.metered
     calm = _measured_noise(bare(simulator, flight, record, windows, axes, Memory(LONGEST, LONGEST)), seed)
     instruments = instruments_at_best(calm)
     calm = replace(calm, gusts=gusts_of(calm, instruments))
@@ -89,6 +90,8 @@ def noisier(view: View, random: np.random.Generator) -> Flight:
     noisy = replace(record, columns=columns)
     if view.flight.inferred:
         noisy = inferred.with_angles(view.simulator.aircraft, noisy, view.flight.inferred, view.flight.source)
+    if not view.flight.metered:
+        noisy = unmetered.with_thrust(view.simulator.aircraft, noisy)
     return replace(view.flight, record=noisy)
 
 
@@ -98,6 +101,6 @@ def _jittered(view: View, random: np.random.Generator) -> dict[str, Array]:
     period = 1.0 / view.flight.actuator_rate
     nodes = np.arange(0.0, record.duration + period, period)
     off = np.interp(record.time, nodes, period * (random.random(nodes.size) - 0.5))
-    symbols = [*aircraft.control_symbols, *(["thrust"] if aircraft.throttle else [])]
+    symbols = [*aircraft.control_symbols, *(["thrust"] if aircraft.throttle and view.flight.metered else [])]
     moved = [s for s in symbols if s not in view.flight.filled]
     return {s: np.interp(record.time + off, record.time, record[s]) for s in moved}

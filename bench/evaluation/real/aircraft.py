@@ -41,13 +41,17 @@ def hfb320(folder: Path) -> Aircraft:
 
 
 def thor(folder: Path) -> Aircraft:
-    """The standard linear model; the rudder turned round, for this one's positive is the other way."""
-    beliefs = _of("CL", {"0": 0.1, "alpha": 4.5, "q": 5.0, "de": 0.3}) | _of("CD", {"0": 0.03, "alpha": 0.3})
-    beliefs |= _of("Cm", {"0": 0.05, "alpha": -0.7, "q": -10.0, "de": -1.0})
-    beliefs |= _of("CY", {"0": 0.01, "beta": -0.3, "dr": 0.1})
-    beliefs |= _of("Cl", {"0": 0.01, "beta": -0.03, "p": -0.4, "r": 0.1, "da": -0.15})
-    beliefs |= _of("Cn", {"0": 0.01, "beta": 0.05, "p": -0.03, "r": -0.1, "dr": -0.05})
-    return _aircraft(folder, "thor", Reference(15.0, 1.15), list(CONTROLS), beliefs)
+    """The model that the University of Minnesota's simulator of this very aircraft holds (Ultra Stick 25e, 2011; how
+    flights led to it: Dorobantu, Murch, Mettler & Balas (2013), Journal of Aircraft 50(4)).
+
+    Its polar is made linear at the lift of level flight; what it knows of its servos (8 Hz) is left out.
+    """
+    beliefs = _of("CL", {"0": 0.1086, "alpha": 4.58, "q": 6.1639, "de": 0.0983}) | _of("CD", {"0": 0.045, "alpha": 0.1})
+    beliefs |= _of("Cm", {"0": -0.0278, "alpha": -0.723, "q": -13.5664, "de": -0.8488})
+    beliefs |= _of("CY", {"0": 0.0, "beta": -0.4889, "p": -0.0375, "r": 0.15, "dr": 0.1913})
+    beliefs |= _of("Cl", {"0": 0.0, "beta": -0.0545, "p": -0.4496, "r": 0.1086, "da": -0.1646, "dr": 0.0115})
+    beliefs |= _of("Cn", {"0": 0.0, "beta": 0.0723, "p": 0.118, "r": -0.1833, "da": 0.0574, "dr": -0.1811})
+    return _aircraft(folder, "thor", Reference(17.0, 1.2), list(CONTROLS), beliefs, Throttle("throttle"))
 
 
 def _of(coefficient: str, values: Mapping[str, float]) -> dict[str, Derivative]:

@@ -40,6 +40,9 @@ _RESPONSES = {
 
 _TIMES = ("before", "after")
 
+#: Of flights on which nobody metered the thrust.
+_THRUST = " Thrust was not recorded: it is taken as what the file's drag leaves, and forward motion is not compared."
+
 #: Motion of the air that is not worth a word, m/s rms.
 _STILL = 0.2
 
@@ -126,10 +129,12 @@ def _falls(found: Diagnosis, otherwise: str) -> str:
 def _blindness(found: Diagnosis) -> str:
     """What was not measured, and what cannot be said without."""
     angles = dict.fromkeys(angle for view in found.views for angle in view.flight.inferred)
+    thrust = "" if all(view.flight.metered for view in found.views) else _THRUST
     if not angles:
-        return ""
+        return thrust
     known = " and ".join(WORDS[angle] for angle in angles)
-    return f" Not measured, but inferred from the inertial instruments: {known}. What gusts do is not known then."
+    gusts = "What gusts do is not known then."
+    return f" Not measured, but inferred from the inertial instruments: {known}. {gusts}{thrust}"
 
 
 def _weather(found: Diagnosis) -> str:
