@@ -1,6 +1,7 @@
-"""The messages of an open bag, as bytes: through rosbags, and chunk by chunk where they lie in chunks of mcap files.
+"""The messages of an open bag, as bytes: mcap files chunk by chunk, sqlite3 files row by row, others through rosbags.
 
-rosbags goes through a chunk as through a file, number by number, which takes four times as long.
+rosbags goes through a chunk as through a file, number by number, which takes four times as long, and hands each row of
+a table through two generators, which takes twice as long.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader, decompress
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from sysid_node.flight.cdr_layout import DamageError
 from sysid_node.flight.streams import Stamps
@@ -22,6 +24,7 @@ _MESSAGE = 0x05  # what a message's record begins with
 _RECORD = struct.Struct("<BQHIQQ")  # kind and length; channel, sequence, log time, time of publication
 _LENGTH_ENDS = 9
 _CRC, _NAME = 33, 49  # where a chunk's checksum and the name of its compression stand in its record
+_ROWS = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp"
 
 
 class Messages(NamedTuple):
@@ -37,8 +40,8 @@ def read_messages(reader: Reader, chosen: Mapping[str, Sequence[Connection]]) ->
 
     Raises DamageError, or what rosbags raises, where the file is damaged.
     """
-    files = _chunked(reader)
-    found = _by_chunks(files, chosen) if files else _by_rosbags(reader, chosen)
+    files = _files(reader)
+    found = _by_files(files, chosen) if files else _by_rosbags(reader, chosen)
     return dict(zip(chosen, found, strict=True))
 
 
@@ -56,15 +59,19 @@ def _by_rosbags(reader: Reader, chosen: Mapping[str, Sequence[Connection]]) -> I
     return (Messages(data, np.array(logs, np.int64), np.array(order, np.int64)) for data, logs, order in into)
 
 
-def _chunked(reader: Reader) -> list[McapReader]:
-    """The files of the bag; none where any is not an mcap file in chunks, or where single messages are compressed."""
+def _files(reader: Reader) -> list[McapReader | Sqlite3Reader]:
+    """The files of the bag; none where rosbags must read any of them, or where single messages are compressed."""
     storage = reader.storage
     files = storage.storages if isinstance(storage, DirectoryReader) else [storage]
-    mcap = [file for file in files if isinstance(file, McapReader) and file.chunks]
-    return mcap if len(mcap) == len(files) and reader.compression_mode != "message" else []
+    known = [
+        file for file in files if isinstance(file, Sqlite3Reader) or (isinstance(file, McapReader) and file.chunks)
+    ]
+    return known if len(known) == len(files) and reader.compression_mode != "message" else []
 
 
-def _by_chunks(files: Sequence[McapReader], chosen: Mapping[str, Sequence[Connection]]) -> Iterator[Messages]:
+def _by_files(
+    files: Sequence[McapReader | Sqlite3Reader], chosen: Mapping[str, Sequence[Connection]]
+) -> Iterator[Messages]:
     """One file after the other, as rosbags does; messages of one file by log time, at equal times as they lie."""
     topics: list[int] = []
     logs: list[int] = []
@@ -73,14 +80,29 @@ def _by_chunks(files: Sequence[McapReader], chosen: Mapping[str, Sequence[Connec
     places = {connections[0].topic: i for i, connections in enumerate(chosen.values())}
     for file in files:
         into = {c.id: places[c.topic] for c in file.connections if c.topic in places}
-        for chunk in file.chunks:
-            _read_chunk(_content(file, chunk), into, topics, logs, data)
+        if isinstance(file, Sqlite3Reader):
+            _read_rows(file, into, topics, logs, data)
+        else:
+            for chunk in file.chunks:
+                _read_chunk(_content(file, chunk), into, topics, logs, data)
         fresh = np.argsort(np.array(logs[order.size :], np.int64), kind="stable")
         order = np.append(order, order.size + fresh)
     topic, log_ns = np.array(topics, np.int64)[order], np.array(logs, np.int64)[order]
     for i in range(len(chosen)):
         at = np.flatnonzero(topic == i)
         yield Messages([data[k] for k in order[at].tolist()], log_ns[at], at)
+
+
+def _read_rows(
+    file: Sqlite3Reader, into: Mapping[int, int], topics: list[int], logs: list[int], data: list[bytes]
+) -> None:
+    """Append the messages of the topics by number ``into`` ours."""
+    assert file.dbconn is not None
+    for topic, log_ns, message in file.dbconn.execute(_ROWS):
+        if topic in into:
+            topics.append(into[topic])
+            logs.append(log_ns)
+            data.append(message)
 
 
 def _content(file: McapReader, chunk: ChunkInfo) -> bytes:

@@ -1,4 +1,4 @@
-"""Messages read chunk by chunk are those that rosbags yields one by one, in the same order."""
+"""Messages read chunk by chunk, or row by row, are those that rosbags yields one by one, in the same order."""
 
 import struct
 from pathlib import Path
@@ -15,10 +15,15 @@ from sysid_node.flight.messages import type_store
 TOPICS = ("/a", "/b", "/c")
 
 
-def bag(folder: Path, compression: CompressionMode | None = None, seed: int = 0) -> Path:
+def bag(
+    folder: Path,
+    compression: CompressionMode | None = None,
+    seed: int = 0,
+    storage: StoragePlugin = StoragePlugin.MCAP,
+) -> Path:
     """Four megabytes, over several chunks, logged out of order and often at the same time."""
     rng = np.random.default_rng(seed)
-    writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer = Writer(folder, version=9, storage_plugin=storage)
     if compression is not None:
         writer.set_compression(compression, CompressionFormat.ZSTD)
     with writer:
@@ -52,6 +57,14 @@ def test_chunks_hold_what_rosbags_yields(
     tmp_path: Path, topics: tuple[str, ...], compression: CompressionMode | None
 ) -> None:
     assert_as_rosbags_reads(bag(tmp_path / "bag", compression), topics)
+
+
+@pytest.mark.parametrize("compression", [None, CompressionMode.FILE, CompressionMode.MESSAGE], ids=str)
+@pytest.mark.parametrize("topics", [TOPICS, ("/c", "/a")], ids=str)
+def test_rows_hold_what_rosbags_yields(
+    tmp_path: Path, topics: tuple[str, ...], compression: CompressionMode | None
+) -> None:
+    assert_as_rosbags_reads(bag(tmp_path / "bag", compression, storage=StoragePlugin.SQLITE3), topics)
 
 
 def test_a_file_alone(tmp_path: Path) -> None:
