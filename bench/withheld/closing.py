@@ -1,7 +1,9 @@
-"""How much of the gap a diagnosis closes, measured in the plant: the corrected model flown beside the truth.
+"""How much of the gap a diagnosis closes, beside what the true effect closes.
 
-The held-out flight again, with the same gusts and without noise: once as it was, once with the aircraft file that was
-handed over, once with the corrected file and the effects found. Only for plants that can fly any aircraft file.
+Measured in the plant: the held-out flight again, with the same gusts and without noise, once as it was, once with the
+aircraft file that was handed over, once with the corrected file and the effects found, once with the true effect in
+their place. A foreign plant flies no other aircraft's file: there the simulator flies the same three beside the
+held-out record.
 """
 
 from __future__ import annotations
@@ -17,10 +19,16 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.gap.flights import RATE as ANALYSIS_RATE
+from sysid_node.gap.flights import load_flight
+from sysid_node.gap.flown import flown
+from sysid_node.gap.viewing import view_of
+from sysid_node.sim import Simulator
 
-from .drawing import Case
+from .drawing import FOREIGN, Case
 from .motion import DivergedError, Effects
 from .plant import RATE, Plant
+from .predicting import everywhere, vector
 
 Array = NDArray[np.float64]
 
@@ -39,7 +47,7 @@ def closed(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float]
     if kept.exists():
         known: dict[str, float] = json.loads(kept.read_text(encoding="utf-8"))
         return known or None
-    errors = _errors(label, which, case) if label["plant"] != "c172p" else {}
+    errors = _beside_record(label, case) if label["plant"] == FOREIGN else _errors(label, which, case)
     kept.write_text(json.dumps(errors), encoding="utf-8")
     return errors or None
 
@@ -57,6 +65,17 @@ def _errors(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float
         return {}
     flights = {"before": before, "after": after, "true_effect": best}
     return {name: _apart(flight, truth) for name, flight in flights.items()}
+
+
+def _beside_record(label: Mapping[str, Any], case: Path) -> dict[str, float]:
+    """The simulator's errors on the held-out record, by the diagnosis' own rule, noise and all."""
+    aircraft, corrected = (load_aircraft(str(case / name)) for name in ("aircraft.yaml", "out/corrected.yaml"))
+    simulator = Simulator(aircraft, ANALYSIS_RATE)
+    view = view_of(simulator, load_flight(case / "held", aircraft, None, "flu"))
+    found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
+    points = (vector(simulator, corrected, effects) for effects in (found, label["effects"]))
+    gap = flown(*(everywhere((view,), point) for point in points))
+    return {"before": gap.before, "after": gap.tolerances, "true_effect": gap.after} if gap else {}
 
 
 def _flown(plant: Plant, aircraft: Aircraft, effects: Effects) -> Array:

@@ -15,12 +15,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.bag_writer import write_streams
-from sysid_node.gap.evidence import Evidence, groups_of
 from sysid_node.gap.flights import RATE as ANALYSIS_RATE
 from sysid_node.gap.flights import load_flight
 from sysid_node.gap.flown import flown
@@ -32,8 +29,7 @@ from .closing import effects_of
 from .drawing import Case
 from .instruments import SUITES, readings, record
 from .plant import Plant
-
-Array = NDArray[np.float64]
+from .predicting import everywhere, vector
 
 #: Numbers of the flights that are flown for this: after the one fitted and the one held out.
 _FLIGHTS = (2, 3, 4)
@@ -48,18 +44,12 @@ def main(which: str, seed: int, folder: Path) -> None:
     simulator = Simulator(aircraft, ANALYSIS_RATE)
     views = tuple(_view(plant, simulator, flight, label["effects"]) for flight in _FLIGHTS)
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
-    after = _vector(simulator, load_aircraft(str(case / "out" / "corrected.yaml")), found)
-    before, corrected = (_everywhere(views, point) for point in (simulator.neutral(), after))
+    after = vector(simulator, load_aircraft(str(case / "out" / "corrected.yaml")), found)
+    before, corrected = (everywhere(views, point) for point in (simulator.neutral(), after))
     gap = flown(before, corrected)
     errors = asdict(gap) if gap else {}
     kept = {name: errors[name] for name in ("before", "after", "noise_floor", "shrink_percent") if errors}
     (case / "covered.json").write_text(json.dumps(kept), encoding="utf-8")
-
-
-def _everywhere(views: tuple[View, ...], point: Array) -> Evidence:
-    """Flights that are predicted with the same parameters throughout."""
-    points = tuple((point,) * len(groups_of(view)) for view in views)
-    return Evidence(np.empty(0), (), views, points)
 
 
 def _view(plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str, Mapping[str, float]]) -> View:
@@ -71,16 +61,6 @@ def _view(plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str,
     with tempfile.TemporaryDirectory() as folder:
         write_streams(Path(folder) / "flight", streams)
         return view_of(simulator, load_flight(Path(folder) / "flight", simulator.aircraft, None, "flu"))
-
-
-def _vector(simulator: Simulator, aircraft: Aircraft, effects: Mapping[str, Mapping[str, float]]) -> Array:
-    """The parameters by which the believed aircraft becomes another, with these effects."""
-    theta = simulator.vector({n: v for n, v in effects.items() if n != "derivative_error"})
-    known = simulator.aircraft.derivatives
-    for name, derivative in aircraft.derivatives.items():
-        off = effects.get("derivative_error", {}).get(name, 0.0)
-        theta[simulator.names.index(f"derivative_error.{name}")] = derivative.value + off - known[name].value
-    return np.asarray(theta)
 
 
 if __name__ == "__main__":

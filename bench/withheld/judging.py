@@ -59,8 +59,8 @@ class Judged:
         return float(self.gap["shrink_percent"]) / 100.0
 
     @property
-    def closed_in_plant(self) -> float | None:
-        """The same in the plant, over what the true effect closes there; None where that is next to nothing."""
+    def closed_of_true(self) -> float | None:
+        """Share of what the true effect closes (``closing``) that was; None where that is next to nothing."""
         if self.flown is None:
             return None
         before, after, best = (self.flown[name] for name in ("before", "after", "true_effect"))

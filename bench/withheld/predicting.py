@@ -1,0 +1,31 @@
+"""A flight's record against a corrected model: its parameters as the believed aircraft's simulator holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.gap.evidence import Evidence, groups_of
+from sysid_node.gap.view import View
+from sysid_node.sim import Simulator
+
+Array = NDArray[np.float64]
+
+
+def everywhere(views: tuple[View, ...], point: Array) -> Evidence:
+    """Flights that are predicted with the same parameters throughout."""
+    points = tuple((point,) * len(groups_of(view)) for view in views)
+    return Evidence(np.empty(0), (), views, points)
+
+
+def vector(simulator: Simulator, aircraft: Aircraft, effects: Mapping[str, Mapping[str, float]]) -> Array:
+    """The parameters by which the believed aircraft becomes another, with these effects."""
+    theta = simulator.vector({n: v for n, v in effects.items() if n != "derivative_error"})
+    known = simulator.aircraft.derivatives
+    for name, derivative in aircraft.derivatives.items():
+        off = effects.get("derivative_error", {}).get(name, 0.0)
+        theta[simulator.names.index(f"derivative_error.{name}")] = derivative.value + off - known[name].value
+    return np.asarray(theta)
