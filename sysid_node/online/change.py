@@ -12,10 +12,12 @@ that no derivatives explain are another matter: there the model itself does not 
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, islice
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +57,7 @@ class Watch:
     lost: Flags | None = None  # (C,)
     disowned: Flags | None = None  # (C,) by what was learned in well-excited flight
     looks: int = 0
+    ahead: dict[int, list[Contradiction]] = field(default_factory=dict)  # by look: what was tested before its time
 
 
 @dataclass(frozen=True)
@@ -80,34 +83,69 @@ class Looking:
 
     def lines(self, span: int) -> tuple[float, Array]:
         """Start (s) and clean lines of the last ``span`` pieces."""
-        pieces = self.watch.pieces
-        part = sum(piece for _, piece in islice(pieces, len(pieces) - span, None))
-        return pieces[-span][0], clean_lines(np.asarray(part), self.model)
-
-    def before(self, span: int) -> Reference | None:
-        """The estimates from before the last ``span`` pieces, if there are any."""
-        if span > len(self.watch.pieces):
-            return None
-        start = self.watch.pieces[-span][0]
-        return next((r for r in reversed(self.watch.references) if r.time <= start + 1e-6), None)
-
-    def _known(self, spans: Iterable[int]) -> Iterator[tuple[int, Reference]]:
-        """The ``spans`` up to the first without estimates from before them, and these."""
-        for span in spans:
-            reference = self.before(span)
-            if reference is None:
-                return
-            yield span, reference
+        return self.watch.pieces[-span][0], clean_lines(_summed(self.watch.pieces, span), self.model)
 
     def contradictions(self, spans: Iterable[int]) -> Iterator[tuple[int, Contradiction]]:
         """How the last pieces contradict the estimates from before them: of the ``spans`` (rising) that have such."""
-        known = self._known(spans)
-        for _, pairs in groupby(known, key=lambda pair: id(pair[1].plan)):
-            alike, references = zip(*pairs, strict=True)
-            starts, lines = zip(*map(self.lines, alike), strict=True)
-            duration = self.now - np.array(starts)
-            found = contradiction(Reference.stacked(references), np.array(lines), self.spectrum, duration)
-            yield from zip(alike, found.each(), strict=True)
+        known = list(_stretches(self.watch, self.watch.pieces, self.now, spans))
+        return zip(spans, _tested(known, self.model, self.spectrum), strict=False)
+
+    def ahead(self, upcoming: Sequence[tuple[float, Array]], ends: Sequence[float], until: int) -> None:
+        """Test what is going to be looked at with the ``upcoming`` pieces, which end at ``ends`` (s), all at once.
+
+        New estimates will come with the one number ``until``: what is to be tested against them has to wait.
+        """
+        watch, every, known = self.watch, [*self.watch.pieces, *upcoming], list[_Stretch]()
+        counts: list[int] = []
+        for j, end in enumerate(ends, start=1):
+            spans = _due(watch.looks + j)
+            if j - spans[0] >= until:
+                break
+            fresh = list(_stretches(watch, every[: len(watch.pieces) + j], end, spans))
+            known += fresh
+            counts.append(len(fresh))
+        found = _tested(known, self.model, self.spectrum)
+        for j, count in enumerate(counts, start=1):
+            watch.ahead[watch.looks + j] = [next(found) for _ in range(count)]
+
+
+class _Stretch(NamedTuple):
+    """One or several pieces in a row, and the estimates from before them."""
+
+    start: float  # s
+    end: float
+    part: Array  # (2F + 1, W) transform
+    before: Reference
+
+
+def _summed(pieces: Sequence[tuple[float, Array]], span: int) -> Array:
+    """(2F + 1, W) transform of the last ``span`` pieces."""
+    return np.asarray(sum(piece for _, piece in islice(pieces, len(pieces) - span, None)))
+
+
+def _stretches(
+    watch: Watch, pieces: Sequence[tuple[float, Array]], end: float, spans: Iterable[int]
+) -> Iterator[_Stretch]:
+    """The last of the ``pieces``, up to ``end`` (s): of the ``spans`` up to the first without estimates before it."""
+    for span in spans:
+        start = pieces[-span][0] if span <= len(pieces) else -math.inf
+        reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
+        if reference is None:
+            return
+        yield _Stretch(start, end, _summed(pieces, span), reference)
+
+
+def _tested(stretches: Sequence[_Stretch], model: Auxiliary | None, spectrum: Spectrum) -> Iterator[Contradiction]:
+    """How each contradicts the estimates from before it; those by the same equations at once."""
+    for _, some in groupby(stretches, key=lambda stretch: id(stretch.before.plan)):
+        starts, ends, parts, references = zip(*some, strict=True)
+        lines, duration = clean_lines(np.array(parts), model), np.array(ends) - np.array(starts)
+        yield from contradiction(Reference.stacked(references), lines, spectrum, duration).each()
+
+
+def _due(look: int) -> list[int]:
+    """The spans that are looked at with the look of this number."""
+    return [span for span in SPANS if not look % max(span // EVERY, 1)]
 
 
 def examine(looking: Looking, experiences: list[Experience]) -> Finding:
@@ -115,7 +153,8 @@ def examine(looking: Looking, experiences: list[Experience]) -> Finding:
     watch, C = looking.watch, len(looking.full.coefficients)
     watch.looks += 1
     surest = 1.0
-    for span, found in looking.contradictions(span for span in SPANS if not watch.looks % max(span // EVERY, 1)):
+    spans, tested = _due(watch.looks), watch.ahead.pop(watch.looks, None)
+    for span, found in looking.contradictions(spans) if tested is None else zip(spans, tested, strict=False):
         known = found.freedom >= KNOWN
         usual = _usual(watch, span, C)
         watch.doubted[span] = known & (found.chance(usual) < DOUBT)

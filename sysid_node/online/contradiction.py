@@ -48,11 +48,8 @@ class Reference:
     @classmethod
     def stacked(cls, some: Sequence[Reference]) -> Reference:
         """Estimates by the same equations with an axis in front."""
-        first = some[0]
-        if all(one is first for one in some):
-            return first
         solution = Solution(*_columns([one.solution for one in some]))
-        return cls(first.time, first.plan, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
+        return cls(some[0].time, some[0].plan, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
 
 
 def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:

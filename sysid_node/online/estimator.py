@@ -115,7 +115,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     transform.add(state.transform, previous[0], time, area, slant)
     state.samples += 1
     state.intervals += sample[INTERVAL]
-    state.recent.append(now[1])
+    state.recent.append(now[1][None])
 
 
 def renew_early(state: State) -> None:

@@ -117,10 +117,11 @@ def about_mean(transform: Array, model: Auxiliary | None) -> Array:
 
 
 def project(lines: Array) -> Array:
-    """(2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
-    n = lines[:, _N].copy()
-    clean = lines - n @ (inverse2(n.T @ n) @ (n.T @ lines))
-    clean[:, _N] = n
+    """(..., 2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
+    n = lines[..., _N].copy()
+    across = n.swapaxes(-1, -2)
+    clean: Array = lines - n @ (inverse2(across @ n) @ (across @ lines))
+    clean[..., _N] = n
     return clean
 
 
@@ -161,7 +162,7 @@ def window_energy(duration: float, rate: float) -> float:
 
 
 def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
-    """(2F, W) lines of a transform (2F + 1, W) without offset, constant and drift, and the instruments made of them."""
+    """(..., 2F, W) lines of transforms (..., 2F + 1, W) without offset, constant and drift, with their instruments."""
     return project(about_mean(transform.copy(), model))
 
 

@@ -7,6 +7,7 @@ on.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -69,7 +70,12 @@ def reach(time: Any, step: Any) -> Any:
 def _is_due(state: State) -> bool:
     """Whether it is time to solve for everything again."""
     renewed = state.renewed
-    return renewed is None or state.pieces - renewed.pieces >= 1 + int(renewed.total.energy / SOON)
+    return renewed is None or state.pieces - renewed.pieces >= _pause(renewed)
+
+
+def _pause(renewed: Renewed) -> int:
+    """Pieces from one time when everything is solved for to the next."""
+    return 1 + int(renewed.total.energy / SOON)
 
 
 def begin_segment(state: State, time: float) -> None:
@@ -107,7 +113,7 @@ def _weigh_recent(state: State) -> None:
     pieces, every = list(state.watch.pieces)[-RECENT:], state.intervals / max(state.samples, 1)
     # about the mean of the last seconds, as slower motion is not in the lines
     mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (now - pieces[0][0])
-    model, rows = state.model, np.array(state.recent)
+    model, rows = state.model, np.concatenate(state.recent)
     boxes = max(round(2.0 * model.settings.frequencies[2] * duration), 1)
     found = unevenness.measure(
         model.aircraft, model.layout, model.plan, model.believed[0], rows, mean, duration, every, boxes
@@ -232,8 +238,7 @@ def _look_for_changes(state: State, lines: Array) -> None:
     model, now, renewed = state.model, state.transform.last, state.renewed
     if renewed is None:
         return
-    looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, now, _memory(state))
-    finding = change.examine(looking, state.experiences)
+    finding = change.examine(_looking(state), state.experiences)
     same = np.array_equal(finding.lost, renewed.lost) and np.array_equal(finding.doubted, renewed.doubted)
     if state.flow.active or not same:
         state.renewed = replace(renewed, lost=finding.lost, doubted=finding.doubted, grounds=None)
@@ -241,6 +246,30 @@ def _look_for_changes(state: State, lines: Array) -> None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:
         state.changed_at, state.experiences = now, experiences(model.plan, model.layout)
+
+
+def look_ahead(state: State, ends: Sequence[float], lines: Sequence[Array]) -> None:
+    """Test for changes what will be looked at with the next pieces, unless the next look's tests are known already.
+
+    The pieces will end at ``ends`` (K,) s, with transforms ``lines`` (2F + 1, W) of the present segment. Whatever is
+    renewed at these times meets the same tests, and so the same bits, as if it had made them then.
+    """
+    renewed, watch = state.renewed, state.watch
+    if renewed is None or not state.model.settings.detect_changes or watch.looks + 1 in watch.ahead:
+        return
+    starts, before = [state.piece_start, *ends[:-1]], [state.piece, *lines[:-1]]
+    rate = state.model.spectrum.rate
+    pieces = [
+        (start, after - past * math.exp(0.5 * rate * (start - end)))
+        for start, end, past, after in zip(starts, ends, before, lines, strict=True)
+    ]
+    _looking(state).ahead(pieces, ends, renewed.pieces + _pause(renewed) - state.pieces)
+
+
+def _looking(state: State) -> Looking:
+    """What looks for changes share."""
+    model = state.model
+    return Looking(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, _memory(state))
 
 
 def _memory(state: State) -> float:

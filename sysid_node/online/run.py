@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Sequence
 from copy import copy
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator, reconstruction, signals, transform
+from sysid_node.online.change import PIECE
 from sysid_node.online.estimates import estimates_at
-from sysid_node.online.renewal import reach
+from sysid_node.online.renewal import look_ahead, reach
 from sysid_node.online.settings import Settings
 from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
@@ -220,18 +222,56 @@ def _integrate(results: _Results, chunk: _Chunk, begin: int, end: int, stops: de
         results.finish()
         estimator.interrupt(state, float(chunk.time[begin]))
         return begin + 1
-    # up to and including the sample after which is renewed, short of the next gap
-    far = np.flatnonzero(chunk.reach[begin:end] >= state.renew_at)
-    stop = begin + int(far[0]) + 1 if far.size else end
-    gaps = np.flatnonzero(np.isnan(chunk.begins[begin:stop]))
-    stop = begin + int(gaps[0]) if gaps.size else stop
-    wanted, part = _popped(stops, stop), slice(begin, stop)
+    gaps = np.flatnonzero(np.isnan(chunk.begins[begin:end]))
+    return _take_pieces(
+        results, chunk, begin, _pieces(state, chunk, begin, begin + int(gaps[0]) if gaps.size else end), stops
+    )
+
+
+def _pieces(state: State, chunk: _Chunk, begin: int, end: int) -> list[int]:
+    """Where pieces of data end between the usable samples ``begin`` and ``end``: up to that, or the segment's end."""
+    ends, at, renew_at = [], begin, state.renew_at
+    while at < end:
+        far = np.flatnonzero(chunk.reach[at:end] >= renew_at)
+        at = at + int(far[0]) + 1 if far.size else end
+        ends.append(at)
+        if chunk.reach[at - 1] - state.segment_start >= state.model.segment_time:
+            break
+        renew_at = float(chunk.time[at - 1]) + PIECE
+    return ends
+
+
+def _take_pieces(results: _Results, chunk: _Chunk, begin: int, ends: list[int], stops: deque[tuple[int, float]]) -> int:
+    """Take in usable samples from ``begin`` to the last of the ``ends``, which are pieces', all transformed at once.
+
+    What is renewed between them sees the transform as it was by then. Where that changes it, for all is learned anew,
+    the rest is left for another time: returns up to where samples are taken in.
+    """
+    state, running, part = results.state, results.state.transform, slice(begin, ends[-1])
+    places = sorted([*(count for count, _ in stops if count <= ends[-1]), *ends])
     moved = chunk.begins[part], chunk.time[part], chunk.areas[part], chunk.slants[part]
-    lines = transform.add_many(state.transform, *moved, [count - begin for count, _ in wanted])
-    results.want(lines, [float(chunk.time[count - 1]) for count, _ in wanted], [now for _, now in wanted])
-    state.step = float(chunk.time[stop - 1] - chunk.begins[stop - 1])
-    state.samples += stop - begin
-    state.recent.extend(chunk.values[begin:stop])
+    lines = transform.add_many(running, *moved, [place - begin for place in places])
+    times, rows = chunk.time[np.array(ends) - 1].tolist(), [bisect_right(places, end) - 1 for end in ends]
+    for piece, (first, stop) in enumerate(pairwise([begin, *ends])):
+        wanted, row = _popped(stops, stop), rows[piece]
+        moments = [float(chunk.time[count - 1]) for count, _ in wanted]
+        results.want(lines[row - len(wanted) : row], moments, [now for _, now in wanted])
+        _count(state, chunk, slice(first, stop))
+        if stop < ends[-1]:
+            state.transform = transform.as_it_was(running, times[piece], lines[row])
+            look_ahead(state, times[piece:-1], [lines[k] for k in rows[piece:-1]])
+            was = state.transform.done
+            results.renew()
+            if state.transform.done is not was:
+                return stop
+    state.transform = running
+    return ends[-1]
+
+
+def _count(state: State, chunk: _Chunk, part: slice) -> None:
+    """What ``update`` counts of each of some consecutive samples."""
+    state.step = float(chunk.time[part.stop - 1] - chunk.begins[part.stop - 1])
+    state.samples += part.stop - part.start
+    state.recent.append(chunk.values[part])
     # one after the other, as ``update`` adds them
-    state.intervals = float(np.cumsum(np.append(state.intervals, chunk.intervals[begin:stop]))[-1])
-    return stop
+    state.intervals = float(np.cumsum(np.append(state.intervals, chunk.intervals[part]))[-1])

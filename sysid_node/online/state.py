@@ -102,7 +102,7 @@ class State:
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
-    recent: list[Array] = field(default_factory=list)  # (T,) signals of the samples since ``weighed_until``
+    recent: list[Array] = field(default_factory=list)  # (n, T) signals of the samples since ``weighed_until``
     weighed_until: float = math.nan  # time up to which ``uneven`` counts
     uneven: Unevenness = field(default_factory=Unevenness)  # of the present segment
     renew_at: float = math.inf

@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,6 +116,7 @@ def exact(grid: Lines, begin: float, end: float) -> Array:
     return found
 
 
+_PLACES = np.arange(BLOCK)
 #: The moments of such an interval are the area and the slant themselves.
 _ITSELF = np.eye(2, MOMENTS)
 #: Ratios of x^k / k to x^(k-1) / (k-1), over x.
@@ -270,11 +271,12 @@ def _blocks(state: Transform, begins: Array, ends: Array, areas: Array, slants: 
     starts, stops = _cut(state.begin, held, grid.span, begins.tolist(), ends.tolist())
     begin, firsts = np.array(starts), np.array([0, *stops[:-1]])
     which = np.repeat(np.arange(begin.size), np.diff(stops, prepend=0))
-    slot = np.arange(ends.size) - firsts[which] + np.where(which, 0, held)
-    kernels, waves = np.zeros((begin.size, BLOCK, 2, MOMENTS)), basis(grid, begin)
-    values = np.zeros((begin.size, *state.values.shape))
-    values[which, slot, 0, : state.width], values[which, slot, 1, : state.width] = areas, slants
-    kernels[which, slot] = _weighed(state, begin[which], firsts[1:], begins, ends)
+    weighed, waves = _weighed(state, begin[which], firsts[1:], begins, ends), basis(grid, begin)
+    kernels, values = np.zeros((begin.size, BLOCK, 2, MOMENTS)), np.zeros((begin.size, *state.values.shape))
+    for i, (first, stop) in enumerate(zip(firsts.tolist(), stops, strict=True)):
+        given, place = slice(first, stop), slice(0 if i else held, stop - first + (0 if i else held))
+        kernels[i, place] = weighed[given]
+        values[i, place, 0, : state.width], values[i, place, 1, : state.width] = areas[given], slants[given]
     kernels[0, :held], values[0, :held], waves[0] = state.kernels[:held], state.values[:held], state.waves
     for i in np.flatnonzero(ends > begin[which] + grid.span).tolist():
         waves[which[i]] = exact(grid, float(begins[i]), float(ends[i]))
@@ -301,8 +303,8 @@ def _weighed(state: Transform, origin: Array, firsts: NDArray[np.intp], begins: 
 def _sum_up(state: Transform, blocks: _Blocks, ends: Array, stops: Sequence[int], found: Array) -> None:
     """Finish all blocks but the last, which is under way then; ``found`` (K, R, width + room): what is at the stops."""
     fades, first, told = math.isfinite(state.memory), -state.count, 0
-    sums = _in_rows(blocks.kernels).swapaxes(-1, -2) @ _in_rows(blocks.values)
-    parts = blocks.waves.swapaxes(-1, -2) @ sums
+    parts = _summed(blocks.waves, blocks.kernels, blocks.values)
+    _sum_to(blocks, first, stops, found)
     for i, end in enumerate(blocks.ends):
         if i:
             begin, first = float(blocks.begins[i]), blocks.ends[i - 1]
@@ -311,14 +313,26 @@ def _sum_up(state: Transform, blocks: _Blocks, ends: Array, stops: Sequence[int]
                 state.done *= _growth(state.memory, state.begin - begin)
             state.begin = begin
         while told < len(stops) and stops[told] <= end:
-            kernels = blocks.kernels[i].copy()
-            kernels[stops[told] - first :] = 0.0
-            found[told] = _total(state.done, blocks.waves[i], kernels, blocks.values[i])
+            found[told] += state.done
             if fades:
                 found[told] *= _growth(state.memory, state.begin - float(ends[stops[told] - 1]))
             told += 1
     state.kernels, state.values = blocks.kernels[-1].copy(), blocks.values[-1].copy()
     state.waves, state.count, state.last = blocks.waves[-1].copy(), blocks.ends[-1] - first, float(ends[-1])
+
+
+def _sum_to(blocks: _Blocks, first: int, stops: Sequence[int], found: Array) -> None:
+    """Into ``found`` what the blocks of the stops bring up to there; the first block begins with interval ``first``."""
+    which = np.searchsorted(blocks.ends, stops)
+    count = np.array(stops, np.intp) - np.array([first, *blocks.ends[:-1]])[which]
+    kernels = blocks.kernels[which] * (count[:, None] > _PLACES)[:, :, None, None]
+    _summed(blocks.waves[which], kernels, blocks.values[which], found)
+
+
+def _summed(waves: Array, kernels: Array, values: Array, out: Array | None = None) -> Array:
+    """(n, R, width + room) what n blocks bring, see ``Transform``."""
+    sums = _in_rows(kernels).swapaxes(-1, -2) @ _in_rows(values)
+    return np.asarray(np.matmul(waves.swapaxes(-1, -2), sums, out=out))
 
 
 def _in_rows(blocks: Array) -> Array:
@@ -328,13 +342,18 @@ def _in_rows(blocks: Array) -> Array:
 
 def restart(state: Transform, time: float) -> None:
     """Forget all; the transform goes on at ``time`` (s)."""
-    state.done[:], state.count, state.last = 0.0, 0, time
+    state.done, state.count, state.last = np.zeros_like(state.done), 0, time
+
+
+def as_it_was(state: Transform, time: float, lines: Array) -> Transform:
+    """The transform of an earlier ``time`` (s) as ``current`` told it then: good for all but adding to it."""
+    return replace(state, done=lines, count=0, begin=time, last=time)
 
 
 def take_out(state: Transform, part: Array) -> None:
     """Forget a ``part`` (R, width) of the transform up to the last sample, such as all up to some time ago."""
-    growth = _growth(state.memory, state.last - state.begin) if math.isfinite(state.memory) else 1.0
-    state.done -= growth * part
+    state.done = current(state) - part
+    state.begin, state.count = state.last, 0
 
 
 def current(state: Transform) -> Array:
