@@ -68,11 +68,11 @@ def reading(path: Path) -> Iterator[None]:
 
 def _not_found(path: Path) -> str:
     if not path.exists():
-        return f"{path} does not exist"
+        return f"does not exist in {path.resolve().parent}; give a rosbag2 folder, .mcap or .db3 file"
     files = sorted(file.name for file in path.iterdir() if file.suffix in {".mcap", ".db3"})
     if files:
         return f"no metadata.yaml (a recording that was cut short?); run: ros2 bag reindex {path}, or give {files[0]}"
-    return f"{path} is no bag: neither metadata.yaml nor an .mcap or .db3 file in it"
+    return f"no bag: neither metadata.yaml nor an .mcap or .db3 file in {path}"
 
 
 def _remedy(path: Path) -> str:

@@ -23,7 +23,7 @@ from sysid_node.online.state import State
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
-CHUNK = 1024  # samples whose signals are made at once
+CHUNK = 512  # samples whose signals are made at once
 AT_ONCE = 48  # moments that are solved for at once: what they need stays in the processor's caches
 
 

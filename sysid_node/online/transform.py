@@ -346,8 +346,9 @@ def restart(state: Transform, time: float) -> None:
 
 
 def as_it_was(state: Transform, time: float, lines: Array) -> Transform:
-    """The transform of an earlier ``time`` (s) as ``current`` told it then: good for all but adding to it."""
-    return replace(state, done=lines, count=0, begin=time, last=time)
+    """The transform of an earlier ``time`` (s), as ``current`` told it then."""
+    kernels, values = np.zeros_like(state.kernels), np.zeros_like(state.values)
+    return replace(state, done=lines, kernels=kernels, values=values, count=0, begin=time, last=time)
 
 
 def take_out(state: Transform, part: Array) -> None:

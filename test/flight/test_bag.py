@@ -128,8 +128,9 @@ def test_joints_that_come_and_go(tmp_path, streams):
 
 
 def test_missing_bag(tmp_path):
-    assert "does not exist" in error_of(tmp_path / "none")
-    assert "does not exist" in error_of(tmp_path / "none.mcap")
+    for name in ("none", "none.mcap"):
+        expected = f"bag {name}: does not exist in {tmp_path}; give a rosbag2 folder, .mcap or .db3 file"
+        assert error_of(tmp_path / name) == expected
 
 
 def test_folder_without_a_bag(tmp_path):

@@ -208,6 +208,26 @@ def test_what_is_taken_out_leaves_what_came_after(memory: float, cut: int) -> No
 
 
 @pytest.mark.parametrize("memory", [math.inf, 2.0])
+def test_the_transform_as_it_was_can_be_forgotten_without_touching_what_goes_on(memory: float) -> None:
+    """What is taken out of it, and that it begins anew, is its own; samples that follow give the same bits."""
+    time = irregular(2 * BLOCK + 5)
+    signals = np.random.default_rng(10).normal(size=(time.size, 3))
+    cut = BLOCK + 3
+    running, there = fed(GRID, time, signals, memory), fed(GRID, time[: cut + 1], signals[: cut + 1], memory)
+    earlier, expected = transform.current(there), transform.current(running).tobytes()
+    past = transform.as_it_was(running, float(time[cut]), earlier.copy())
+    assert transform.current(past).tobytes() == earlier.tobytes()
+    areas, slants = parts(time[cut : cut + 2], signals[cut : cut + 2])
+    for state in (past, there):
+        transform.take_out(state, 0.3 * earlier)
+    assert transform.current(past).tobytes() == transform.current(there).tobytes()
+    assert transform.current(running).tobytes() == expected
+    for state in (past, there):
+        transform.add(state, float(time[cut]), float(time[cut + 1]), areas[0], slants[0])
+    assert transform.current(past).tobytes() == transform.current(there).tobytes()
+
+
+@pytest.mark.parametrize("memory", [math.inf, 2.0])
 def test_after_a_restart_nothing_is_left_of_what_was_before(memory: float) -> None:
     time = irregular(3 * BLOCK)
     signals = np.random.default_rng(9).normal(size=(time.size, 3))

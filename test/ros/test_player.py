@@ -84,7 +84,7 @@ def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Pat
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["nowhere"], "bag nowhere: nowhere does not exist"),
+        (["nowhere"], "bag nowhere: does not exist in "),
         (["--rate", "0", "nowhere"], "expected a number over zero"),
     ],
 )
