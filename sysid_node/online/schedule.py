@@ -63,11 +63,11 @@ def due_times(time: Array, wait: Array, rate: float) -> Array:
     """Those of the samples' times (N,) s, increasing, at which ``due`` says so."""
     intervals = np.diff(time, prepend=time[:1])
     reach = time + 0.5 * np.minimum(intervals, 1.0 / rate)
-    rows = list(zip(reach.tolist(), wait.tolist(), _fresh(wait, intervals).tolist(), strict=True))
+    reaches, waits, fresh = reach.tolist(), wait.tolist(), _fresh(wait, intervals).tolist()
     crest = np.maximum.accumulate(reach).tolist()
     schedule, places, at = Schedule(rate), [], 0
-    while (at := bisect_left(crest, schedule.next / rate, at)) < len(rows):
-        if schedule.advance(*rows[at]):
+    while (at := bisect_left(crest, schedule.next / rate, at)) < len(crest):
+        if schedule.advance(reaches[at], waits[at], fresh[at]):
             places.append(at)
         at += 1
     return time[places]

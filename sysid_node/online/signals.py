@@ -102,13 +102,18 @@ def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
 
 
 def array_signals(aircraft: Aircraft) -> ArraySignals:
-    """As ``scalar_signals`` for columns (N,). Functions come from the scalar library, for equal bits."""
+    """As ``scalar_signals`` for columns (N,).
+
+    Functions come from the scalar library, for equal bits; but roots, which IEEE 754 rounds alike everywhere.
+    """
 
     def mapped(function: Callable[..., float]) -> Callable[..., Array]:
         return lambda *xs: np.fromiter(map(function, *(x.tolist() for x in xs)), np.float64, xs[0].size)
 
-    functions = {name: mapped(getattr(math, name)) for name in ("cos", "sin", "sqrt", "atan2")}
-    return cast(ArraySignals, _signals(aircraft, SimpleNamespace(**functions), np.ones_like, np.zeros_like))
+    functions = {name: mapped(getattr(math, name)) for name in ("cos", "sin", "atan2")}
+    return cast(
+        ArraySignals, _signals(aircraft, SimpleNamespace(**functions, sqrt=np.sqrt), np.ones_like, np.zeros_like)
+    )
 
 
 def _signals(aircraft: Aircraft, functions: Any, one: Any, none: Any) -> Any:
