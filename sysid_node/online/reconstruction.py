@@ -50,6 +50,7 @@ _FLOW, _ATTITUDE, _BIAS = 0.05, 0.1, 0.01
 _TOLERANCE = 0.2  # share of a derivative that it may be off by where the file does not say
 _SLOW = 0.6  # rad/s under which gusts and motion are not in the band
 _MEMORY = 60.0  # s over which their energies are counted
+_WILDEST, _FASTEST, _THINNEST = 1e6, 1e4, 1e-6  # m/s^2 and rad/s, m/s, kg/m^3 of no flight: no readings
 _STEEPEST = 1.4  # rad of pitch or flow angle beyond which the filter is lost and begins anew
 
 
@@ -266,8 +267,9 @@ def _angles(
     V = sample[6]
     if not (
         math.isfinite(time + sum(sample[:7]) + sample[AIR_INTERVAL] + sum(sample[_CONTROLS:]))
-        and V > 0.5
-        and sample[9] > 0.0
+        and max(map(abs, sample[:6])) < _WILDEST
+        and 0.5 < V < _FASTEST
+        and sample[9] > _THINNEST
     ):
         return math.nan, math.nan
     step = time - filter_.time

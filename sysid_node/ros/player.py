@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.utilities import remove_ros_args
@@ -23,6 +24,7 @@ from sysid_node.ros.conversion import NANOSECONDS, stamp_message
 from sysid_node.ros.spin import run_program
 
 CLOCK_PERIOD = NANOSECONDS // 100
+ACKNOWLEDGED = Duration(seconds=5)  # longest wait for listeners that have yet to take the last messages
 SETTLE = 0.3  # s from the moment when a listener is found until it surely hears
 
 
@@ -74,6 +76,9 @@ class Player(Node):
                 publisher, headed = self._topics[topic]
                 publisher.publish(shift_stamp(raw, shift) if headed and shift else raw)
                 count += 1
+        if rclpy.ok():  # what is still on its way would end with this process
+            for publisher, _ in self._topics.values():
+                publisher.wait_for_all_acked(ACKNOWLEDGED)
         return count
 
     def _deaf(self) -> list[str]:

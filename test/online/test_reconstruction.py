@@ -126,6 +126,17 @@ def test_a_record_at_once_equals_its_samples_one_by_one(columns: tuple[int, ...]
     assert repr(estimate(state, time[-1])) == repr(whole)
 
 
+@pytest.mark.parametrize(("column", "reading"), [(9, 5e-324), (9, 0.0), (6, 1e200), (0, 1e200), (3, -1e200)])
+def test_readings_of_no_flight_are_none(column: int, reading: float) -> None:
+    time, samples = flown()
+    samples = without(samples)
+    for place in (0, 700):
+        samples[place, column] = reading
+    made = completed(AIRCRAFT, time, samples)[:, ANGLES]
+    assert np.isnan(made[[0, 700]]).all()
+    assert np.isfinite(np.delete(made, [0, 700], axis=0)).all()
+
+
 def test_a_file_without_a_lift_slope_cannot_make_angles() -> None:
     known = {name: d for name, d in AIRCRAFT.derivatives.items() if name != "CL_alpha"}
     found = identify(without(flown()[1]), replace(AIRCRAFT, derivatives=known)).derivatives
