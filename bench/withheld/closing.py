@@ -35,6 +35,13 @@ Array = NDArray[np.float64]
 #: Windows, their means left out, in which responses are compared: drift from trim to trim is no dynamics.
 WINDOW_S = 4.0
 
+#: Times by which a response is later than commands, or stamps of commands make it seem earlier.
+_LATE = (
+    ("command_delay", "delay", -1.0),
+    ("actuator_lag", "time_constant", -1.0),
+    ("actuator_stamp_delay", "delay", 1.0),
+)
+
 _READ = (0, 1, 2, 3, 4, 5, 9, 10, 11)  # IMU and air data, without the attitude
 
 
@@ -56,15 +63,28 @@ def _errors(label: Mapping[str, Any], which: str, case: Path) -> dict[str, float
     fields = {k: v for k, v in label.items() if k in Case.__dataclass_fields__}
     plant = Plant(Case(**fields), which)
     truth = _flown(plant, plant.truth, label["effects"])
-    effects = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
+    found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
+    effects = beside_servos(found, label["servo_lag"])
     try:
         corrected = load_aircraft(str(case / "out" / "corrected.yaml"))
         before = _flown(plant, load_aircraft(str(case / "aircraft.yaml")), {})
-        after, best = (_flown(plant, corrected, found) for found in (effects, label["effects"]))
+        after, best = (_flown(plant, corrected, one) for one in (effects, label["effects"]))
     except DivergedError:
         return {}
     flights = {"before": before, "after": after, "true_effect": best}
     return {name: _apart(flight, truth) for name, flight in flights.items()}
+
+
+def beside_servos(effects: Effects, servo_lag: float) -> Effects:
+    """Effects found, as a plant flies them whose servos are ``servo_lag`` (s) late of themselves.
+
+    Nothing that is handed over knows of the servos, so that a time that is found holds theirs, and would count twice.
+    """
+    for name, key, sign in _LATE:
+        if name in effects:
+            late = max(effects[name][key] + sign * servo_lag, 0.0)
+            return {**effects, name: {**effects[name], key: late}}
+    return effects
 
 
 def _beside_record(label: Mapping[str, Any], case: Path) -> dict[str, float]:

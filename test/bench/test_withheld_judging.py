@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from withheld.closing import beside_servos
 from withheld.drawing import LISTED, SETS, draw
 from withheld.judging import judge
 from withheld.scoreboard import calibration, interval, page
@@ -136,3 +137,14 @@ def test_the_stated_interval_covers_what_further_flights_show() -> None:
     assert replace(case, further=further).covers is True
     assert replace(case, further={**further, "shrink_percent": 88.0}).covers is False
     assert replace(case, further={**further, "noise_floor": 0.49}).covers is None  # next to no gap
+
+
+def test_times_found_hold_the_servos_own() -> None:
+    """Which the plant's have by themselves: once, whichever of the times is found."""
+    lag = {"actuator_lag": {"time_constant": 0.108}}
+    assert beside_servos(lag, 0.008) == {"actuator_lag": {"time_constant": pytest.approx(0.1)}}
+    both = {**lag, "command_delay": {"delay": 0.005}}
+    assert beside_servos(both, 0.008) == {**lag, "command_delay": {"delay": 0.0}}
+    early = {"actuator_stamp_delay": {"delay": 0.05}, "imu_bias": {"ax": 0.1}}
+    assert beside_servos(early, 0.008) == {**early, "actuator_stamp_delay": {"delay": pytest.approx(0.058)}}
+    assert beside_servos({"imu_bias": {"ax": 0.1}}, 0.008) == {"imu_bias": {"ax": 0.1}}
