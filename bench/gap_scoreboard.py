@@ -49,8 +49,13 @@ def main() -> None:
         if not args.judge and not _over(args.until):
             _finish(args.set, seed, folder, fly_only=args.fly)
         judged += list(_judged(args.set, folder, seed))
-        failed += [path.read_text(encoding="utf-8").strip() for path in (folder / str(seed)).glob("failed.txt")]
+        failed += [said for said in _failed(folder / str(seed)) if not said.startswith("diagnosis")]
     publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged, failed), args.page)
+
+
+def _failed(case: Path) -> list[str]:
+    """What ended a case before it was diagnosed, if anything did."""
+    return [path.read_text(encoding="utf-8").strip() for path in case.glob("failed.txt")]
 
 
 def _over(until: str | None) -> bool:
@@ -98,11 +103,13 @@ def _run(words: list[str], folder: Path, seed: int, what: str) -> int:
 
 
 def _judged(which: str, folder: Path, seed: int) -> Iterator[judging.Judged]:
-    """The case as it was judged, where it was diagnosed."""
+    """The case as it was judged, where it was diagnosed or the diagnosis failed."""
     found, label = folder / str(seed) / "out" / "gap.json", folder / "labels" / f"{seed}.json"
-    if found.exists() and label.exists():
+    ended = any(said.startswith("diagnosis") for said in _failed(folder / str(seed)))
+    if (found.exists() or ended) and label.exists():
         truth = json.loads(label.read_text(encoding="utf-8"))
-        judged = judging.judge(truth, json.loads(found.read_text(encoding="utf-8")))
+        said = judging.FAILURE if ended else json.loads(found.read_text(encoding="utf-8"))
+        judged = judging.judge(truth, said)
         named = judged.right and judged.kind in ("one", "two")
         flown = closed(truth, which, folder / str(seed)) if named else None
         kept = folder / str(seed) / "covered.json"

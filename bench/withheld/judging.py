@@ -15,6 +15,14 @@ BLAMED = 0.9
 #: Most effects that a set named together may hold.
 TOGETHER = 3
 
+#: Verdict of a diagnosis that ended in an error or a refusal: wrong, whatever is there.
+FAILED = "failed"
+FAILURE = {
+    "verdict": FAILED,
+    "causes": [],
+    "gap": dict.fromkeys(("shrink_percent", "before", "after", "noise_floor"), 0.0),
+}
+
 _WITHIN, _ONSET = 0.15, 2.0  # share by which a parameter may be off; seconds of an onset
 
 #: Parameters that only shape an effect, or that the drawn value does not determine.
@@ -136,6 +144,8 @@ def _right(
     Of the foreign plant with nothing added: whether nothing is blamed but what it has.
     """
     truth = set(label["effects"])
+    if verdict == FAILED:
+        return False, False if len(truth) > 1 else None
     if label["kind"] == "none":
         return (verdict != "unsupported" and all(inherent) if label["plant"] == FOREIGN else verdict == "no_gap"), None
     if label["kind"] == "unlisted":

@@ -24,7 +24,7 @@ def interval(right: int, of: int) -> tuple[float, float]:
 
 
 def page(cases: Sequence[Judged], failed: Sequence[str] = ()) -> str:
-    """The section of the documentation: cases that were judged, and what was said of those that failed."""
+    """The section of the documentation: cases that were judged, and why others could not be."""
     if not cases:
         return "No case was diagnosed."
     own = [c for c in cases if c.label["plant"] != FOREIGN]
@@ -40,7 +40,7 @@ def page(cases: Sequence[Judged], failed: Sequence[str] = ()) -> str:
         table(("effect", "plant", "cases", "right", "else"), _confusion(cases)),
     ]
     if failed:
-        parts.append(f"Not judged: {len(failed)} ({'; '.join(failed)}).")
+        parts.append(f"Not flown: {'; '.join(failed)}.")
     return "\n\n".join(parts)
 
 

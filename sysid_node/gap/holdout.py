@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from sysid_node.gap import close
 from sysid_node.gap.attribute import Attribution
 from sysid_node.gap.close import Gap
@@ -56,6 +58,20 @@ def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisan
     return Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))
 
 
+def _checked(
+    attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]
+) -> tuple[Attribution, Check]:
+    """An explanation and what flight not fitted says of it; without causes of which no numbers come there.
+
+    A mode that feeds itself may do so on flight not fitted only (see ``trials.upon``).
+    """
+    try:
+        return attribution, check(attribution, unseen, own)
+    except np.linalg.LinAlgError:
+        bare = attribution.without_causes()
+        return bare, check(bare, unseen, own)
+
+
 def settled(
     attribution: Attribution, views: Sequence[View], unseen: Sequence[View], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
@@ -66,7 +82,7 @@ def settled(
     worse than the file leave the file as it is. (In gusts derivatives that these have biased seem the better by
     frequency.)
     """
-    checked = check(attribution, unseen, own)
+    attribution, checked = _checked(attribution, unseen, own)
     if foreseen([*views, *unseen]):
         attribution = attribution.without_causes().as_filed()
         return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)

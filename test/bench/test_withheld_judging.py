@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from withheld.closing import beside_servos
 from withheld.drawing import LISTED, SETS, draw
-from withheld.judging import judge
+from withheld.judging import FAILURE, judge
 from withheld.scoreboard import calibration, interval, page
 
 from sysid_node.sim import EFFECTS
@@ -148,3 +148,11 @@ def test_times_found_hold_the_servos_own() -> None:
     early = {"actuator_stamp_delay": {"delay": 0.05}, "imu_bias": {"ax": 0.1}}
     assert beside_servos(early, 0.008) == {**early, "actuator_stamp_delay": {"delay": pytest.approx(0.058)}}
     assert beside_servos({"imu_bias": {"ax": 0.1}}, 0.008) == {"imu_bias": {"ax": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("kind", "plant"), [("none", "cdrw"), ("none", "c172p"), ("one", "cdrw"), ("unlisted", "cdrw")]
+)
+def test_a_diagnosis_that_ends_in_an_error_is_wrong(kind: str, plant: str) -> None:
+    effects = {} if kind == "none" else {"imu_bias": {"ax": 0.1}}
+    assert not judge(_label(kind, effects, plant), FAILURE).right

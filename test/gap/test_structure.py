@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.structure import Structure
+from sysid_node.gap.structure import Structure, _root
 
 DIRECTIONS, ROWS = 37, 400
 
@@ -31,3 +31,11 @@ def test_structure_in_strong_noise_is_still_seen() -> None:
     random = np.random.default_rng(5)
     found = np.array([measured(random, 1.8, structure=4.0).deviations[0] for _ in range(200)])
     assert np.median(found) > 4.5
+
+
+def test_information_that_rounding_makes_singular_has_a_factor() -> None:
+    alike = np.array([[1.0, 1.0], [1.0, 1.0 - 1e-15]])
+    root = _root(alike)
+    np.testing.assert_allclose(root.T @ root, alike, atol=1e-9)
+    clear = np.array([[1.0, 0.5], [0.5, 1.0]])
+    np.testing.assert_array_equal(_root(clear), np.linalg.cholesky(clear).T)
