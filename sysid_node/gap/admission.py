@@ -16,7 +16,7 @@ _TRAVEL = 0.004
 
 #: Ratio of measured to expected mean lift beyond which a flight is another aircraft's, unless a vane that is off by so
 #: much (rad) would account for it.
-_LIFT, _VANE = 2.5, 0.06
+_LIFT, _VANE = 2.5, 0.1
 
 
 def require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
