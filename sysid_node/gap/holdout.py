@@ -58,9 +58,7 @@ def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisan
     return Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))
 
 
-def _checked(
-    attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]
-) -> tuple[Attribution, Check]:
+def _checked(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
     """An explanation and what flight not fitted says of it; without causes of which no numbers come there.
 
     A mode that feeds itself may do so on flight not fitted only (see ``trials.upon``).
