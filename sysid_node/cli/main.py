@@ -47,12 +47,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = next((word for word in arguments if not word.startswith("-")), "")
     debug = "--debug" in arguments
     try:
+        _one_thread_for_linear_algebra()  # before the command's own module brings NumPy
         parser = build_parser(command)
         args = parser.parse_args(arguments)
         if not args.command:
             parser.print_help()
             return BAD_INPUT
-        _one_thread_for_linear_algebra()
         import_module(f"sysid_node.cli.{command}").run(args)
     except KeyboardInterrupt:
         return _say(command, "interrupted", INTERRUPTED)
