@@ -87,7 +87,7 @@ def build_parser(command: str) -> Parser:
 def _one_thread_for_linear_algebra() -> None:
     """Unless the environment says otherwise; before NumPy is imported.
 
-    Matrices are small and commands have threads of their own: with BLAS's beside them ``sysid gap`` took 32 s for 26.
+    Matrices are small and commands have threads of their own: with BLAS's beside them ``sysid gap`` took 34 s for 29.
     """
     if "OMP_NUM_THREADS" not in os.environ:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -131,3 +131,20 @@ def test_linear_algebra_has_one_thread_unless_told_otherwise(monkeypatch, capsys
         monkeypatch.setenv(name, value)
     assert main(["convert", "nowhere.csv", "--aircraft", "cdrw", "--out", "nowhere"]) == 2
     assert os.environ.get("OPENBLAS_NUM_THREADS") == expected
+
+
+def test_linear_algebra_is_told_so_before_it_is_there() -> None:
+    """The library reads the variable once, when NumPy is imported: by whichever module comes first."""
+    program = """
+import os, sys
+class Watch:
+    def find_spec(self, name, path=None, target=None):
+        if name == "numpy":
+            print("at numpy", os.environ.get("OPENBLAS_NUM_THREADS"))
+sys.meta_path.insert(0, Watch())
+from sysid_node.cli.main import main
+main(["gap", "nowhere", "--aircraft", "cdrw"])
+"""
+    kept = {k: v for k, v in os.environ.items() if k not in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", program], env=kept, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[0] == "at numpy 1"
