@@ -148,7 +148,7 @@ def _spread(
 ) -> list[_Result]:
     """The work on each, in their order; on as many threads as there are processors, which XLA and LAPACK leave free."""
     done = []
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:
         for result in pool.map(work, over):
             done.append(result)
             progress(len(done) / len(over))
