@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
 _NUISANCES = slice(OFFSET, OFFSET + 3)
 BANDS = 6
+#: Share of the drift's energy that is not the constant's, under which it brings nothing.
+INDEPENDENT = 1e-12
 
 
 @dataclass
@@ -106,10 +108,13 @@ def about_mean(transform: Array, model: Auxiliary | None) -> Array:
     The lines are made where the transforms lie, which must be in one piece. Nuisances are kept. The airspeed's noise is
     in k: fitting the offset to the lines of k would regress on noise.
     """
-    for one in transform.reshape(-1, *transform.shape[-2:]):
-        share = one[-1] / max(one[-1, OFFSET], 1e-12)
+    if transform.ndim > 2:
+        for one in transform:
+            about_mean(one, None)
+    else:
+        share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
         share[_NUISANCES] = 0.0
-        dger(-1.0, share, one[:, OFFSET], a=one.T, overwrite_a=True)  # z - k share
+        dger(-1.0, share, transform[:, OFFSET], a=transform.T, overwrite_a=True)  # z - k share
     lines = transform[..., :-1, :]
     if model is not None:
         fill_in(model, lines)
@@ -130,7 +135,7 @@ def inverse2(gram: Array) -> Array:
     rows = []
     for a, b, _, d in gram.reshape(-1, 4).tolist():
         det = a * d - b * b
-        if det > 1e-12 * a * d:
+        if det > INDEPENDENT * a * d:
             rows.append((d / det, -b / det, -b / det, a / det))
         else:
             rows.append((1.0 / a if a > 0.0 else 0.0, 0.0, 0.0, 0.0))
@@ -171,10 +176,15 @@ def products(transform: Array, model: Auxiliary | None) -> Array:
 
     The transforms are used up.
     """
+    if transform.ndim > 2:
+        return np.array([products(one, model) for one in transform])
     lines = about_mean(transform, model)
-    gram: Array = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
-    border = gram[..., _N]
-    gram -= border @ inverse2(border[..., _N, :]) @ border.swapaxes(-1, -2)
+    gram: Array = lines.T.dot(lines)
+    nuisances = range(_N.start, _N.stop)
+    for n, energy in zip(nuisances, gram.diagonal()[_N].tolist(), strict=True):
+        row, left = gram[n].copy(), float(gram[n, n])
+        if left > INDEPENDENT * energy:
+            dger(-1.0 / left, row, row, a=gram.T, overwrite_a=True)
     return gram
 
 

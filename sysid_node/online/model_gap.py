@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import regression
-from sysid_node.online.present import Present
+from sysid_node.online.present import Present, growth_since, slope_variances
 from sysid_node.online.state import State
 
 Array = NDArray[np.float64]
@@ -38,7 +38,9 @@ def model_gap(state: State, current: Present | None) -> list[CoefficientGap]:
     energy = np.maximum(((gram @ v) * v).sum(axis=0), 0.0)
     motion = current.solution.motion
     relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))
-    spread = np.sqrt(np.maximum(current.slopes, 0.0) + _tolerances(precisions))
+    growth = growth_since(renewed, current.time)
+    variances = slope_variances(renewed, current.solution.residual, current.diagonal, growth)
+    spread = np.sqrt(np.maximum(variances.T, 0.0) + _tolerances(precisions))
     deviations = np.where(plan.mine > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()
     names = [f"{c}_{plan.regressors[i]}" for c, i in zip(plan.coefficients, worst, strict=True)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sysid_node.online import regression, transform
 from sysid_node.online.information import products
 from sysid_node.online.prior import weighed
-from sysid_node.online.regression import Plan, Solution
+from sysid_node.online.regression import Plan, Solution, product
 from sysid_node.online.signals import OFFSET
 from sysid_node.online.state import Renewed, State
 
@@ -23,13 +23,12 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Present:
-    """What is solved for: D derivatives, P unknowns, C coefficients, W signals."""
+    """What is solved for: D derivatives, P unknowns, W signals."""
 
     time: Any  # (...) s, of the last sample
     values: Array  # (..., D)
     variances: Array  # (..., D) squared standard errors
     solution: Solution
-    slopes: Array  # (..., P, C) squared standard errors of the solution, before beliefs are counted in
     gram: Array  # (..., W, W)
     diagonal: Array  # (..., P) size of the inverse's diagonal
 
@@ -50,43 +49,58 @@ def present_at(state: State, lines: Array, time: Any) -> Present | None:
     integrals = renewed.integrals + lines[..., -1, :]
     gram = products(lines, state.model.auxiliary)
     gram += renewed.base
-    # since the last renewal the noise's part has grown, and the variances shrunk, with the time counted
-    energy, noise = renewed.total.energy, renewed.compensation
-    growth = (energy + (time - renewed.time)) / max(energy, 1e-9)
+    growth, noise = growth_since(renewed, time), renewed.compensation
     if lines.ndim > 2:
         growth = growth[:, None, None]
     solution = regression.solve(plan, gram, None if noise is None else noise * growth)
     diagonal = np.abs(solution.inverse.diagonal(axis1=-2, axis2=-1))
-    slopes = renewed.factors * solution.residual[..., None, :]
-    slopes *= diagonal[..., :, None] / growth
-    theta, variances = solution.theta, slopes
+    slopes = solution.theta.swapaxes(-1, -2)
     if state.model.settings.use_prior:
-        theta, variances = _with_beliefs(state, renewed, theta)
-    P, C = plan.mine.shape
-    found = np.empty((*theta.shape[:-2], 2, P + 1, C))  # values and variances of slopes, and below them of offsets
-    found[..., 0, :P, :], found[..., 1, :P, :] = theta, variances
-    found[..., 0, P, :], found[..., 1, P, :] = _offsets(plan, renewed, integrals, theta)
-    table = found.reshape(*found.shape[:-2], -1).take(state.model.table.place, axis=-1)
-    return Present(time, table[..., 0, :], np.maximum(table[..., 1, :], 0.0), solution, slopes, gram, diagonal)
+        slopes, variances = _with_beliefs(state, renewed, slopes)
+    else:
+        variances = slope_variances(renewed, solution.residual, diagonal, growth)
+    C, P = slopes.shape[-2:]
+    told = np.empty((*slopes.shape[:-2], 2, C, P + 1))  # values and variances of the slopes and, behind them, offsets
+    told[..., 0, :, :P], told[..., 1, :, :P] = slopes, variances
+    told[..., 0, :, P], told[..., 1, :, P] = _offsets(plan, renewed, integrals, slopes)
+    found = told.reshape(*slopes.shape[:-2], 2, C * (P + 1)).take(state.model.table.place, axis=-1)
+    return Present(time, found[..., 0, :], np.maximum(found[..., 1, :], 0.0), solution, gram, diagonal)
 
 
-def _with_beliefs(state: State, renewed: Renewed, theta: Array) -> tuple[Array, Array]:
-    """(..., P, C) the solutions ``theta`` weighed with the aircraft file's derivatives, and their variances."""
-    values, covariance = weighed(state.plan, theta, renewed.uncertainty.covariance, *state.model.believed)
-    return values, covariance.diagonal(axis1=1, axis2=2).T
+def slope_variances(renewed: Renewed, residual: Array, diagonal: Array, growth: Any) -> Array:
+    """(..., C, P) squared standard errors of the slopes, before beliefs are counted in; ``growth`` (..., 1, 1)."""
+    variances = product(residual[..., None], diagonal[..., None, :] / growth)
+    variances *= renewed.factors
+    return variances
 
 
-def _offsets(plan: Plan, renewed: Renewed, integrals: Array, theta: Array) -> tuple[Array, Array]:
+def growth_since(renewed: Renewed, time: Any) -> Any:
+    """How many times as much time is counted at ``time`` (...) s as at the last renewal.
+
+    So much the noise's part in the equations has grown since, and the variances have shrunk.
+    """
+    energy = renewed.total.energy
+    return (energy + (time - renewed.time)) / max(energy, 1e-9)
+
+
+def _with_beliefs(state: State, renewed: Renewed, slopes: Array) -> tuple[Array, Array]:
+    """(..., C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their variances."""
+    covariance = renewed.uncertainty.covariance
+    values, spread = weighed(state.plan, slopes.swapaxes(-1, -2), covariance, *state.model.believed)
+    return values.swapaxes(-1, -2), spread.diagonal(axis1=1, axis2=2)
+
+
+def _offsets(plan: Plan, renewed: Renewed, integrals: Array, slopes: Array) -> tuple[Array, Array]:
     """(..., C) offsets and their variances, from the ``integrals`` (..., W) of all signals.
 
-    At zero frequency k C_0 = y - sum k C_j x_j, with the slopes ``theta`` (..., P, C).
+    At zero frequency k C_0 = y - sum k C_j x_j, with the ``slopes`` (..., C, P).
     """
     P, C = plan.mine.shape
-    weight = integrals[..., OFFSET, None]
-    means = integrals.take(plan.sides, axis=-1) / weight
-    x = means[..., None, :P]
-    values = means[..., P:] - (x @ theta)[..., 0, :]
-    # x' covariance x as one product of all pairs
-    pairs = (x.swapaxes(-1, -2) * x).reshape(*x.shape[:-1], P * P)
-    spread = (pairs @ renewed.uncertainty.covariance.reshape(C, P * P).T)[..., 0, :]
-    return values, spread + renewed.trim_noise / (weight * weight)
+    weight, sums = integrals[..., OFFSET], integrals.take(plan.sides, axis=-1)
+    if integrals.ndim > 1:
+        weight = weight[:, None]
+    x, y = sums[..., :P, None], sums[..., P:]
+    left = y - product(slopes, x)[..., 0]
+    # x' covariance x
+    spread = product(product(renewed.uncertainty.covariance.reshape(C * P, P), x).reshape(slopes.shape), x)[..., 0]
+    return left / weight, (spread + renewed.trim_noise) / weight / weight

@@ -149,11 +149,18 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     theta = solved[..., P:]
     # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
     row = theta.swapaxes(-1, -2)
-    misfit = row @ normal[..., :P, :]
+    misfit = product(row, normal[..., :P, :])
     misfit -= normal[..., P:, :]
     motion = flat.take(plan.square, axis=-1)
-    residual: Array = np.maximum(motion + np.vecdot(misfit, row), ROUNDING * motion)
+    residual = product(misfit, theta).diagonal(axis1=-2, axis2=-1) + motion
+    np.maximum(residual, ROUNDING * motion, out=residual)
     return Solution(theta, solved[..., :P], residual, motion, usable)
+
+
+def product(left: Array, right: Array) -> Array:
+    """Matrix product, of one moment's or of several's. The same library's, but ``dot`` has half the overhead."""
+    found: Array = left.dot(right) if left.ndim == right.ndim == 2 else left @ right
+    return found
 
 
 def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:

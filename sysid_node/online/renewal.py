@@ -168,8 +168,8 @@ def _solve_all(state: State, segment: Information) -> None:
     if state.flow.active:
         spread.covariance = noise_alone + _doubt(state, solution, total)
     gusts = _gusts(state, total, plan, solution, spread)
-    scale = np.abs(solution.inverse.diagonal())[:, None] * solution.residual
-    variance = exogeneity.inflation(spread, gusts) * spread.covariance.diagonal(axis1=1, axis2=2).T
+    scale = solution.residual[:, None] * np.abs(solution.inverse.diagonal())
+    variance = exogeneity.inflation(spread, gusts)[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
     mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
     none = np.zeros(len(plan.coefficients), dtype=bool)
     timing, timed = _timing(state, solution, spread, gram)

@@ -76,7 +76,7 @@ class Renewed:
     base: Array  # (W, W) Gram matrix of the finished segments
     integrals: Array  # (W,) of the finished segments' signals
     trim_noise: Array  # (C,) squared error of the coefficients' integrals
-    factors: Array  # (P, C) squared standard error over (P_jj residual)
+    factors: Array  # (C, P) squared standard error over (P_jj residual)
     timing: Timing  # whether the controls are felt when they are measured
     hold: Hold  # of the instruments on the regressors
     prudence: Array  # (P, C) see ``prudence``

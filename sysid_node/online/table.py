@@ -20,7 +20,7 @@ class Table:
     coefficient: NDArray[np.intp]  # (D,) index into the plan's coefficients
     unknown: NDArray[np.intp]  # (D,) index into the plan's unknowns; 0 for an offset
     offset: NDArray[np.bool_]  # (D,) whether it is a C_0
-    place: NDArray[np.intp]  # (D,) index among the slopes (P x C) and, behind them, the offsets (C,)
+    place: NDArray[np.intp]  # (D,) index in (C, P + 1): the coefficients' slopes and, behind them, offsets
     allowed: NDArray[np.float64]  # (D,) the largest standard error of a valid estimate
     relative: NDArray[
         np.float64
@@ -54,13 +54,13 @@ def table(aircraft: Aircraft, plan: Plan, valid_fraction: float) -> Table:
         unknowns.append(next((int(i) for i in plan.unknowns(c) if plan.regressors[i] == regressor), 0))
         sizes.append(max(abs(belief.value), 2.0 * (belief.tolerance or 0.0)))
     coefficient, unknown, offset = np.array(coefficients, np.intp), np.array(unknowns, np.intp), np.array(offsets)
-    P, C = plan.mine.shape
+    P = len(plan.regressors)
     return Table(
         names=tuple(names),
         coefficient=coefficient,
         unknown=unknown,
         offset=offset,
-        place=np.where(offset, P * C, unknown * C) + coefficient,
+        place=coefficient * (P + 1) + np.where(offset, P, unknown),
         allowed=valid_fraction * np.array(sizes),
         relative=np.where(np.array(sizes) > 0.0, 0.0, valid_fraction),
         needs_thrust=np.array([name in ("CL_0", "CD_0") for name in names]),

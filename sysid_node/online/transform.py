@@ -123,9 +123,9 @@ _ITSELF = np.eye(2, MOMENTS)
 _RATIOS = np.maximum(np.arange(MOMENTS + 1.0), 1.0) / np.arange(1.0, MOMENTS + 2.0)
 
 
-def primitives(place: Any) -> Array:
+def primitives(place: Any) -> Any:
     """(..., M + 1) x^k / k of places x (..., 1), the integrals of x^(k-1) up to there, k from 1."""
-    return np.asarray(np.multiply.accumulate(place * _RATIOS, axis=-1))
+    return np.multiply.accumulate(place * _RATIOS, axis=-1)
 
 
 _FROM = primitives(-1.0)
@@ -211,7 +211,7 @@ def _growth(memory: float, time: float) -> float:
 
 def _total(done: Array, waves: Array, kernels: Array, values: Array) -> Array:
     """(R, width + room) the finished blocks and the unfinished one's part."""
-    total: Array = waves.T @ (kernels.reshape(-1, MOMENTS).T @ values.reshape(-1, values.shape[-1]))
+    total: Array = waves.T.dot(kernels.reshape(-1, MOMENTS).T.dot(values.reshape(-1, values.shape[-1])))
     total += done
     return total
 
