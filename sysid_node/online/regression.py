@@ -191,7 +191,7 @@ def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
     known = plan.known.copy()
     known[P:] = cross[P:]
     solver = dposv if plan.least_squares else dgesv
-    *_, solved, fault = solver(cross[:P].T, known.T, overwrite_b=True)
+    *_, solved, fault = solver(cross[:P].T, known.T)
     return solved, fault
 
 
