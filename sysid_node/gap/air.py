@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import bounds, prior
+from sysid_node.gap.candidates import prior
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, LONGEST, View, kinematic
 
 #: Shortest memory of the observer of the air, s.
@@ -71,7 +71,7 @@ def instruments_at_best(view: View) -> Array:
 
 
 def _stepped(calm: View, theta: Array) -> Array:
-    """One step of least squares of all that kinematics depend on, within its bounds."""
+    """One step of least squares of all that kinematics depend on; of clocks, they know differences only."""
     simulator = calm.simulator
     own = [i for i in kinematic(simulator.layout) if simulator.parameters[i][1].switch]
     shown = _FORCES + np.flatnonzero(calm.axes[_FORCES:])
@@ -82,7 +82,8 @@ def _stepped(calm: View, theta: Array) -> Array:
     matrix = np.vstack([columns.real, columns.imag, np.diag(1.0 / sigma)])
     right = np.concatenate([rows.real, rows.imag, (centre - theta[own]) / sigma])
     there = theta.copy()
-    there[own] = np.clip(theta[own] + np.linalg.lstsq(matrix, right, rcond=None)[0], *bounds(simulator, own))
+    low, high = np.array([(p.lower, p.upper) for _, p in (simulator.parameters[i] for i in own)]).T
+    there[own] = np.clip(theta[own] + np.linalg.lstsq(matrix, right, rcond=None)[0], low, high)
     return there
 
 

@@ -40,11 +40,21 @@ class Attribution:
     doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
     table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
+    filed: bool = False  # whether derivatives are the file's
 
     def as_filed(self) -> Attribution:
         """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
         neutral = tuple(view.simulator.neutral() for view in self.base.fit.views)
         return replace(self, corrected=linearised(replace(self.base.fit, points=neutral)))
+
+    def beside_the_file(self) -> Attribution:
+        """The causes beside the file's own derivatives: where those that were fitted predict worse."""
+        fit, neutral = self.corrected, self.corrected.views[0].simulator.neutral()
+        own, points = [*fit.indices, *fit.widened], tuple(neutral.copy() for _ in fit.points)
+        for point, found in zip(points, fit.points, strict=True):
+            point[own] = found[own]
+        moved = replace(linearised(replace(fit, points=points)), information=fit.information)
+        return replace(self, corrected=moved, filed=True)
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""

@@ -41,8 +41,9 @@ TIMES = frozenset(
 #: Of these, the ones by which the response comes later than the commands: each is a rival of the others, always.
 BETWEEN = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
 
-#: Of these, stamps that may also be early; early stamps of commands are what a command's delay does.
-_EITHER_WAY = frozenset({"air_data_delay", "imu_delay"})
+#: Of these, stamps: no message is stamped before what it tells of. Early ones would let the three clocks stand for one
+#: another: commands and air data that are late by themselves would be an early IMU and air data less late.
+_STAMPS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
 
 #: Onsets that are tried, as shares of the flight.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
@@ -103,7 +104,7 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     jams = [e == "stuck_surface" and p.switch for e, p in table]
     lower = [_JAMMED if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
     lower = [_STIFFEST if (e, p.name) == _RINGING else low for low, (e, p) in zip(lower, table, strict=True)]
-    lower = [0.0 if e == "actuator_stamp_delay" else low for low, (e, _) in zip(lower, table, strict=True)]
+    lower = [0.0 if e in _STAMPS else low for low, (e, _) in zip(lower, table, strict=True)]
     return np.array(lower), np.array([p.upper for _, p in table])
 
 
@@ -142,8 +143,7 @@ def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterato
         yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
     if effect in TIMES:
         name = "delay" if effect.endswith("delay") else "time_constant"
-        early = (-0.05,) if effect in _EITHER_WAY else ()
-        yield name, (*early, 0.02, 0.07, 0.2)
+        yield name, (0.02, 0.07, 0.2)
     if effect == "structural_mode":
         yield "frequency", (3.5, 5.0, 9.0)
     if effect == "ground_effect":

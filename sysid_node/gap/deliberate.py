@@ -10,10 +10,8 @@ from scipy.signal import lfilter
 from sysid_node.flight.record import Array
 from sysid_node.gap.air import calm_of
 from sysid_node.gap.nuisance import gusty
+from sysid_node.gap.quiet import sudden
 from sysid_node.gap.view import COEFFICIENTS, View
-
-#: A command steps where it changes so many times faster than it usually does.
-_STEP = 8.0
 
 #: Time after which a step is forgotten, s.
 _MEMORY = 3.0
@@ -44,9 +42,8 @@ def deliberate(view: View) -> Given:
     gusts. Where none steps (a multisine), the commands themselves, unless the weather moves them."""
     commands = view.commands
     changes = np.diff(commands, axis=0, prepend=commands[:1])
-    kept = np.where(np.abs(changes) > _STEP * np.median(np.abs(changes), axis=0), changes, 0.0)
     decay = np.exp(-view.simulator.step / _MEMORY)
-    steps = lfilter([1.0], [1.0, -decay], kept, axis=0)
+    steps = lfilter([1.0], [1.0, -decay], sudden(commands), axis=0)
     usual = lfilter([1.0], [1.0, -decay], changes, axis=0)
     stepped = steps.std(axis=0) > _STEPPED * usual.std(axis=0)
     if stepped[:-1].any():

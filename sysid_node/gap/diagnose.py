@@ -20,6 +20,7 @@ from sysid_node.gap.holdout import settled
 from sysid_node.gap.localise import Shape
 from sysid_node.gap.next_flight import advice
 from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.quiet import manoeuvre_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.trials import Progress
 from sysid_node.gap.verdict import verdict_of
@@ -62,12 +63,15 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnoses flights, and measures the gap on flights held out; without these, by parts of the same flights.
 
-    ``keep``: a folder for finished steps, from which an interrupted diagnosis goes on; empty again at the end.
+    One flight alone with one manoeuvre is cut down to it (``quiet``). ``keep``: a folder for finished steps, from which
+    an interrupted diagnosis goes on; empty again at the end.
     Raises InputError: an aircraft file without tolerances or of another aircraft, a held-out flight that is also
     fitted, a flight in which nothing moves.
     """
     require_others(flights, holdouts)
     progress(0.0, "reading the flights as forces and moments")
+    if len(flights) == 1 and not holdouts:
+        flights = [manoeuvre_of(flights[0], aircraft.control_symbols)]
     simulator = Simulator(aircraft, RATE)
     views = [admitted(view_of(simulator, flight)) for flight in flights]
     unseen = [admitted(view_of(simulator, flight)) for flight in holdouts]

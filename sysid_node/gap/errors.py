@@ -13,21 +13,13 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.evidence import groups_of
 from sysid_node.gap.fit import Fit
-from sysid_node.gap.nuisance import gusty
 from sysid_node.gap.sizes import responses
 
 
 def standard_errors(fit: Fit) -> Array:
     """Of all unknowns (unknowns,), of a fit as ``sizes.unbiased`` leaves it."""
-    covariance = fit.covariance
-    alone = responses(fit) if any(gusty(view) for view in fit.views) else _least_squares(fit, covariance)
-    steps = np.array([part[group].sum(axis=0) for view, part in zip(fit.views, alone, strict=True)
+    steps = np.array([part[group].sum(axis=0) for view, part in zip(fit.views, responses(fit), strict=True)
                       for group in groups_of(view)])  # fmt: skip
     steps = steps - steps.mean(axis=0)
     scatter = (steps**2).sum(axis=0) * len(steps) / max(len(steps) - 1, 1)
-    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), scatter)))
-
-
-def _least_squares(fit: Fit, covariance: Array) -> list[Array]:
-    """By flight (W, unknowns): how far each window alone moves the unknowns."""
-    return [np.einsum("wru,wr->wu", J, r) @ covariance for J, r in zip(fit.slopes, fit.rows, strict=True)]
+    return np.asarray(np.sqrt(np.maximum(np.diag(fit.covariance), scatter)))

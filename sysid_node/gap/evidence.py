@@ -54,6 +54,11 @@ def groups_of(view: View) -> list[NDArray[np.intp]]:
     return list(np.array_split(np.arange(view.windows.count), min(_GROUPS, max(view.windows.count // 2, 1))))
 
 
+def beside(group: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """A group of windows with those that overlap it, of so many."""
+    return np.arange(max(group[0] - 1, 0), min(group[-1] + 2, count))
+
+
 def cross_validated(fit: Fit) -> Evidence:
     """Each group of windows predicted from the others of the same flights; windows that overlap it stand aside."""
     assert fit.information is not None
@@ -68,7 +73,7 @@ def cross_validated(fit: Fit) -> Evidence:
         residual = amplitudes(rows, weights(view.windows, power))
         unseen, steps = residual.copy(), []
         for group in groups_of(view):
-            aside = np.arange(max(group[0] - 1, 0), min(group[-1] + 2, view.windows.count))
+            aside = beside(group, view.windows.count)
             others = np.setdiff1d(np.arange(view.windows.count), aside)
             J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
             information = elsewhere[i] + grams[i][others].sum(axis=0)
@@ -79,7 +84,7 @@ def cross_validated(fit: Fit) -> Evidence:
             scores.append(score)
             unseen[group] = part
         residuals.append(unseen)
-        points.append(tuple(_written(fit, moved(fit, step).points[i]) for step in steps))
+        points.append(tuple(written(fit, moved(fit, step).points[i]) for step in steps))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views, tuple(points))
 
 
@@ -137,7 +142,7 @@ def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) ->
             score, _ = _predictive(view, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
             scores.append(score)
         residuals.append(view.residual(point))
-        points.append((_written(fit, point),) * len(groups_of(view)))
+        points.append((written(fit, point),) * len(groups_of(view)))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(views), tuple(points))
 
 
@@ -156,7 +161,7 @@ def carried(fit: Fit, view: View) -> Array:
     return np.asarray(point)
 
 
-def _written(fit: Fit, point: Array) -> Array:
+def written(fit: Fit, point: Array) -> Array:
     """The parameters (P,) of the model that is handed on: the nuisances neutral but for the derivatives' errors."""
     simulator, kept = fit.views[0].simulator, point.copy()
     own = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != WIDENED]

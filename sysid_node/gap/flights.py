@@ -46,6 +46,7 @@ class Flight:
     source: str = ""
     filled: tuple[str, ...] = field(default=())  # columns that were not measured and are taken as zero
     inferred: tuple[str, ...] = field(default=())  # flow angles that no vane measured
+    left_out: float = 0.0  # s without a manoeuvre that are not looked at
     metered: bool = True  # whether thrust is known, or else is what the file's drag leaves of the forward force
 
 

@@ -14,6 +14,7 @@ from sysid_node.gap.close import Gap
 from sysid_node.gap.evidence import Evidence, groups_of, held_out
 from sysid_node.gap.flown import flown, foreseen
 from sysid_node.gap.nuisance import Nuisances
+from sysid_node.gap.parts import parted
 from sysid_node.gap.sizes import unbiased
 from sysid_node.gap.structure import Structure
 from sysid_node.gap.view import View
@@ -52,22 +53,27 @@ def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisan
     if unseen:
         base, final = (held_out(f, unseen, own) for f in (unbiased(attribution.base.fit), attribution.corrected))
     else:
-        base, final = attribution.base.evidence, attribution.chosen.evidence
+        base = parted(attribution.base.evidence, unbiased(attribution.base.fit))
+        final = parted(attribution.chosen.evidence, attribution.corrected, filed=attribution.filed)
     views = base.views
     before = [v.residual(v.simulator.neutral()) for v in views]
     return Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))
 
 
 def _checked(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
-    """An explanation and what flight not fitted says of it; without causes of which no numbers come there.
+    """An explanation and what flight not fitted says of it.
 
-    A mode that feeds itself may do so on flight not fitted only (see ``trials.upon``).
+    A mode that feeds itself may do so on flight not fitted only (see ``trials.upon``): then with its sizes as least
+    squares has them, and without causes where no numbers come of that either.
     """
-    try:
-        return attribution, check(attribution, unseen, own)
-    except np.linalg.LinAlgError:
-        bare = attribution.without_causes()
-        return bare, check(bare, unseen, own)
+    tried = (attribution, replace(attribution, corrected=attribution.chosen.fit))
+    for explanation in tried:
+        try:
+            return explanation, check(explanation, unseen, own)
+        except np.linalg.LinAlgError:
+            continue
+    bare = attribution.without_causes()
+    return bare, check(bare, unseen, own)
 
 
 def settled(
@@ -77,19 +83,40 @@ def settled(
 
     Nothing is blamed where weather and noise are all of the gap, nor what by neither measure predicts flight better
     than the derivatives within their tolerances, or by one of them no better than the file; and derivatives that do
-    worse than the file leave the file as it is. (In gusts derivatives that these have biased seem the better by
-    frequency.)
+    worse than the file leave the file as it is, with the causes beside it where these do better. (In gusts derivatives
+    that these have biased seem the better by frequency.)
     """
     attribution, checked = _checked(attribution, unseen, own)
     if foreseen([*views, *unseen]):
         attribution = attribution.without_causes().as_filed()
         return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
-    no_better = all(g.after >= g.tolerances for g in checked.gaps)
-    worse = no_better or any(g.after >= g.before for g in checked.gaps)
-    if attribution.causes and worse:
+    if attribution.causes and _no_better(checked):
+        attribution, checked = _beside_the_file(attribution, checked, unseen, own)
+    if attribution.causes and _no_better(checked):
         attribution = attribution.without_causes()
         checked = check(attribution, unseen, own)
     if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
         attribution = attribution.as_filed()
         checked = checked.as_filed(attribution.left)
     return attribution, checked
+
+
+def _no_better(checked: Check) -> bool:
+    """Whether causes predict no better than the derivatives by either measure, or than the file by one of them."""
+    return all(g.after >= g.tolerances for g in checked.gaps) or any(g.after >= g.before for g in checked.gaps)
+
+
+def _beside_the_file(
+    attribution: Attribution, checked: Check, unseen: Sequence[View], own: Sequence[Nuisances]
+) -> tuple[Attribution, Check]:
+    """The causes beside the file's own derivatives, where the derivatives that were fitted do worse than these."""
+    if not any(g.tolerances > g.before for g in checked.gaps):
+        return attribution, checked
+    explanation = attribution.beside_the_file()
+    try:
+        found = check(explanation, unseen, own)
+    except np.linalg.LinAlgError:
+        return attribution, checked
+    before, filed = [v.residual(v.simulator.neutral()) for v in found.views], found.as_filed(attribution.left)
+    gap = close.gap_of(found.views, before, filed.base, found.final, attribution.left)
+    return explanation, replace(found, base=replace(filed.base, scores=found.base.scores), gap=gap)

@@ -116,40 +116,45 @@ def undone(chain: Chain, motion: Motion) -> Sample:
     return Sample(inertial.force, inertial.rates, velocity, inertial.attitude, flow, reading)
 
 
-class FlowRates(NamedTuple):
-    """How fast the flow changes, at the time of the samples."""
+class Flow(NamedTuple):
+    """The flow at the time of the samples, and how fast it changes."""
 
-    at_probe: Scalar  # (N, 3) of airspeed (m/s^2), alpha and beta (rad/s), in still air
-    alpha: Scalar  # (N,) rad/s at the CG, with as much of the air's own motion as the memory lets through
+    velocity: Vector  # (N,) relative to the air at the CG, m/s
+    alpha_rate: Scalar  # (N,) rad/s at the CG
 
 
-def flow_rates(chain: Chain, motion: Motion, memory: Scalar | float) -> FlowRates:
-    """By the inertial instruments: differentiated, the vanes' noise would pass for motion.
+def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
+    """By the inertial instruments, with as much of what the vanes show beyond them as a memory (s) lets through.
 
-    What gusts do to alpha, only the vane shows: it is followed beyond a memory (s), without one at every sample.
+    What gusts do, only the vanes show: without a memory they are followed at every sample. In still air their noise
+    would pass for motion: in a regressor it makes derivatives seem smaller, the more so the less the aircraft moves.
     """
-    inertial, reading = _inertial(chain, motion), _reading(chain, motion)
-    at_probe = _flow_rate(chain, inertial, reading)
-    flow = sensors.before_lag(chain.effects, reading, at_probe, chain.step)
-    velocity = airflow.velocity_of(*flow.T).minus(inertial.rates.cross(_probe(chain)))
-    moving, _ = rates_of_change(velocity, inertial.attitude, inertial.force, inertial.rates)
-    _, still, _ = _rates_of_flow(velocity, moving)
-    _, alpha, _ = airflow.flow_angles(velocity)
-    followed = _followed(alpha, still, memory, chain.step)
-    return FlowRates(at_probe, jnp.where(memory > 0.0, followed, slope(alpha, chain.step)))
+    samples = undone(chain, motion)
+    moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
+    velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
+    _, alpha_rate, _ = _rates_of_flow(velocity, rate)
+    _, alpha, _ = airflow.flow_angles(samples.velocity)
+    followed, seen = Flow(velocity, alpha_rate), Flow(samples.velocity, slope(alpha, chain.step))
+    flow: Flow = jax.tree.map(lambda a, b: jnp.where(memory > 0.0, a, b), followed, seen)
+    return flow
 
 
-def _followed(angle: Scalar, still: Scalar, memory: Scalar | float, step: Scalar) -> Scalar:
-    """Rate (N,) of an angle as the vane has it, from its rate in still air: a complementary filter."""
+def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar) -> tuple[Vector, Vector]:
+    """A velocity (N,) as the vanes have it, from its rate by the inertial instruments, and its rate: a complementary
+    filter."""
 
-    def advance(expected: Scalar, sample: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-        seen, rate, remembered = sample
-        beyond = (seen - expected) / (remembered + step)
-        return expected + (rate + beyond) * step, rate + beyond
+    def advance(last: Vector, sample: tuple[Vector, Vector, Scalar]) -> tuple[Vector, tuple[Vector, Vector]]:
+        reading, gained, remembered = sample
+        expected = last.plus(gained)
+        beyond = reading.minus(expected).times(1.0 / (remembered + step))
+        now = expected.plus(beyond.times(step))
+        return now, (now, beyond)
 
-    begun = jnp.minimum(jnp.arange(angle.size) * step, memory)
-    _, rates = jax.lax.scan(advance, angle[0], (angle, still, begun))
-    return rates
+    first = jax.tree.map(lambda series: series[0], seen)
+    gained = jax.tree.map(lambda a: 0.5 * step * (a + jnp.concatenate([a[:1], a[:-1]])), moving)
+    begun = jnp.minimum(jnp.arange(seen.x.size) * step, memory)
+    _, (velocity, beyond) = jax.lax.scan(advance, first, (seen, gained, begun))
+    return velocity, moving.plus(beyond)
 
 
 def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:

@@ -20,7 +20,6 @@ from sysid_node.gap.fit import Fit, linearised, moved
 from sysid_node.gap.nuisance import gusty
 from sysid_node.gap.spectra import SHARE
 from sysid_node.gap.structure import Equations, equations, priors, within_limits
-from sysid_node.gap.view import CHANNELS
 
 #: Rounds of k and the step by turns; a tenth changes nothing that matters.
 _ROUNDS = 10
@@ -48,21 +47,36 @@ def instrumented(fit: Fit) -> Fit:
 
 
 def responses(fit: Fit) -> list[Array]:
-    """By flight (W, unknowns): how far each window alone moves the unknowns of a fit as ``instrumented`` leaves it."""
+    """By flight (W, unknowns): how far each window alone moves the unknowns of a fit as ``unbiased`` leaves it."""
+    if not any(gusty(view) for view in fit.views):
+        return [np.einsum("wru,wr->wu", J, r) @ fit.covariance for J, r in zip(fit.slopes, fit.rows, strict=True)]
+    known, information = telling(fit)
+    scores = (np.einsum("wru,wr->wu", K, r) for K, r in zip(known, fit.rows, strict=True))
+    return [np.linalg.solve(information, score.T).T for score in scores]
+
+
+def telling(fit: Fit) -> tuple[Sequence[Array], Array]:
+    """What multiplies the remainder in the equations that a fit as ``unbiased`` leaves it solves, and their matrix.
+
+    By flight (W, R, unknowns): the slopes in still air; in moving air, what of them the instruments see, less chance's
+    share, and the slopes of the means.
+    """
+    if not any(gusty(view) for view in fit.views):
+        assert fit.information is not None
+        return fit.slopes, fit.information
     seen = equations(fit, fit.power)
     channels = _channels(seen)
     step, corrected = _solved(fit, seen, channels)
     found, order = [], iter(channels)
-    for basis, r, J, rows, slopes in zip(seen.basis, seen.rows, seen.slopes, fit.rows, fit.slopes, strict=True):
-        mean = rows.reshape(rows.shape[0], -1, len(CHANNELS))[:, 0]
-        slope = slopes.reshape(slopes.shape[0], -1, len(CHANNELS), slopes.shape[2])[:, 0]
-        scores = np.einsum("wau,wa->wu", slope, mean)
+    for basis, J, slopes in zip(seen.basis, seen.slopes, fit.slopes, strict=True):
+        known = np.zeros_like(J)
+        known[:, 0] = slopes.reshape(J.shape)[:, 0]
         for axis, directions in basis.items():
             own, excess = J[:, :, axis].reshape(-1, J.shape[3]), next(order).excess(step)
-            known = (1.0 + excess) * (directions @ (directions.T @ own)) - excess * own
-            scores += np.einsum("wru,wr->wu", known.reshape(J[:, :, axis].shape), r[:, :, axis])
-        found.append(np.linalg.solve(corrected.information, scores.T).T)
-    return found
+            coherent = (1.0 + excess) * (directions @ (directions.T @ own)) - excess * own
+            known[:, 1:, axis] = coherent.reshape(J[:, :, axis].shape)[:, 1:]
+        found.append(known.reshape(slopes.shape))
+    return found, corrected.information
 
 
 def _solved(fit: Fit, seen: Equations, channels: Sequence[_Channel]) -> tuple[Array, Equations]:
@@ -119,7 +133,12 @@ def _without_chance(seen: Equations, channels: Sequence[_Channel], step: Array, 
         excess = channel.excess(step)
         information -= excess * channel.rest[:-1, :-1]
         right -= excess * channel.rest[:-1, -1]
+    return replace(seen, information=sound(information, precision), right=right)
+
+
+def sound(information: Array, precision: Array) -> Array:
+    """Information (unknowns, unknowns) that is in no direction less than that of the priors (unknowns,)."""
     unit = precision**-0.5
-    sizes, directions = np.linalg.eigh(information * np.outer(unit, unit))
-    sound = (directions * np.maximum(sizes, 1.0)) @ directions.T
-    return replace(seen, information=sound / np.outer(unit, unit), right=right)
+    scaled = information * np.outer(unit, unit)
+    sizes, directions = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    return np.asarray((directions * np.maximum(sizes, 1.0)) @ directions.T / np.outer(unit, unit))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flights import Flight
-from sysid_node.gap.kinematics import READINGS, Motion, flow_rates, motion_of, reconstruct
+from sysid_node.gap.kinematics import READINGS, Motion, flow_of, motion_of, reconstruct
 from sysid_node.gap.recent import Recent
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator, parameters
@@ -70,8 +70,8 @@ def _forces(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar
     signals = given.signals
     if given.motion is not None:
         chain = Chain.of(layout, model, theta, given.step, jnp.zeros(()))
-        rates = flow_rates(chain, given.motion, given.memory.vane)
-        signals = signals._replace(flow_rate=rates.at_probe, alpha_rate=rates.alpha)
+        flow = flow_of(chain, given.motion, given.memory.vane)
+        signals = signals._replace(velocity=flow.velocity, alpha_rate=flow.alpha_rate)
     return coefficients(model, given.signals, predict(layout, model, theta, signals, given.step))
 
 

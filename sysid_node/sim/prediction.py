@@ -52,8 +52,8 @@ class Signals(NamedTuple):
     density: Scalar  # (N,) kg/m^3
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     climb: Scalar  # (N,) m since the start
-    flow_rate: Scalar | None = None  # (N, 3) rate of the flow at the probe, when it moved, m/s^2, rad/s
-    alpha_rate: Scalar | None = None  # (N,) rad/s, at the CG, when it moved
+    velocity: Vector | None = None  # (N,) m/s relative to the air at the CG when it moved, where better known
+    alpha_rate: Scalar | None = None  # (N,) rad/s, the same
 
 
 class _Memory(NamedTuple):
@@ -165,10 +165,12 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
     effects, step = chain.effects, chain.step
     late_imu, late_air = effects["imu_delay"]["delay"], effects["air_data_delay"]["delay"]
     rates = sensors.rates_from(effects, Vector(*shift_cubic(signals.rates, -late_imu / step).T))
-    reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
-    flow = sensors.before_lag(effects, reading, signals.flow_rate, step)
-    arm = sensors.air_data_arm(chain.model, effects, chain.body)
-    velocity = airflow.velocity_of(*flow.T).minus(rates.cross(arm))
+    velocity = signals.velocity
+    if velocity is None:
+        reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
+        flow = sensors.before_lag(effects, reading, None, step)
+        arm = sensors.air_data_arm(chain.model, effects, chain.body)
+        velocity = airflow.velocity_of(*flow.T).minus(rates.cross(arm))
     _, alpha, _ = airflow.flow_angles(velocity)
     return _Sample(
         command=command.arrive(effects, signals.commands, step),

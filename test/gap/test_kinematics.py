@@ -1,5 +1,8 @@
 """Air data and attitude follow from the inertial instruments alone; truth: flights of this simulator, still air."""
 
+from dataclasses import replace
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from gap_flights import fly
@@ -13,6 +16,7 @@ from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
 
 FIRST = len(CHANNELS) - len(READINGS)
+STEPS_ONCE = ["3211:elevator:start=2", "3211:aileron:start=8", "3211:rudder:start=14"]
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +72,17 @@ def test_moment_with_the_rate_of_alpha_is_found_despite_the_vane_noise(aircraft)
     candidates = [c for c in candidates_of(view.simulator, [view]) if c.effect == "unsteady_aerodynamics"]
     found = polish(with_candidates(polish(blank([view], nuisances)), candidates, nuisances, [0.5, 1.0]))
     assert found.values[1] == pytest.approx(-10.0, rel=0.1)
+
+
+def test_a_lag_is_found_despite_the_vanes_noise(aircraft) -> None:
+    """Most of the flight is quiet: by the vanes alone derivatives seem smaller there, and the lag makes up for it."""
+    flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, 3, manoeuvre=STEPS_ONCE, duration=60.0)
+    view = view_of(Simulator(aircraft, 50.0), flight)
+    by_vanes = replace(view, given=view.given._replace(memory=view.given.memory._replace(vane=jnp.zeros(()))))
+    off = []
+    for seen in (view, by_vanes):
+        nuisances = nuisances_of(aircraft, seen)
+        candidates = [c for c in candidates_of(seen.simulator, [seen]) if c.effect == "actuator_lag"]
+        fit = polish(with_candidates(polish(blank([seen], nuisances)), candidates, nuisances, [0.05]))
+        off.append(abs(fit.values[0] - 0.09))
+    assert off[0] < 0.003 < 0.5 * off[1]

@@ -49,7 +49,7 @@ _STILL = 0.2
 
 def paragraph(found: Diagnosis) -> str:
     """What was found."""
-    return f"{_off(found)}{_findings(found)}{_weather(found)}{_blindness(found)}"
+    return f"{_off(found)}{_findings(found)}{_weather(found)}{_blindness(found)}{_quiet(found)}"
 
 
 def _off(found: Diagnosis) -> str:
@@ -135,6 +135,16 @@ def _blindness(found: Diagnosis) -> str:
     known = " and ".join(WORDS[angle] for angle in angles)
     gusts = "What gusts do is not known then."
     return f" Not measured, but inferred from the inertial instruments: {known}. {gusts}{thrust}"
+
+
+def _quiet(found: Diagnosis) -> str:
+    """What of the flight was not looked at."""
+    left_out = sum(view.flight.left_out for view in found.views)
+    if not left_out:
+        return ""
+    return (
+        f" There is one manoeuvre: {number(left_out, 2)} s of flight without any were left out, and its parts checked."
+    )
 
 
 def _weather(found: Diagnosis) -> str:

@@ -1,0 +1,79 @@
+"""Parts of flights, each by a simulator that was fitted to the others: the check where no flight was held out.
+
+A part may hold the only manoeuvre of its kind. What the others then say little of stays near the aircraft file, and
+within its limits: unknowns that would go beyond are put there and the others are solved for anew, for cut off one by
+one they would no longer agree with what the others' windows show (an angle of attack's lift that another term had made
+up for).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.candidates import bounds
+from sysid_node.gap.evidence import Evidence, beside, groups_of, written
+from sysid_node.gap.fit import Fit, amplitudes, moved, weights
+from sysid_node.gap.sizes import sound, telling
+from sysid_node.gap.structure import priors
+
+#: Times that unknowns are put at their limits.
+_BINDINGS = 8
+
+
+def parted(evidence: Evidence, fit: Fit, *, filed: bool = False) -> Evidence:
+    """Evidence with the residuals and parameters of each part as the others have it, about a fit that is ``unbiased``.
+
+    ``filed``: nuisances stay where they are. The scores stay: they compare explanations of the same flights.
+    """
+    residuals, points = [], []
+    for i, (view, steps) in enumerate(zip(fit.views, _steps(fit, filed=filed), strict=True)):
+        weight = weights(view.windows, fit.power[i])
+        unseen = amplitudes(fit.rows[i], weight)
+        for group, step in zip(groups_of(view), steps, strict=True):
+            unseen[group] = amplitudes(fit.rows[i][group] - fit.slopes[i][group] @ step, weight)
+        residuals.append(unseen)
+        points.append(tuple(written(fit, moved(fit, step).points[i]) for step in steps))
+    return replace(evidence, residuals=tuple(residuals), points=tuple(points))
+
+
+def _steps(fit: Fit, *, filed: bool) -> Iterator[list[Array]]:
+    """By flight: the steps (unknowns,) that the unknowns take without each group of windows and its neighbours."""
+    known, _ = telling(fit)
+    precision, far = priors(fit)
+    matrices = [np.einsum("wru,wrv->wuv", K, J, optimize=True) for K, J in zip(known, fit.slopes, strict=True)]
+    scores = [np.einsum("wru,wr->wu", K, r) for K, r in zip(known, fit.rows, strict=True)]
+    matrix = np.diag(precision) + sum(m.sum(axis=0) for m in matrices)
+    score = -precision * far + sum(s.sum(axis=0) for s in scores)
+    limits = _limits(fit, filed=filed)
+    for view, own, right in zip(fit.views, matrices, scores, strict=True):
+        asides = [beside(group, view.windows.count) for group in groups_of(view)]
+        yield [
+            _bound(sound(matrix - own[a].sum(axis=0), precision), score - right[a].sum(axis=0), *limits) for a in asides
+        ]
+
+
+def _limits(fit: Fit, *, filed: bool) -> tuple[Array, Array]:
+    """Least and greatest step of each unknown."""
+    low, high = bounds(fit.views[0].simulator, fit.indices)
+    now, _, limit = fit.stacked
+    down, up = (np.zeros(now.size),) * 2 if filed else (-limit - now, limit - now)
+    least, greatest = np.concatenate([low - fit.values, down]), np.concatenate([high - fit.values, up])
+    return np.minimum(least, 0.0), np.maximum(greatest, 0.0)
+
+
+def _bound(matrix: Array, score: Array, least: Array, greatest: Array) -> Array:
+    """The step of matrix @ step = score with what would go beyond its limits at them."""
+    step, free = np.zeros(score.size), np.ones(score.size, bool)
+    for _ in range(_BINDINGS):
+        right = score[free] - matrix[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(matrix[np.ix_(free, free)], right)
+        beyond = free & ((step < least) | (step > greatest))
+        step = np.clip(step, least, greatest)
+        if not beyond.any():
+            break
+        free &= ~beyond
+    return step
