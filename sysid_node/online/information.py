@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import dger
 
 from sysid_node.online.auxiliary import Auxiliary, fill_in
+from sysid_node.online.matrices import product
 from sysid_node.online.signals import OFFSET, Layout
 from sysid_node.online.unevenness import Unevenness
 
@@ -176,16 +177,20 @@ def products(transform: Array, model: Auxiliary | None) -> Array:
 
     The transforms are used up.
     """
-    if transform.ndim > 2:
-        return np.array([products(one, model) for one in transform])
     lines = about_mean(transform, model)
-    gram: Array = lines.T.dot(lines)
-    nuisances = range(_N.start, _N.stop)
-    for n, energy in zip(nuisances, gram.diagonal()[_N].tolist(), strict=True):
+    gram = product(lines.swapaxes(-1, -2), lines)
+    for one in gram.reshape(-1, *gram.shape[-2:]):
+        _project_out(one)
+    return gram
+
+
+def _project_out(gram: Array) -> None:
+    """Take constant and drift out of a Gram matrix (W, W) where it lies: Gaussian elimination."""
+    energies = gram.diagonal()[_N].tolist()
+    for n, energy in zip(range(_N.start, _N.stop), energies, strict=True):
         row, left = gram[n].copy(), float(gram[n, n])
         if left > INDEPENDENT * energy:
             dger(-1.0 / left, row, row, a=gram.T, overwrite_a=True)
-    return gram
 
 
 def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:

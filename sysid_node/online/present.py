@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from sysid_node.online import regression, transform
 from sysid_node.online.information import products
+from sysid_node.online.matrices import product
 from sysid_node.online.prior import weighed
-from sysid_node.online.regression import Plan, Solution, product
+from sysid_node.online.regression import Plan, Solution
 from sysid_node.online.signals import OFFSET
 from sysid_node.online.state import Renewed, State
 

@@ -17,6 +17,7 @@ from scipy.special import stdtrit
 
 from sysid_node.online import unevenness
 from sysid_node.online.information import BANDS, Information
+from sysid_node.online.matrices import product
 from sysid_node.online.signals import Layout
 
 Array = NDArray[np.float64]
@@ -155,12 +156,6 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     residual = product(misfit, theta).diagonal(axis1=-2, axis2=-1) + motion
     np.maximum(residual, ROUNDING * motion, out=residual)
     return Solution(theta, solved[..., :P], residual, motion, usable)
-
-
-def product(left: Array, right: Array) -> Array:
-    """Matrix product, of one moment's or of several's. The same library's, but ``dot`` has half the overhead."""
-    found: Array = left.dot(right) if left.ndim == right.ndim == 2 else left @ right
-    return found
 
 
 def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:
