@@ -4,7 +4,8 @@
 
 Effects drawn at random are flown by plants in processes of their own, which hand over bags and an aircraft file; the
 label is sealed until the diagnosis is written. Finished cases are kept: the same command goes on where it stopped.
-``--judge`` flies and diagnoses nothing more, and scores what is there.
+``--judge`` flies and diagnoses nothing more, and scores what is there. ``--ledger`` keeps what was judged, a line a case:
+cases in it are not flown again, and count.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from evaluation.pages import publish
-from withheld import judging, scoreboard
+from withheld import judging, ledger, scoreboard
 from withheld.closing import closed
 from withheld.drawing import FOREIGN, SETS, draw
 
@@ -38,17 +39,25 @@ def main() -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("out/withheld"), help="where cases are kept (default: out/withheld)"
     )
+    parser.add_argument("--ledger", type=Path, help="file of judged cases, to count and to add to")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     folder = args.out.resolve() / args.set
     judged, failed = [], []
+    known = ledger.read(args.ledger)
     for seed in range(args.first, args.first + args.cases):
         case = draw(args.set, seed)
         if (args.plants and case.plant not in args.plants) or (args.kinds and case.kind not in args.kinds):
             continue
+        if seed in known:
+            judged.append(known[seed])
+            continue
         if not args.judge and not _over(args.until):
             _finish(args.set, seed, folder, fly_only=args.fly)
-        judged += list(_judged(args.set, folder, seed))
+        for fresh in _judged(args.set, folder, seed):
+            judged.append(fresh)
+            if args.ledger is not None:
+                ledger.add(args.ledger, fresh)
         failed += [said for said in _failed(folder / str(seed)) if not said.startswith("diagnosis")]
     publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged, failed), args.page)
 

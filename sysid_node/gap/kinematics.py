@@ -142,19 +142,18 @@ def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
 def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar) -> tuple[Vector, Vector]:
     """A velocity (N,) as the vanes have it, from its rate by the inertial instruments, and its rate: a complementary
     filter."""
+    readings, rates = jnp.stack(seen, 1), jnp.stack(moving, 1)
+    gained = 0.5 * step * (rates + jnp.concatenate([rates[:1], rates[:-1]]))
+    share = (step / (jnp.minimum(jnp.arange(seen.x.size) * step, memory) + step))[:, None]
 
-    def advance(last: Vector, sample: tuple[Vector, Vector, Scalar]) -> tuple[Vector, tuple[Vector, Vector]]:
-        reading, gained, remembered = sample
-        expected = last.plus(gained)
-        beyond = reading.minus(expected).times(1.0 / (remembered + step))
-        now = expected.plus(beyond.times(step))
-        return now, (now, beyond)
+    def advance(last: Scalar, sample: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        now = sample[0] * last + sample[1]
+        return now, now
 
-    first = jax.tree.map(lambda series: series[0], seen)
-    gained = jax.tree.map(lambda a: 0.5 * step * (a + jnp.concatenate([a[:1], a[:-1]])), moving)
-    begun = jnp.minimum(jnp.arange(seen.x.size) * step, memory)
-    _, (velocity, beyond) = jax.lax.scan(advance, first, (seen, gained, begun))
-    return velocity, moving.plus(beyond)
+    # one row in, one row out: XLA would copy whole series at every step
+    _, velocity = jax.lax.scan(advance, readings[0], (1.0 - share, (1.0 - share) * gained + share * readings))
+    beyond = (velocity - jnp.concatenate([readings[:1], velocity[:-1]]) - gained) / step
+    return Vector(*velocity.T), Vector(*(rates + beyond).T)
 
 
 def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:

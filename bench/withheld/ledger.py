@@ -1,0 +1,37 @@
+"""Judged cases kept as lines of a file, so that a set can be gone on with where its bags are no more."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any
+
+from .judging import Judged
+
+#: What the scoreboard reads of a gap.
+_GAP = ("before", "after", "noise_floor", "shrink_percent", "ci95")
+
+
+def read(path: Path | None) -> dict[int, Judged]:
+    """The cases of a file by seed; none where there is no file."""
+    if path is None or not path.exists():
+        return {}
+    rows = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+    return {int(row["label"]["seed"]): _judged(row) for row in rows}
+
+
+def add(path: Path, judged: Judged) -> None:
+    """Adds a case at the end of a file."""
+    row = asdict(replace(judged, gap={name: judged.gap[name] for name in _GAP if name in judged.gap}))
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row, ensure_ascii=False) + "\n")
+
+
+def _judged(row: dict[str, Any]) -> Judged:
+    return Judged(**{field.name: _tuples(row[field.name]) for field in fields(Judged)})
+
+
+def _tuples(value: Any) -> Any:
+    """Lists as the tuples that they were."""
+    return tuple(_tuples(part) for part in value) if isinstance(value, list) else value
