@@ -1,9 +1,9 @@
 """How far a cause can be believed: the weights of ``sysid_node.gap.credence``, learned from flights of known truth.
 
-    python bench/gap_credence.py out/withheld/development out/withheld/final:36-59 [--page docs/gap.md]
+    python bench/gap_credence.py out/development.jsonl out/final.jsonl:36-59 [--page docs/gap.md]
 
-Reads what ``bench/gap_scoreboard.py`` has left of these sets (or of these seeds of them): the grounds of every cause
-that was named or doubted, and by the label whether it was there. A logistic regression by Firth's (1993) penalised
+Reads ledgers of ``bench/gap_scoreboard.py`` (or some seeds of them): the grounds of every cause that was named or
+doubted, and by the label whether it was there. A logistic regression by Firth's (1993) penalised
 likelihood (Biometrika 80(1)): few cases, nearly parted by their grounds, would send the likeliest weights to infinity
 (Heinze & Schemper (2002), Statistics in Medicine 21). Held against each case by weights learned from all the others.
 """
@@ -11,7 +11,6 @@ likelihood (Biometrika 80(1)): few cases, nearly parted by their grounds, would 
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -19,7 +18,7 @@ import numpy as np
 from evaluation.pages import publish, table
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from withheld import judging
+from withheld import ledger
 from withheld.scoreboard import calibration
 
 from sysid_node.gap.credence import PLIABLE, WEIGHTS, Grounds
@@ -31,7 +30,7 @@ _NAMES = ("a constant", "logarithm of the nats", "an effect that works through t
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("sets", nargs="+", help="folder of a set, or FOLDER:FIRST-LAST for some of its seeds")
+    parser.add_argument("sets", nargs="+", help="ledger of a set, or FILE:FIRST-LAST for some of its seeds")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     known = [row for text in args.sets for row in causes(text)]
@@ -43,21 +42,12 @@ def main() -> None:
 
 
 def causes(text: str) -> Iterator[tuple[str, Grounds, bool]]:
-    """Case, grounds, and whether it was there, of every cause in a set.
-
-    Not of what a plant always has: that is right whatever speaks for it.
-    """
+    """Case, grounds, and whether it was there, of every cause of a ledger."""
     name, _, seeds = text.partition(":")
     first, last = (int(part) for part in seeds.split("-")) if seeds else (0, 10**9)
-    for path in sorted(Path(name).glob("labels/*.json"), key=lambda path: int(path.stem)):
-        said = Path(name) / path.stem / "out" / "gap.json"
-        if first <= int(path.stem) <= last and said.exists():
-            label, document = (json.loads(p.read_text(encoding="utf-8")) for p in (path, said))
-            for cause in (*document["causes"], *document["doubted"]):
-                own = cause["grounds"]
-                grounds = Grounds(own["foretold"], own["misfit"], cause["effect"] in PLIABLE)
-                if not judging.always_there(label, cause):
-                    yield f"{name}/{path.stem}", grounds, judging.there(label, cause)
+    for seed, (effect, nats, misfit, there) in ledger.causes(Path(name)):
+        if first <= seed <= last:
+            yield f"{name}/{seed}", Grounds(nats, misfit, effect in PLIABLE), there
 
 
 def learned(X: Array, right: Array) -> Array:

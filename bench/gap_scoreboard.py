@@ -4,8 +4,8 @@
 
 Effects drawn at random are flown by plants in processes of their own, which hand over bags and an aircraft file; the
 label is sealed until the diagnosis is written. Finished cases are kept: the same command goes on where it stopped.
-``--judge`` flies and diagnoses nothing more, and scores what is there. ``--ledger`` keeps what was judged, a line a case:
-cases in it are not flown again, and count.
+``--judge`` flies and diagnoses nothing more, and scores what is there. ``--ledger`` keeps what was judged, a line a
+case: cases in it are not flown again, and count.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from evaluation.pages import publish
 from withheld import judging, ledger, scoreboard
@@ -57,7 +58,7 @@ def main() -> None:
         for fresh in _judged(args.set, folder, seed):
             judged.append(fresh)
             if args.ledger is not None:
-                ledger.add(args.ledger, fresh)
+                ledger.add(args.ledger, fresh, list(ledger.weighed_by(fresh.label, _said(folder / str(seed)))))
         failed += [said for said in _failed(folder / str(seed)) if not said.startswith("diagnosis")]
     publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged, failed), args.page)
 
@@ -114,16 +115,27 @@ def _run(words: list[str], folder: Path, seed: int, what: str) -> int:
 def _judged(which: str, folder: Path, seed: int) -> Iterator[judging.Judged]:
     """The case as it was judged, where it was diagnosed or the diagnosis failed."""
     found, label = folder / str(seed) / "out" / "gap.json", folder / "labels" / f"{seed}.json"
-    ended = any(said.startswith("diagnosis") for said in _failed(folder / str(seed)))
-    if (found.exists() or ended) and label.exists():
+    if (found.exists() or _ended(folder / str(seed))) and label.exists():
         truth = json.loads(label.read_text(encoding="utf-8"))
-        said = judging.FAILURE if ended else json.loads(found.read_text(encoding="utf-8"))
-        judged = judging.judge(truth, said)
+        judged = judging.judge(truth, _said(folder / str(seed)))
         named = judged.right and judged.kind in ("one", "two")
         flown = closed(truth, which, folder / str(seed)) if named else None
         kept = folder / str(seed) / "covered.json"
         further = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else None
         yield replace(judged, flown=flown, further=further)
+
+
+def _ended(case: Path) -> bool:
+    """Whether the diagnosis of a case ended without a verdict."""
+    return any(said.startswith("diagnosis") for said in _failed(case))
+
+
+def _said(case: Path) -> Mapping[str, Any]:
+    """What the diagnosis said of a case."""
+    if _ended(case):
+        return judging.FAILURE
+    said: Mapping[str, Any] = json.loads((case / "out" / "gap.json").read_text(encoding="utf-8"))
+    return said
 
 
 if __name__ == "__main__":

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
+from . import judging
 from .judging import Judged
+
+#: What is kept of a cause that was named or doubted: effect, nats, misfit, whether it was there.
+Weighed = tuple[str, float, float, bool]
 
 #: What the scoreboard reads of a gap.
 _GAP = ("before", "after", "noise_floor", "shrink_percent", "ci95")
@@ -21,11 +26,28 @@ def read(path: Path | None) -> dict[int, Judged]:
     return {int(row["label"]["seed"]): _judged(row) for row in rows}
 
 
-def add(path: Path, judged: Judged) -> None:
+def add(path: Path, judged: Judged, weighed: list[Weighed]) -> None:
     """Adds a case at the end of a file."""
     row = asdict(replace(judged, gap={name: judged.gap[name] for name in _GAP if name in judged.gap}))
+    row["weighed"] = weighed
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row, ensure_ascii=False) + "\n")
+
+
+def weighed_by(label: Mapping[str, Any], said: Mapping[str, Any]) -> Iterator[Weighed]:
+    """The causes that were named or doubted; not what a plant always has: that is right whatever speaks for it."""
+    for cause in (*said["causes"], *said.get("doubted", ())):
+        if not judging.always_there(label, cause):
+            own = cause["grounds"]
+            yield cause["effect"], own["foretold"], own["misfit"], judging.there(label, cause)
+
+
+def causes(path: Path) -> Iterator[tuple[int, Weighed]]:
+    """The causes of a file, each after its case's seed."""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        row = json.loads(line)
+        for effect, nats, misfit, there in row["weighed"]:
+            yield int(row["label"]["seed"]), (effect, nats, misfit, there)
 
 
 def _judged(row: dict[str, Any]) -> Judged:

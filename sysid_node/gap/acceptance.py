@@ -76,7 +76,18 @@ def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     gone = before.coherent - after.coherent
     structured = (gone > MATERIAL * before.coherent) & (gone * scale > NOTICED**2 * _motion(trial))
     forces = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
-    return np.where(forces, structured, _matters(without, trial))
+    return np.where(forces, structured | _shifts(without, trial), _matters(without, trial))
+
+
+def _shifts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+    """Channels (12,) on which a trial takes enough of what is off on average away: gusts average out."""
+    left, now = (_power_of_means(t.evidence) for t in (without, trial))
+    return np.asarray((left - now > MATERIAL * left) & (left - now > NOTICED**2 * _motion(trial)))
+
+
+def _power_of_means(evidence: Evidence) -> Array:
+    """Power (12,) of the flights' means of what is left, as ``spectra.power_of`` counts it."""
+    return np.asarray(sum(0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in evidence.residuals))
 
 
 def _motion(trial: Trial) -> Array:

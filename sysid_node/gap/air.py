@@ -75,7 +75,7 @@ def _stepped(calm: View, theta: Array) -> Array:
     simulator = calm.simulator
     own = [i for i in kinematic(simulator.layout) if simulator.parameters[i][1].switch]
     shown = _FORCES + np.flatnonzero(calm.axes[_FORCES:])
-    residual, slopes = (part[:, 1:, shown] for part in (calm.residual(theta), calm.slopes(theta, own)))
+    residual, slopes = calm.residual(theta)[:, 1:, shown], calm.slopes_of_readings(theta, own)[:, 1:, shown - _FORCES]
     spread = np.sqrt(np.median(np.abs(residual) ** 2, axis=0) + calm.noise[1:, shown])
     rows, columns = (residual / spread).ravel(), (slopes / spread[..., None]).reshape(-1, len(own))
     centre, sigma = prior(simulator, own)

@@ -80,7 +80,7 @@ def attribute(
         tried = trier.finish(likeliest(looks, most), _share_of(progress, count))
         candidates = narrowed(candidates, [look for _, look in looks])
         stages.append([trial for _, trial in tried])
-        better = [t for upon, t in tried if accepted(base, upon, t) and likelier(t, chosen)]
+        better = [t for upon, t in tried if likelier(t, chosen) and accepted(base, upon, t)]
         if not better:
             break
         chosen, frontier = better[0], better

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -86,8 +87,10 @@ def settled(
     worse than the file leave the file as it is, with the causes beside it where these do better. (In gusts derivatives
     that these have biased seem the better by frequency.)
     """
-    attribution, checked = _checked(attribution, unseen, own)
-    if foreseen([*views, *unseen]):
+    with ThreadPoolExecutor(1) as pool:
+        weather = pool.submit(foreseen, [*views, *unseen])
+        attribution, checked = _checked(attribution, unseen, own)
+    if weather.result():
         attribution = attribution.without_causes().as_filed()
         return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
     if attribution.causes and _no_better(checked):

@@ -171,20 +171,25 @@ class View:
         known = self._slopes.get(key)
         return self._slopes.keep(key, self._slopes_of(theta, indices) if known is None else known)
 
+    def slopes_of_readings(self, theta: Array, indices: list[int]) -> Complex:
+        """d predicted air data and attitude / d parameters of these indices, (W, L, 6, K)."""
+        slopes = np.zeros((*self.measured.shape[:2], len(READINGS), len(indices)), complex)
+        for some in _lanes([k for k, index in enumerate(indices) if index in kinematic(self.simulator.layout)]):
+            slopes[..., some] = self._slopes_along(_readings, theta, [indices[k] for k in some])
+        return slopes
+
     def _slopes_of(self, theta: Array, indices: list[int]) -> Complex:
         slopes = np.zeros((*self.measured.shape, len(indices)), complex)
         layout, forces = self.simulator.layout, len(COEFFICIENTS)
         own = {self.simulator.names.index(f"derivative_error.{n}"): d for d, n in enumerate(layout.derivatives)}
         linear = [k for k, index in enumerate(indices) if index in own]
         others = [k for k, index in enumerate(indices) if index not in own]
-        moving = [k for k in others if indices[k] in kinematic(layout)]
         if linear:
             by_derivative = self._slopes_by_derivative(theta)
             slopes[:, :, :forces, linear] = by_derivative[..., [own[indices[k]] for k in linear]]
         for some in _lanes(others):
             slopes[:, :, :forces, some] = self._slopes_along(_forces, theta, [indices[k] for k in some])
-        for some in _lanes(moving):
-            slopes[:, :, forces:, some] = self._slopes_along(_readings, theta, [indices[k] for k in some])
+        slopes[:, :, forces:] = self.slopes_of_readings(theta, indices)
         return np.asarray(slopes * self.axes[:, None])
 
     def _series(self, expected: Callable[..., Scalar], theta: Array) -> Array:

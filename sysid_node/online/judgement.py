@@ -84,7 +84,7 @@ def judge(state: State, renewed: Renewed, current: Present, now: Any) -> Codes:
     table, plan, grounds = state.model.table, state.plan, grounds_of(state, renewed)
     gram = current.gram
     motion = gram.reshape(*gram.shape[:-2], -1).take(plan.energy, axis=-1)
-    inflation = current.diagonal * motion
+    inflation = current.size * motion
     buried = motion < grounds.floor
     hidden = buried | (inflation > HOPELESS)
     poor = _poor(current)
@@ -98,7 +98,7 @@ def judge(state: State, renewed: Renewed, current: Present, now: Any) -> Codes:
         reasons = _reasons(state, grounds, current, inflation, buried, poor)
         np.copyto(codes, reasons, where=~good)
     changed, stale = current.time - state.changed_at < SETTLING, now - current.time > STALE
-    if np.count_nonzero(changed | stale):
+    if (changed | stale) is not False:  # one moment's is a plain bool
         codes[changed] = status.CHANGED
         codes[stale] = status.STALE
     return codes

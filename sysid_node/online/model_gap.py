@@ -39,7 +39,7 @@ def model_gap(state: State, current: Present | None) -> list[CoefficientGap]:
     motion = current.solution.motion
     relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))
     growth = growth_since(renewed, current.time)
-    variances = slope_variances(renewed, current.solution.residual, current.diagonal, growth)
+    variances = slope_variances(renewed, current.solution.residual, current.size, growth)
     spread = np.sqrt(np.maximum(variances.T, 0.0) + _tolerances(precisions))
     deviations = np.where(plan.mine > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online import regression, transform
 from sysid_node.online.information import products
-from sysid_node.online.matrices import product
+from sysid_node.online.matrices import diagonal, product
 from sysid_node.online.prior import weighed
 from sysid_node.online.regression import Plan, Solution
 from sysid_node.online.signals import OFFSET
@@ -31,7 +31,7 @@ class Present:
     variances: Array  # (..., D) squared standard errors
     solution: Solution
     gram: Array  # (..., W, W)
-    diagonal: Array  # (..., P) size of the inverse's diagonal
+    size: Array  # (..., P) of the inverse's diagonal
 
 
 def present(state: State) -> Present | None:
@@ -54,23 +54,23 @@ def present_at(state: State, lines: Array, time: Any) -> Present | None:
     if lines.ndim > 2:
         growth = growth[:, None, None]
     solution = regression.solve(plan, gram, None if noise is None else noise * growth)
-    diagonal = np.abs(solution.inverse.diagonal(axis1=-2, axis2=-1))
+    size = np.abs(diagonal(solution.inverse))
     slopes = solution.theta.swapaxes(-1, -2)
     if state.model.settings.use_prior:
         slopes, variances = _with_beliefs(state, renewed, slopes)
     else:
-        variances = slope_variances(renewed, solution.residual, diagonal, growth)
+        variances = slope_variances(renewed, solution.residual, size, growth)
     C, P = slopes.shape[-2:]
     told = np.empty((*slopes.shape[:-2], 2, C, P + 1))  # values and variances of the slopes and, behind them, offsets
     told[..., 0, :, :P], told[..., 1, :, :P] = slopes, variances
     told[..., 0, :, P], told[..., 1, :, P] = _offsets(plan, renewed, integrals, slopes)
     found = told.reshape(*slopes.shape[:-2], 2, C * (P + 1)).take(state.model.table.place, axis=-1)
-    return Present(time, found[..., 0, :], np.maximum(found[..., 1, :], 0.0), solution, gram, diagonal)
+    return Present(time, found[..., 0, :], np.maximum(found[..., 1, :], 0.0), solution, gram, size)
 
 
-def slope_variances(renewed: Renewed, residual: Array, diagonal: Array, growth: Any) -> Array:
+def slope_variances(renewed: Renewed, residual: Array, size: Array, growth: Any) -> Array:
     """(..., C, P) squared standard errors of the slopes, before beliefs are counted in; ``growth`` (..., 1, 1)."""
-    variances = product(residual[..., None], diagonal[..., None, :] / growth)
+    variances = product(residual[..., None], size[..., None, :] / growth)
     variances *= renewed.factors
     return variances
 

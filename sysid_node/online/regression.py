@@ -17,7 +17,7 @@ from scipy.special import stdtrit
 
 from sysid_node.online import unevenness
 from sysid_node.online.information import BANDS, Information
-from sysid_node.online.matrices import product
+from sysid_node.online.matrices import diagonal, product
 from sysid_node.online.signals import Layout
 
 Array = NDArray[np.float64]
@@ -153,8 +153,7 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     misfit = product(row, normal[..., :P, :])
     misfit -= normal[..., P:, :]
     motion = flat.take(plan.square, axis=-1)
-    residual = product(misfit, theta).diagonal(axis1=-2, axis2=-1) + motion
-    np.maximum(residual, ROUNDING * motion, out=residual)
+    residual: Array = np.maximum(diagonal(product(misfit, theta)) + motion, ROUNDING * motion)
     return Solution(theta, solved[..., :P], residual, motion, usable)
 
 
@@ -281,7 +280,7 @@ def student_95(freedom: Array) -> Array:
 
 def rivals(plan: Plan, solution: Solution) -> Index:
     """(..., P) of each unknown the one of the same equation whose estimate is most correlated with its own."""
-    spread = np.sqrt(np.abs(solution.inverse.diagonal(axis1=-2, axis2=-1)))
+    spread = np.sqrt(np.abs(diagonal(solution.inverse)))
     # each row's own spread is common to all of it
     correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)[..., None, :]
     correlation *= plan.same - plan.unit
