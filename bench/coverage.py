@@ -124,7 +124,8 @@ WATCHED = ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_beta", "Cl_p"
 def _biases(verdicts: Mapping[str, Verdict]) -> list[str]:
     """Mean errors in % of the truth, then coverage and confident wrong ones over all derivatives."""
     known = [v for v in verdicts.values() if v.valid > 1]
-    errors = [f"{100 * (verdicts[name].mean / TRUTH[name] - 1):+.1f}" for name in WATCHED]
+    shares = [100 * (verdicts[name].mean / TRUTH[name] - 1) for name in WATCHED]
+    errors = ["-" if math.isnan(share) else f"{share:+.1f}" for share in shares]
     covered = [100 * v.coverage for v in known]
     far = 100 * sum(v.far for v in known) / sum(v.valid for v in known)
     return [*errors, f"{min(covered):.0f}", f"{np.mean(covered):.1f}", f"{far:.2f}"]

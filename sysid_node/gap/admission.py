@@ -18,6 +18,9 @@ _TRAVEL = 0.004
 #: much (rad) would account for it.
 _LIFT, _VANE = 2.5, 0.1
 
+#: Mean angle of attack from which lift that is missing may be stalled, rad.
+_STALLING = 0.15
+
 
 def require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
     """Raises InputError where a held-out flight is one of those that are fitted."""
@@ -44,7 +47,8 @@ def admitted(view: View) -> View:
     lift, expected = view.series[:, 0].mean(), view.predicted_series(view.simulator.neutral())[:, 0].mean()
     slope = view.simulator.aircraft.derivatives.get("CL_alpha")
     by_a_vane = slope is not None and abs(lift - expected) < _VANE * slope.value and not view.flight.inferred
-    if not (1.0 / _LIFT < lift / expected < _LIFT or by_a_vane):
+    stalled = lift < expected and not view.flight.inferred and view.record["alpha"].mean() > _STALLING
+    if not (1.0 / _LIFT < lift / expected < _LIFT or by_a_vane or stalled):
         raise InputError(
             f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
             f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "

@@ -22,3 +22,16 @@ def test_a_vane_that_is_three_degrees_off_is_no_other_aircraft(aircraft) -> None
     expected = view.predicted_series(view.simulator.neutral())[:, 0].mean()
     assert view.series[:, 0].mean() > 2.5 * expected
     assert admitted(view) is view
+
+
+@pytest.mark.parametrize(("alpha", "stalled"), [(0.05, False), (0.2, True)])
+def test_a_third_of_the_lift_is_a_stall_at_large_angles_only(aircraft, plain_view, alpha: float, stalled: bool) -> None:
+    record, series = plain_view.record, plain_view.series.copy()
+    series[:, 0] = plain_view.predicted_series(plain_view.simulator.neutral())[:, 0] / 3.0
+    turned = record["alpha"] - record["alpha"].mean() + alpha
+    view = replace(plain_view, series=series, record=replace(record, columns={**record.columns, "alpha": turned}))
+    if stalled:
+        assert admitted(view) is view
+    else:
+        with pytest.raises(InputError, match="another aircraft's flight"):
+            admitted(view)
