@@ -1,6 +1,6 @@
 """What one sample costs: the whole online estimator beside the bare arithmetic of its method, in one run.
 
-    OMP_NUM_THREADS=1 python bench/update.py [--bag bags/cdrw_multistep] [--aircraft cdrw] [--repeat 3]
+    OMP_NUM_THREADS=1 python bench/update.py [--bag bags/cdrw_multistep] [--aircraft cdrw] [--repeat 3] [--page PAGE]
 
 Every sample of the flight is taken in (kinematics, transform), all derivatives are solved for with their variances, and
 each is judged; renewals (segments, colour of the residuals, watch for changes) fall in between, every second or so.
@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from evaluation.pages import publish, table
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
@@ -141,21 +142,29 @@ def measure(aircraft: Aircraft, bag: Path, method: str) -> dict[str, Array]:
     }
 
 
+def measured(method: str, aircraft: Aircraft, bag: Path, repeat: int) -> str:
+    """The table of one method, of the fastest of so many runs."""
+    runs = [measure(aircraft, bag, method) for _ in range(repeat)]
+    costs = min(runs, key=lambda run: float(np.median(run["tuned NumPy"])))
+    reference = float(np.median(costs["tuned NumPy"]))
+    rows = []
+    for name, cost in costs.items():
+        median, p99 = np.percentile(cost, [50.0, 99.0])
+        rows.append([name, f"{median:.1f}", f"{cost.mean():.1f}", f"{p99:.1f}", f"{median / reference:.2f}"])
+    return table((f"{method}: us a sample", "median", "mean", "p99", "x tuned"), rows)
+
+
 def main() -> None:
-    """Print a table for each method."""
+    """Print a table for each method, or put them in the documentation."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bag", type=Path, default=Path("bags/cdrw_multistep"))
     parser.add_argument("--aircraft", default="cdrw")
     parser.add_argument("--repeat", type=int, default=3, help="of which the fastest counts")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     options = parser.parse_args()
-    for method in METHODS:
-        runs = [measure(load_aircraft(options.aircraft), options.bag, method) for _ in range(options.repeat)]
-        costs = min(runs, key=lambda run: float(np.median(run["tuned NumPy"])))
-        reference = float(np.median(costs["tuned NumPy"]))
-        print(f"\n{method}: us a sample    median     mean      p99  x tuned")
-        for name, cost in costs.items():
-            median, p99 = np.percentile(cost, [50.0, 99.0])
-            print(f"{name:<22}{median:>9.1f}{cost.mean():>9.1f}{p99:>9.1f}{median / reference:>9.2f}")
+    aircraft = load_aircraft(options.aircraft)
+    tables = [measured(method, aircraft, options.bag, options.repeat) for method in METHODS]
+    publish("bench/update.py", "\n\n".join(tables), options.page)
 
 
 if __name__ == "__main__":
