@@ -153,11 +153,16 @@ def _climb(record: FlightRecord, time: Array) -> Array:
     """Height gained through the air since the start (m) by attitude, airspeed and flow angles; 0 without attitude."""
     if not (np.isfinite(record["theta"]).all() and np.isfinite(record["phi"]).all()):
         return np.zeros_like(time)
-    attitude = rigid.quaternion(*(jnp.asarray(x) for x in (record["phi"], record["theta"], 0.0 * record.time)))
-    velocity = airflow.velocity_of(*(jnp.asarray(record[name]) for name in ("V", "alpha", "beta")))
-    speed = -np.asarray(rigid.to_earth(attitude, velocity).z)
-    gained: Array = cumulative_trapezoid(np.asarray(speed, dtype=float), np.asarray(record.time), initial=0)
+    speed = np.asarray(_speed_of_climb(*(record[name] for name in ("phi", "theta", "V", "alpha", "beta"))))
+    gained: Array = cumulative_trapezoid(speed, np.asarray(record.time), initial=0)
     return np.asarray(np.interp(time, record.time, gained))
+
+
+@jax.jit
+def _speed_of_climb(roll: Scalar, pitch: Scalar, airspeed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:
+    """Speed (N,) upwards through the air, m/s."""
+    attitude = rigid.quaternion(roll, pitch, jnp.zeros_like(roll))
+    return -rigid.to_earth(attitude, airflow.velocity_of(airspeed, alpha, beta)).z
 
 
 def _true_motion(chain: Chain, signals: Signals) -> _Sample:

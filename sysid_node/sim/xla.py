@@ -33,7 +33,7 @@ def configure() -> None:
     _set("jax_enable_x64", True)
     if jax.config.jax_compilation_cache_dir is None:  # type: ignore[attr-defined]
         _set("jax_compilation_cache_dir", str(_cache_folder()))
-        _set("jax_persistent_cache_min_compile_time_secs", 0.2)
+        _set("jax_persistent_cache_min_compile_time_secs", 0.0)  # dozens of small programs take half a second
 
 
 def _set(option: str, value: object) -> None:
