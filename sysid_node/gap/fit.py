@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import Candidate, bounds, prior
@@ -31,6 +31,15 @@ _ROUNDS, _SETTLED = 8, 0.3
 
 #: Times that nuisances are put at their limits before what is left beyond is cut off.
 _BINDINGS = 6
+
+#: Room that an unknown at its limit is left, in its own standard deviations: bounds must not coincide.
+_ROOM = 1e-6
+
+#: Share of each unknown's information that tells it from others where rounding does not.
+_TRACE = 1e-10
+
+#: Share of its limit within which a nuisance stands at it.
+_AT_LIMIT = 1e-6
 
 #: Evaluations of the small nonlinear problem in each round.
 _EVALUATIONS = 12
@@ -213,7 +222,7 @@ def _one_round(fit: Fit) -> Fit:
     values = fit.values
     if values.size:
         low, high = bounds(fit.views[0].simulator, fit.indices)
-        start = np.clip(values, low + 1e-9, high - 1e-9)
+        start = np.clip(problem.together(values, low, high), low + 1e-9, high - 1e-9)
         scale = fit.views[0].simulator.scales[list(fit.indices)]
         solution = least_squares(
             problem.ahead, start, problem.jacobian, bounds=(low, high), x_scale=scale, max_nfev=_EVALUATIONS,
@@ -273,6 +282,31 @@ class Projected:
         """How far the nuisances' best at these values lies from where the residual is taken."""
         return np.asarray(self.shift + self.spread * self._best(self._rows(values)))
 
+    def together(self, values: Array, low: Array, high: Array) -> Array:
+        """The values from which to go on: these, or those of a step in which nuisances move with them, if it is better.
+
+        A nuisance at its limit stays there while the values move alone, and may hold what is theirs: an elevator's bias
+        crept by a thousandth a round where this step finds it. Nuisances are bound as it leaves them.
+        """
+        before = self.free, self.shift
+        here = self.deviance(self.residual(values))
+        matrix = np.hstack([self.matrix, self._columns(values)])
+        rows = self._rows(values) + self.moved_rows
+        gram, right = matrix.T @ matrix, matrix.T @ rows
+        own = np.arange(self.now.size, gram.shape[0])
+        gram[own, own] += self.sigma**-2.0
+        right[own] -= (values - self.centre) / self.sigma**2
+        limit, now = self.limit / self.spread, self.now / self.spread
+        step = bounded(gram, right, np.append(-limit - now, low - values), np.append(limit - now, high - values))
+        moved = now + step[: now.size]
+        beyond = np.abs(moved) > limit * (1.0 - _AT_LIMIT)
+        self._settle(~beyond, np.where(beyond, np.sign(moved) * self.limit - self.now, 0.0))
+        there = values + step[now.size :]
+        if self.deviance(self.residual(there)) < here:
+            return there
+        self._settle(*before)
+        return values
+
     def looking(self, candidate: Candidate) -> Projected:
         """The same nuisances but for those that the candidate is or replaces; its parameters move with the others."""
         other, names = copy(self), self.fit.views[0].simulator.names
@@ -315,15 +349,17 @@ class Projected:
         return kept if key == values.tobytes() else self._slopes(values)
 
     def _slopes(self, values: Array) -> Array:
+        matrix = -self._columns(values)
+        return np.vstack([matrix - self.matrix @ self._best(matrix), np.diag(1.0 / self.sigma)])
+
+    def _columns(self, values: Array) -> Array:
+        """Weighted slopes (R, values) of what is expected with respect to the values, nuisances held."""
         blocks = []
         for view, point, weight in zip(self.fit.views, self.fit.points, self.weights, strict=True):
             there = point.copy()
             there[self.indices] = values
-            slopes = real_rows(view.slopes(there, self.indices), weight)
-            blocks.append(-slopes.reshape(-1, values.size))
-        blocks.append(np.zeros((self.now.size, values.size)))
-        matrix = np.vstack(blocks)
-        return np.vstack([matrix - self.matrix @ self._best(matrix), np.diag(1.0 / self.sigma)])
+            blocks.append(real_rows(view.slopes(there, self.indices), weight).reshape(-1, values.size))
+        return np.vstack([*blocks, np.zeros((self.now.size, values.size))])
 
     def deviance(self, rows: Array) -> float:
         """Minus twice the log probability of a ``residual``, up to a constant, as if of its own spectrum.
@@ -401,6 +437,27 @@ def linearised(fit: Fit) -> Fit:
         information += flat.T @ flat
     cost = sum(float(np.sum(r**2)) for r in rows) - 2.0 * fit.prior_score
     return replace(fit, rows=tuple(rows), slopes=tuple(slopes), information=information, cost=cost)
+
+
+def bounded(information: Array, right: Array, low: Array, high: Array) -> Array:
+    """The step (unknowns,) of least squares, information @ step = right, between bounds."""
+    spread = np.diag(information) ** -0.5
+    root = _root(information * np.outer(spread, spread))
+    target = np.linalg.solve(root.T, right * spread)
+    found = lsq_linear(root, target, (np.minimum(low / spread, -_ROOM), np.maximum(high / spread, _ROOM)))
+    return np.asarray(found.x * spread)
+
+
+def _root(information: Array) -> Array:
+    """Upper factor R of information = R' R, whose diagonal is one.
+
+    Slopes of a mode that feeds itself may be so large, and so alike, that rounding drowns the priors: then a trace of
+    them is put back.
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(information).T)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.cholesky(information + _TRACE * np.eye(len(information))).T)
 
 
 def solve(information: Array, right: Array) -> Array:

@@ -16,12 +16,9 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import bounds
 from sysid_node.gap.evidence import Evidence, beside, groups_of, written
-from sysid_node.gap.fit import Fit, amplitudes, moved, weights
+from sysid_node.gap.fit import Fit, amplitudes, bounded, moved, weights
 from sysid_node.gap.sizes import sound, telling
 from sysid_node.gap.structure import priors
-
-#: Times that unknowns are put at their limits.
-_BINDINGS = 8
 
 
 def parted(evidence: Evidence, fit: Fit, *, filed: bool = False) -> Evidence:
@@ -52,7 +49,8 @@ def _steps(fit: Fit, *, filed: bool) -> Iterator[list[Array]]:
     for view, own, right in zip(fit.views, matrices, scores, strict=True):
         asides = [beside(group, view.windows.count) for group in groups_of(view)]
         yield [
-            _bound(sound(matrix - own[a].sum(axis=0), precision), score - right[a].sum(axis=0), *limits) for a in asides
+            bounded(sound(matrix - own[a].sum(axis=0), precision), score - right[a].sum(axis=0), *limits)
+            for a in asides
         ]
 
 
@@ -62,18 +60,4 @@ def _limits(fit: Fit, *, filed: bool) -> tuple[Array, Array]:
     now, _, limit = fit.stacked
     down, up = (np.zeros(now.size),) * 2 if filed else (-limit - now, limit - now)
     least, greatest = np.concatenate([low - fit.values, down]), np.concatenate([high - fit.values, up])
-    return np.minimum(least, 0.0), np.maximum(greatest, 0.0)
-
-
-def _bound(matrix: Array, score: Array, least: Array, greatest: Array) -> Array:
-    """The step of matrix @ step = score with what would go beyond its limits at them."""
-    step, free = np.zeros(score.size), np.ones(score.size, bool)
-    for _ in range(_BINDINGS):
-        right = score[free] - matrix[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.solve(matrix[np.ix_(free, free)], right)
-        beyond = free & ((step < least) | (step > greatest))
-        step = np.clip(step, least, greatest)
-        if not beyond.any():
-            break
-        free &= ~beyond
-    return step
+    return least, greatest

@@ -14,24 +14,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import bounds, prior
 from sysid_node.gap.deliberate import deliberate
-from sysid_node.gap.fit import Fit, real_rows, weights
+from sysid_node.gap.fit import Fit, bounded, real_rows, weights
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
 _LAGS = (0.0, 0.06, 0.2, 0.6)
-
-#: Room that an unknown at its limit is left, in its own standard deviations: bounds must not coincide.
-_ROOM = 1e-6
-
-#: Share of each unknown's information that tells it from others where rounding does not.
-_TRACE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -123,27 +116,12 @@ def equations(fit: Fit, powers: tuple[Array, ...], *, commanded: bool = False) -
 
 def within_limits(seen: Equations, fit: Fit) -> Array:
     """The step (unknowns,) of least squares that leaves every unknown within its limits."""
-    spread = np.diag(seen.information) ** -0.5
-    root = _root(seen.information * np.outer(spread, spread))
     low, high = bounds(fit.views[0].simulator, fit.indices)
     now, _, limit = fit.stacked
-    lowest = np.concatenate([low - fit.values, -limit - now]) / spread
-    highest = np.concatenate([high - fit.values, limit - now]) / spread
-    target = np.linalg.solve(root.T, seen.right * spread)
-    found = lsq_linear(root, target, (np.minimum(lowest, -_ROOM), np.maximum(highest, _ROOM)))
-    return np.asarray(found.x * spread)
-
-
-def _root(information: Array) -> Array:
-    """Upper factor R of information = R' R, whose diagonal is one.
-
-    Slopes of a mode that feeds itself may be so large, and so alike, that rounding drowns the priors: then a trace of
-    them is put back.
-    """
-    try:
-        return np.asarray(np.linalg.cholesky(information).T)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.cholesky(information + _TRACE * np.eye(len(information))).T)
+    lowest, highest = (
+        np.concatenate(ends) for ends in ((low - fit.values, -limit - now), (high - fit.values, limit - now))
+    )
+    return bounded(seen.information, seen.right, lowest, highest)
 
 
 def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:

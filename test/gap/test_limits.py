@@ -1,10 +1,14 @@
 """Tolerances are limits: a nuisance never goes beyond three of them, whatever the data say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_flights import fly
+from scipy.optimize import lsq_linear
 
-from sysid_node.gap.fit import Fit, Projected, blank, linearised, polish, with_candidates
+from sysid_node.gap.candidates import candidates_of
+from sysid_node.gap.fit import Fit, Projected, blank, bounded, linearised, polish, with_candidates
 from sysid_node.gap.nuisance import LIMIT, nuisances_of
 from sysid_node.gap.viewing import view_of
 from sysid_node.sim import Simulator
@@ -60,3 +64,25 @@ def test_a_prediction_that_grew_without_end_is_no_explanation(aircraft, plain_vi
     assert np.isfinite(problem.deviance(rows))
     rows[3] = size
     assert problem.deviance(rows) == np.inf
+
+
+@pytest.mark.parametrize("limit", [10.0, 0.5])
+def test_the_step_between_bounds_is_the_best_there(random: np.random.Generator, limit: float) -> None:
+    """Truth: SciPy's least squares on the factor itself."""
+    root = np.eye(6) + 0.2 * random.standard_normal((6, 6))
+    target = random.standard_normal(6)
+    best = lsq_linear(root, target, (-limit, limit)).x
+    ours = bounded(root.T @ root, root.T @ target, np.full(6, -limit), np.full(6, limit))
+    np.testing.assert_allclose(ours, best, atol=1e-6)
+
+
+def test_what_a_nuisance_at_its_limit_holds_is_given_back(aircraft) -> None:
+    """Truth: the bias that was flown. Values that move alone, the nuisance at its limit, creep."""
+    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"actuator_bias": {"elevator": -0.06}}, seed=21))
+    nuisances = nuisances_of(aircraft, view)
+    (bias,) = (c for c in candidates_of(view.simulator, [view]) if c.effect == "actuator_bias")
+    fit = with_candidates(polish(blank([view], nuisances)), [bias], nuisances, [0.0, 0.0, 0.0])
+    cm, limit = (nuisances.indices.index(view.simulator.names.index("derivative_error.Cm_0")), nuisances.limit)
+    stuck = [point.copy() for point in fit.points]
+    stuck[0][nuisances.indices[cm]] = limit[cm]
+    assert polish(replace(fit, points=tuple(stuck))).values[0] == pytest.approx(-0.06, rel=0.1)

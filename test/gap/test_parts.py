@@ -1,22 +1,11 @@
-"""Parts by the others. Truth: SciPy's bounded least squares; a fit to the other windows alone."""
+"""Parts by the others. Truth: a fit to the other windows alone."""
 
 import numpy as np
-import pytest
-from scipy.optimize import lsq_linear
 
 from sysid_node.gap.evidence import beside, cross_validated, groups_of
 from sysid_node.gap.fit import blank, polish
 from sysid_node.gap.nuisance import nuisances_of
-from sysid_node.gap.parts import _bound, _steps, parted
-
-
-@pytest.mark.parametrize("limit", [10.0, 0.5])
-def test_what_would_go_beyond_its_limits_stays_at_them(random: np.random.Generator, limit: float) -> None:
-    root = np.eye(6) + 0.2 * random.standard_normal((6, 6))
-    target = random.standard_normal(6)
-    best = lsq_linear(root, target, (-limit, limit)).x
-    ours = _bound(root.T @ root, root.T @ target, np.full(6, -limit), np.full(6, limit))
-    np.testing.assert_allclose(ours, best, atol=1e-6)
+from sysid_node.gap.parts import _steps, parted
 
 
 def test_each_part_is_left_out_of_what_predicts_it(aircraft, plain_view) -> None:
@@ -36,4 +25,4 @@ def test_nuisances_may_be_held(aircraft, plain_view) -> None:
     evidence = parted(cross_validated(fit), fit, filed=True)
     own = [i for i, name in enumerate(plain_view.simulator.names) if name.startswith("derivative_error")]
     for point in evidence.points[0]:
-        assert np.array_equal(point[own], fit.points[0][own]) and np.any(point[own])
+        np.testing.assert_allclose(point[own], fit.points[0][own], rtol=0.0, atol=1e-5 * np.ptp(fit.points[0][own]))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.structure import Structure, _root
+from sysid_node.gap.fit import _root
+from sysid_node.gap.structure import Structure
 
 DIRECTIONS, ROWS = 37, 400
 
