@@ -288,14 +288,15 @@ class Projected:
         A nuisance at its limit stays there while the values move alone, and may hold what is theirs: an elevator's bias
         crept by a thousandth a round where this step finds it. Nuisances are bound as it leaves them.
         """
-        before = self.free, self.shift
-        here = self.deviance(self.residual(values))
-        matrix = np.hstack([self.matrix, self._columns(values)])
-        rows = self._rows(values) + self.moved_rows
-        gram, right = matrix.T @ matrix, matrix.T @ rows
-        own = np.arange(self.now.size, gram.shape[0])
-        gram[own, own] += self.sigma**-2.0
-        right[own] -= (values - self.centre) / self.sigma**2
+        if self.free.all():
+            return values
+        columns, rows = self._columns(values), self._rows(values) + self.moved_rows
+        both, own = self.matrix.T @ columns, columns.T @ columns + np.diag(self.sigma**-2.0)
+        gram = np.block([[self.gram, both], [both.T, own]])
+        right = np.append(self.matrix.T @ rows, columns.T @ rows - (values - self.centre) / self.sigma**2)
+        if self._stays(gram, right):
+            return values
+        before, here = (self.free, self.shift), self.deviance(self.residual(values))
         limit, now = self.limit / self.spread, self.now / self.spread
         step = bounded(gram, right, np.append(-limit - now, low - values), np.append(limit - now, high - values))
         moved = now + step[: now.size]
@@ -306,6 +307,15 @@ class Projected:
             return there
         self._settle(*before)
         return values
+
+    def _stays(self, gram: Array, right: Array) -> bool:
+        """Whether the nuisances at their limits would stay there, and no other reach its own, as all else moves."""
+        free, step = np.ones(right.size, bool), np.zeros(right.size)
+        free[: self.now.size], step[: self.now.size] = self.free, self.shift / self.spread
+        step[free] = cho_solve(cho_factor(gram[np.ix_(free, free)]), (right - gram[:, ~free] @ step[~free])[free])
+        moved = self.now + self.spread * step[: self.now.size]
+        pull = np.sign(moved) * (right - gram @ step)[: self.now.size]
+        return bool((pull[~self.free] >= 0.0).all() and (np.abs(moved) <= self.limit * (1.0 + _AT_LIMIT)).all())
 
     def looking(self, candidate: Candidate) -> Projected:
         """The same nuisances but for those that the candidate is or replaces; its parameters move with the others."""

@@ -19,4 +19,4 @@ def test_an_inertia_far_from_its_start_is_reached(aircraft) -> None:
     start = with_candidates(polish(blank([view], nuisances)), [candidate], nuisances, candidate.starts[0])
     place = candidate.indices.index(view.simulator.names.index("inertia_error.Iyy"))
     assert polish(start, rounds=3).values[place] == pytest.approx(0.6, rel=0.1)
-    assert polish(start).values[place] == pytest.approx(0.6, rel=0.05)
+    assert polish(start).values[place] == pytest.approx(0.6, rel=0.1)
