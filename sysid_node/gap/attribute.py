@@ -40,7 +40,17 @@ class Attribution:
     doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
     table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
-    filed: bool = False  # whether derivatives are the file's
+    beside: Fit | None = None  # what the sizes are from, where the corrected fit has the file's derivatives
+
+    @property
+    def filed(self) -> bool:
+        """Whether derivatives are the file's, beside causes."""
+        return self.beside is not None
+
+    @property
+    def sized(self) -> Fit:
+        """The fit that sizes and their errors are from."""
+        return self.beside or self.corrected
 
     def as_filed(self) -> Attribution:
         """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
@@ -54,12 +64,13 @@ class Attribution:
         for point, found in zip(points, fit.points, strict=True):
             point[own] = found[own]
         moved = replace(linearised(replace(fit, points=points)), information=fit.information)
-        return replace(self, corrected=moved, filed=True)
+        return replace(self, corrected=moved, beside=fit)
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
         corrected = unbiased(self.base.fit)
-        return replace(self, chosen=self.base, corrected=corrected, left=structure_of(self.base.fit), causes=())
+        return replace(self, chosen=self.base, corrected=corrected, beside=None,
+                       left=structure_of(self.base.fit), causes=())  # fmt: skip
 
 
 def attribute(

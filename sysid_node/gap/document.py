@@ -62,7 +62,7 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
         "station": cause.candidate.station,
-        "parameters": parameters(found.attribution.corrected, cause),
+        "parameters": parameters(found.attribution.sized, cause),
         "probability": cause.probability,
         "gap_after": found.size.after,
         "indistinguishable_from": named(cause),

@@ -93,7 +93,7 @@ def settled(
     if weather.result():
         attribution = attribution.without_causes().as_filed()
         return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
-    if attribution.causes and _no_better(checked):
+    if attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
         attribution, checked = _beside_the_file(attribution, checked, unseen, own)
     if attribution.causes and _no_better(checked):
         attribution = attribution.without_causes()
@@ -112,13 +112,13 @@ def _no_better(checked: Check) -> bool:
 def _beside_the_file(
     attribution: Attribution, checked: Check, unseen: Sequence[View], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
-    """The causes beside the file's own derivatives, where the derivatives that were fitted do worse than these."""
-    if not any(g.tolerances > g.before for g in checked.gaps):
-        return attribution, checked
+    """The causes beside the file's own derivatives, where these do better than the derivatives that were fitted."""
     explanation = attribution.beside_the_file()
     try:
         found = check(explanation, unseen, own)
     except np.linalg.LinAlgError:
+        return attribution, checked
+    if not found.gaps[-1].after < checked.gaps[-1].after:
         return attribution, checked
     before, filed = [v.residual(v.simulator.neutral()) for v in found.views], found.as_filed(attribution.left)
     gap = close.gap_of(found.views, before, filed.base, found.final, attribution.left)
