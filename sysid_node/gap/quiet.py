@@ -35,7 +35,8 @@ def sudden(commands: Array) -> Array:
 def manoeuvre_of(flight: Flight, controls: tuple[str, ...]) -> Flight:
     """The flight's only manoeuvre, where there is one and it is a small part of the flight; else the flight."""
     record = thinned(flight)
-    steps = sudden(np.column_stack([record[name] for name in controls])) ** 2
+    moved = [name for name in (*controls, *(["thrust"] if flight.metered else [])) if name in record.columns]
+    steps = sudden(np.column_stack([record[name] for name in moved])) ** 2
     power = (steps / np.maximum(steps.sum(axis=0), 1e-300)).sum(axis=1).cumsum()
     if not power[-1] > 0.0:
         return flight

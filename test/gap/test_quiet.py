@@ -1,5 +1,7 @@
 """A flight's only manoeuvre. Truth: when its steps were flown."""
 
+from dataclasses import replace
+
 import pytest
 from gap_flights import fly
 
@@ -26,3 +28,12 @@ def test_manoeuvres_all_over_a_flight_are_kept(aircraft) -> None:
 def test_where_nothing_steps_all_is_kept(aircraft) -> None:
     flight = fly(aircraft, {}, manoeuvre=["multisine:elevator"], duration=50.0)
     assert manoeuvre_of(flight, CONTROLS) is flight
+
+
+def test_a_throttle_that_steps_later_belongs_to_the_manoeuvres(aircraft) -> None:
+    flight = fly(aircraft, {}, manoeuvre=["3211:elevator:start=2:width=0.3"], duration=50.0)
+    record = flight.record
+    thrust = record["thrust"] + 3.0 * (record.time > 35.0)
+    stepped = replace(flight, record=replace(record, columns={**record.columns, "thrust": thrust}))
+    assert manoeuvre_of(flight, CONTROLS).left_out > 30.0
+    assert manoeuvre_of(stepped, CONTROLS) is stepped
