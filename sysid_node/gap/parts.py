@@ -55,9 +55,10 @@ def _steps(fit: Fit, *, filed: bool) -> Iterator[list[Array]]:
 
 
 def _limits(fit: Fit, *, filed: bool) -> tuple[Array, Array]:
-    """Least and greatest step of each unknown."""
+    """Least and greatest step of each unknown; what only shapes an effect stays, for parts may say nothing of it."""
     low, high = bounds(fit.views[0].simulator, fit.indices)
     now, _, limit = fit.stacked
     down, up = (np.zeros(now.size),) * 2 if filed else (-limit - now, limit - now)
-    least, greatest = np.concatenate([low - fit.values, down]), np.concatenate([high - fit.values, up])
-    return least, greatest
+    sizes = fit.loose[: low.size]
+    least, greatest = (np.where(sizes, end - fit.values, 0.0) for end in (low, high))
+    return np.append(least, down), np.append(greatest, up)

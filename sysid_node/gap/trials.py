@@ -103,7 +103,8 @@ class Trier:
         Slopes of a mode that feeds itself grow without end: such a set predicts nothing, and is no explanation.
         """
         try:
-            return self.trial(current.fit, current.fit.candidates, look)
+            with _endless():
+                return self.trial(current.fit, current.fit.candidates, look)
         except np.linalg.LinAlgError:
             return None
 
@@ -143,13 +144,23 @@ def narrowed(candidates: Sequence[Candidate], looks: Sequence[Look]) -> list[Can
     ]
 
 
+def _endless() -> np.errstate:
+    """Of predictions without end, as of a mode that feeds itself, the result tells: NumPy need not warn of them."""
+    return np.errstate(over="ignore", invalid="ignore")
+
+
 def _spread(
     work: Callable[[_Work], _Result], over: Sequence[_Work], progress: Callable[[float], None]
 ) -> list[_Result]:
-    """The work on each, in their order; on as many threads as there are processors, which XLA and LAPACK leave free."""
+    """The work on each, in their order; on one thread more than there are processors, for each waits for XLA."""
     done = []
+
+    def quietly(item: _Work) -> _Result:
+        with _endless():
+            return work(item)
+
     with ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:
-        for result in pool.map(work, over):
+        for result in pool.map(quietly, over):
             done.append(result)
             progress(len(done) / len(over))
     return done
