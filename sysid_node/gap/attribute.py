@@ -66,6 +66,17 @@ class Attribution:
         moved = replace(linearised(replace(fit, points=points)), information=fit.information)
         return replace(self, corrected=moved, beside=fit)
 
+    def by_least_squares(self) -> Attribution:
+        """Sizes as least squares has them: where those without bias predict nothing."""
+        return replace(self, corrected=self.chosen.fit, beside=None)
+
+    def without_the_weakest(self) -> Attribution:
+        """Without the cause that is the least probable."""
+        weakest = min(self.causes, key=lambda cause: cause.probability)
+        fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
+        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None, left=structure_of(fit),
+                       causes=causes)  # fmt: skip
+
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
         corrected = unbiased(self.base.fit)

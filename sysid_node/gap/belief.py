@@ -35,7 +35,8 @@ class Cause:
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
     grounds: Grounds
     fit: Fit  # of the explanation that it was part of when it was weighed
-    rivals: tuple[Trial, ...] = ()  # what was tried in its stead
+    rivals: tuple[Trial, ...]  # what was tried in its stead
+    without: Trial  # the explanation without it
     made_way: bool = False  # for a rival that can be believed
 
     @property
@@ -125,7 +126,8 @@ def _cause(trier: Trier, chosen: Trial, place: Place, barred: frozenset[str]) ->
     rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
     taken = np.maximum(power_left(place.without.evidence) - power_left(chosen.evidence), 0.0)
     grounds = _grounds(chosen, place.without, candidate)
-    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), grounds, chosen.fit, place.rivals)
+    return Cause(candidate, by_effect[candidate.effect], taken, tuple(rivals_left), grounds, chosen.fit, place.rivals,
+                 place.without)  # fmt: skip
 
 
 def _shares(sets: Sequence[Trial], others: Sequence[Trial]) -> Array:

@@ -77,11 +77,15 @@ class Fit:
         """
         assert self.information is not None
         loose = np.ones(self.information.shape[0], bool)
-        for place, index in enumerate(self.indices):
-            loose[place] = self.views[0].simulator.parameters[index][1].switch
+        loose[: len(self.indices)] = self.sizing
         now, _, limit = self.stacked
         loose[len(self.indices) :] = np.abs(now) < limit * (1.0 - 1e-9)
         return loose
+
+    @property
+    def sizing(self) -> NDArray[np.bool_]:
+        """Which of the candidates' parameters are sizes; the others (an onset, an angle) only shape an effect."""
+        return np.array([self.views[0].simulator.parameters[i][1].switch for i in self.indices], bool)
 
     @property
     def effects(self) -> frozenset[str]:
@@ -447,6 +451,17 @@ def linearised(fit: Fit) -> Fit:
         information += flat.T @ flat
     cost = sum(float(np.sum(r**2)) for r in rows) - 2.0 * fit.prior_score
     return replace(fit, rows=tuple(rows), slopes=tuple(slopes), information=information, cost=cost)
+
+
+def room(fit: Fit) -> tuple[Array, Array]:
+    """Least and greatest step of each unknown within its limits; what only shapes an effect stays.
+
+    Part of a flight may say nothing of an onset, and a linear step would then lead anywhere.
+    """
+    low, high = bounds(fit.views[0].simulator, fit.indices)
+    now, _, limit = fit.stacked
+    least, greatest = (np.where(fit.sizing, end - fit.values, 0.0) for end in (low, high))
+    return np.append(least, -limit - now), np.append(greatest, limit - now)
 
 
 def bounded(information: Array, right: Array, low: Array, high: Array) -> Array:

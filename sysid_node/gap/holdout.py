@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -61,22 +61,6 @@ def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisan
     return Check(views, base, final, close.gap_of(views, before, base, final, attribution.left))
 
 
-def _checked(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
-    """An explanation and what flight not fitted says of it.
-
-    A mode that feeds itself may do so on flight not fitted only (see ``trials.upon``): then with its sizes as least
-    squares has them, and without causes where no numbers come of that either.
-    """
-    tried = (attribution, replace(attribution, corrected=attribution.chosen.fit))
-    for explanation in tried:
-        try:
-            return explanation, check(explanation, unseen, own)
-        except np.linalg.LinAlgError:
-            continue
-    bare = attribution.without_causes()
-    return bare, check(bare, unseen, own)
-
-
 def settled(
     attribution: Attribution, views: Sequence[View], unseen: Sequence[View], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
@@ -84,29 +68,54 @@ def settled(
 
     Nothing is blamed where weather and noise are all of the gap, nor what by neither measure predicts flight better
     than the derivatives within their tolerances, or by one of them no better than the file; and derivatives that do
-    worse than the file leave the file as it is, with the causes beside it where these do better. (In gusts derivatives
-    that these have biased seem the better by frequency.)
+    worse than the file leave the file as it is. (In gusts derivatives that these have biased seem the better by
+    frequency.)
     """
     with ThreadPoolExecutor(1) as pool:
         weather = pool.submit(foreseen, [*views, *unseen])
-        attribution, checked = _checked(attribution, unseen, own)
+        attribution, checked = _standing(attribution, unseen, own)
     if weather.result():
         attribution = attribution.without_causes().as_filed()
         return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
-    if attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
-        attribution, checked = _beside_the_file(attribution, checked, unseen, own)
-    if attribution.causes and _no_better(checked):
-        attribution = attribution.without_causes()
-        checked = check(attribution, unseen, own)
     if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
         attribution = attribution.as_filed()
         checked = checked.as_filed(attribution.left)
     return attribution, checked
 
 
-def _no_better(checked: Check) -> bool:
-    """Whether causes predict no better than the derivatives by either measure, or than the file by one of them."""
-    return all(g.after >= g.tolerances for g in checked.gaps) or any(g.after >= g.before for g in checked.gaps)
+def _standing(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
+    """What of an explanation stands, and what flight not fitted says of it.
+
+    All causes, else with sizes as least squares has them, else without the least probable one, else none; each also
+    beside the file's own derivatives. No numbers come of a mode that feeds itself on flight not fitted (see
+    ``trials.upon``).
+    """
+    for explanation in _explanations(attribution):
+        try:
+            found = explanation, check(explanation, unseen, own)
+        except np.linalg.LinAlgError:
+            continue
+        if any(g.tolerances > g.before for g in found[1].gaps):
+            found = _beside_the_file(*found, unseen, own)
+        if _better(found[1]):
+            return found
+    bare = attribution.without_causes()
+    return bare, check(bare, unseen, own)
+
+
+def _explanations(attribution: Attribution) -> Iterator[Attribution]:
+    """An explanation, then what could stand in its stead."""
+    if attribution.causes:
+        yield attribution
+        if attribution.corrected is not attribution.chosen.fit:
+            yield attribution.by_least_squares()
+    if len(attribution.causes) > 1:
+        yield attribution.without_the_weakest()
+
+
+def _better(checked: Check) -> bool:
+    """Whether causes predict better than the derivatives by one of the measures, and than the file by both."""
+    return any(g.after < g.tolerances for g in checked.gaps) and all(g.after < g.before for g in checked.gaps)
 
 
 def _beside_the_file(

@@ -14,9 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import bounds
 from sysid_node.gap.evidence import Evidence, beside, groups_of, written
-from sysid_node.gap.fit import Fit, amplitudes, bounded, moved, weights
+from sysid_node.gap.fit import Fit, amplitudes, bounded, moved, room, weights
 from sysid_node.gap.sizes import sound, telling
 from sysid_node.gap.structure import priors
 
@@ -45,20 +44,12 @@ def _steps(fit: Fit, *, filed: bool) -> Iterator[list[Array]]:
     scores = [np.einsum("wru,wr->wu", K, r) for K, r in zip(known, fit.rows, strict=True)]
     matrix = np.diag(precision) + sum(m.sum(axis=0) for m in matrices)
     score = -precision * far + sum(s.sum(axis=0) for s in scores)
-    limits = _limits(fit, filed=filed)
+    least, greatest = room(fit)
+    if filed:
+        least[len(fit.indices) :] = greatest[len(fit.indices) :] = 0.0
     for view, own, right in zip(fit.views, matrices, scores, strict=True):
         asides = [beside(group, view.windows.count) for group in groups_of(view)]
         yield [
-            bounded(sound(matrix - own[a].sum(axis=0), precision), score - right[a].sum(axis=0), *limits)
+            bounded(sound(matrix - own[a].sum(axis=0), precision), score - right[a].sum(axis=0), least, greatest)
             for a in asides
         ]
-
-
-def _limits(fit: Fit, *, filed: bool) -> tuple[Array, Array]:
-    """Least and greatest step of each unknown; what only shapes an effect stays, for parts may say nothing of it."""
-    low, high = bounds(fit.views[0].simulator, fit.indices)
-    now, _, limit = fit.stacked
-    down, up = (np.zeros(now.size),) * 2 if filed else (-limit - now, limit - now)
-    sizes = fit.loose[: low.size]
-    least, greatest = (np.where(sizes, end - fit.values, 0.0) for end in (low, high))
-    return np.append(least, down), np.append(greatest, up)

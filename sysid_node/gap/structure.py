@@ -17,9 +17,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.candidates import bounds, prior
+from sysid_node.gap.candidates import prior
 from sysid_node.gap.deliberate import deliberate
-from sysid_node.gap.fit import Fit, bounded, real_rows, weights
+from sysid_node.gap.fit import Fit, bounded, real_rows, room, weights
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
@@ -116,12 +116,7 @@ def equations(fit: Fit, powers: tuple[Array, ...], *, commanded: bool = False) -
 
 def within_limits(seen: Equations, fit: Fit) -> Array:
     """The step (unknowns,) of least squares that leaves every unknown within its limits."""
-    low, high = bounds(fit.views[0].simulator, fit.indices)
-    now, _, limit = fit.stacked
-    lowest, highest = (
-        np.concatenate(ends) for ends in ((low - fit.values, -limit - now), (high - fit.values, limit - now))
-    )
-    return bounded(seen.information, seen.right, lowest, highest)
+    return bounded(seen.information, seen.right, *room(fit))
 
 
 def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:

@@ -1,6 +1,6 @@
 """What flight not fitted says of an explanation. Truth: an explanation of which no numbers come explains nothing."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,36 +16,54 @@ WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_b
 
 @dataclass(frozen=True)
 class Explanation:
-    """As much of an attribution as the check of its numbers looks at."""
+    """As much of an attribution as the check of its numbers looks at; a matrix that is not positive predicts none."""
 
     corrected: Any
-    least_squares: Any
-    chosen: Any = field(init=False)
+    chosen: Any = None
+    causes: tuple[str, ...] = ("a cause",)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "chosen", SimpleNamespace(fit=self.least_squares))
+    def by_least_squares(self) -> "Explanation":
+        return Explanation(self.chosen.fit)
+
+    def without_the_weakest(self) -> "Explanation":
+        return Explanation(2.0 * np.eye(2))
 
     def without_causes(self) -> "Explanation":
-        return Explanation(np.eye(2), np.eye(2))
+        return Explanation(np.eye(2), causes=())
 
 
-@pytest.fixture
-def checked_by_cholesky(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The check of an explanation: the root of its matrix, of which there is none where it is not positive."""
-    monkeypatch.setattr(holdout, "check", lambda explanation, *_: np.linalg.cholesky(explanation.corrected))
+def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
+    """The larger, the better it predicts; 3 is as good as the file, for which 1.5 are the derivatives alone."""
+    size = float(np.linalg.cholesky(explanation.corrected)[0, 0] ** 2)
+    return SimpleNamespace(gaps=[SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size)], size=size)
 
 
-@pytest.mark.usefixtures("checked_by_cholesky")
-def test_causes_that_predict_no_numbers_are_given_up() -> None:
-    """As slopes of a mode that feeds itself on flight not fitted, without end."""
-    left, checked = holdout._checked(Explanation(-np.eye(2), -np.eye(2)), (), ())
-    assert np.array_equal(left.corrected, np.eye(2)) and np.array_equal(checked, np.eye(2))
+@pytest.mark.parametrize(
+    ("unbiased", "least_squares", "causes", "stands"),
+    [
+        (9.0, 4.0, ("one",), 9.0),
+        (-1.0, 4.0, ("one",), 4.0),  # of a mode that feeds itself no numbers come
+        (0.5, 4.0, ("one",), 4.0),  # worse than the file
+        (-1.0, 1.5, ("one",), 1.0),  # no better than the derivatives: nothing is blamed
+        (-1.0, -1.0, ("one",), 1.0),
+    ],
+)
+def test_the_first_explanation_that_predicts_better_stands(
+    monkeypatch: pytest.MonkeyPatch, unbiased: float, least_squares: float, causes: tuple[str, ...], stands: float
+) -> None:
+    monkeypatch.setattr(holdout, "check", by_cholesky)
+    chosen = SimpleNamespace(fit=least_squares * np.eye(2))
+    _, checked = holdout._standing(Explanation(unbiased * np.eye(2), chosen, causes), (), ())
+    assert checked.size == pytest.approx(stands)
 
 
-@pytest.mark.usefixtures("checked_by_cholesky")
-def test_sizes_of_least_squares_stand_where_the_unbiased_ones_predict_no_numbers() -> None:
-    left, checked = holdout._checked(Explanation(-np.eye(2), 4.0 * np.eye(2)), (), ())
-    assert np.array_equal(left.corrected, 4.0 * np.eye(2)) and np.array_equal(checked, 2.0 * np.eye(2))
+def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(holdout, "check", by_cholesky)
+    wild = -np.eye(2)
+    explanation = Explanation(wild, SimpleNamespace(fit=wild), ("sound", "wild"))
+    monkeypatch.setattr(Explanation, "without_the_weakest", lambda self: Explanation(4.0 * np.eye(2)))
+    _, checked = holdout._standing(explanation, (), ())
+    assert checked.size == pytest.approx(4.0)
 
 
 def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(aircraft) -> None:
