@@ -140,18 +140,26 @@ def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
 
 
 def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar) -> tuple[Vector, Vector]:
-    """A velocity (N,) as the vanes have it, from its rate by the inertial instruments, and its rate: a complementary
-    filter."""
+    """A velocity (N,) as the vanes have it, from its rate by the inertial instruments, and its rate.
+
+    A straight line through what the vanes show beyond that rate, over the memory: an accelerometer that is off by a
+    constant leaves nothing (Benedict & Bordner (1962), IRE Trans. Automatic Control 7(4); the gains of a line through n
+    samples).
+    """
     readings, rates = jnp.stack(seen, 1), jnp.stack(moving, 1)
     gained = 0.5 * step * (rates + jnp.concatenate([rates[:1], rates[:-1]]))
-    share = (step / (jnp.minimum(jnp.arange(seen.x.size) * step, memory) + step))[:, None]
+    n = jnp.minimum(jnp.arange(seen.x.size) + 1.0, jnp.maximum(memory / step, 2.0))
+    level, tilt = 2.0 * (2.0 * n - 1.0) / (n * (n + 1.0)), jnp.where(n < 2.0, 0.0, 6.0 / (n * (n + 1.0)))
 
-    def advance(last: Scalar, sample: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-        now = sample[0] * last + sample[1]
-        return now, now
+    def advance(last: Scalar, sample: Scalar) -> tuple[Scalar, Scalar]:
+        expected = last[:3] + last[3:] + sample[2:5]
+        beyond = sample[5:] - expected
+        now = expected + sample[0] * beyond
+        return jnp.concatenate([now, last[3:] + sample[1] * beyond]), now
 
     # one row in, one row out: XLA would copy whole series at every step
-    _, velocity = jax.lax.scan(advance, readings[0], (1.0 - share, (1.0 - share) * gained + share * readings))
+    table = jnp.concatenate([level[:, None], tilt[:, None], gained, readings], axis=1)
+    _, velocity = jax.lax.scan(advance, jnp.concatenate([readings[0], jnp.zeros(3)]), table)
     beyond = (velocity - jnp.concatenate([readings[:1], velocity[:-1]]) - gained) / step
     return Vector(*velocity.T), Vector(*(rates + beyond).T)
 
