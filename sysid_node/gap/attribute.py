@@ -18,7 +18,7 @@ from sysid_node.gap.fit import Fit, blank, linearised
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.sizes import unbiased
 from sysid_node.gap.steps import Steps
-from sysid_node.gap.structure import Structure, structure_of
+from sysid_node.gap.structure import Structure, structure_left, structure_of
 from sysid_node.gap.trials import Progress, Trial, Trier, likeliest, narrowed
 from sysid_node.gap.view import View
 
@@ -74,14 +74,14 @@ class Attribution:
         """Without the cause that is the least probable."""
         weakest = min(self.causes, key=lambda cause: cause.probability)
         fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
-        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None, left=structure_of(fit),
+        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None, left=structure_left(fit),
                        causes=causes)  # fmt: skip
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
         corrected = unbiased(self.base.fit)
         return replace(self, chosen=self.base, corrected=corrected, beside=None,
-                       left=structure_of(self.base.fit), causes=())  # fmt: skip
+                       left=structure_left(self.base.fit), causes=())  # fmt: skip
 
 
 def attribute(
@@ -109,7 +109,7 @@ def attribute(
     progress(0.8, "whether another effect would do as well")
     late = [candidate for candidate in candidates if candidate.effect in BETWEEN]
     chosen, causes, doubted = believed(trier, base, chosen, stages, late)
-    before, left = structure_of(base.fit, chosen.fit), structure_of(chosen.fit)
+    before, left = structure_of(base.fit, chosen.fit), structure_left(chosen.fit)
     ranked, corrected = _ranked(base, stages[0]), unbiased(chosen.fit)
     return Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.fit import Fit
-from sysid_node.gap.structure import equations, priors, structure_of, within_limits
+from sysid_node.gap.structure import commands, equations, priors, structure_of, within_limits
 
 
 def advantage(fit: Fit, other: Fit) -> float:
@@ -31,7 +31,7 @@ def advantage(fit: Fit, other: Fit) -> float:
 
 def _evidence(fit: Fit, powers: tuple[Array, ...]) -> float:
     """Log evidence, up to a constant, in noise of these powers (L, 12) by flight."""
-    seen = equations(fit, powers, commanded=True)
+    seen = equations(fit, powers, commands, whole=True)
     step = within_limits(seen, fit)
     squares = seen.constant - 2.0 * float(seen.right @ step) + float(step @ seen.information @ step)
     precision, _ = priors(fit)

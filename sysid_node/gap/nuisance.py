@@ -28,7 +28,7 @@ LIMIT = 3.0
 #: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. A late
 #: IMU is late against both others, and all three together against nothing: it is measured against the air data, and
 #: the commands' clock stays as it is, for a servo's own lag must not pass for lateness.
-_CLOCKS = {
+CLOCKS = {
     "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
     "air_data_delay": ("air_data_delay", "imu_delay"),
 }
@@ -61,7 +61,7 @@ class Nuisances:
     def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
         """Those that do not belong to these effects; the priors of some are widened."""
         gone = {e for e in effects if e != WIDENED}
-        gone |= {clock for clock, same in _CLOCKS.items() if not effects.isdisjoint(same)}
+        gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
         wide = np.where(np.isin(self.indices, widened), WIDER, 1.0)
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
@@ -90,10 +90,10 @@ def nuisances_of(aircraft: Aircraft, view: View, others: Sequence[View] = ()) ->
     if any(gusty(v) for v in every):
         sigma |= _turning_air(aircraft)
     limit = {name: LIMIT * s for name, s in sigma.items()}
-    for clock, rate in zip(_CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
+    for clock, rate in zip(CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
     names = view.simulator.names
-    shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *_CLOCKS)) for name in sigma])
+    shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *CLOCKS)) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
 

@@ -10,11 +10,11 @@ model of the aircraft beats.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import bilinear, lfilter
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import prior
@@ -25,6 +25,12 @@ from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
 
 #: Time constants through which commands act, s; zero is directly.
 _LAGS = (0.0, 0.06, 0.2, 0.6)
+
+#: Frequencies at which what is not the airframe's may ring, Hz, and the damping that makes each reach the next.
+_RINGING, _DAMPING = (0.6, 0.9, 1.35, 2.0, 3.0), 0.2
+
+#: Signals (N, M) for forces and moments, and for air data and attitude, of zero mean and unit spread; or none.
+Instruments = Callable[[View], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -57,9 +63,17 @@ class Structure:
         return np.asarray(self.coherent / np.maximum(self.total, 1e-300))
 
 
-def structure_of(fit: Fit, like: Fit | None = None) -> Structure:
+def structure_left(fit: Fit) -> Structure:
+    """Of a fit's remainder, by channel as the more telling of two tests has it: ``instruments`` and ``ringing``."""
+    usual, rings = structure_of(fit), structure_of(fit, by=ringing)
+    more = rings.deviations > usual.deviations
+    found = {f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(Structure)}
+    return Structure(**found)
+
+
+def structure_of(fit: Fit, like: Fit | None = None, by: Instruments | None = None) -> Structure:
     """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare."""
-    seen = equations(fit, (like or fit).power)
+    seen = equations(fit, (like or fit).power, by or instruments)
     step = within_limits(seen, fit)
     coherent, total, size, others = (np.zeros(len(CHANNELS)) for _ in range(4))
     for U, r, J in zip(seen.basis, seen.rows, seen.slopes, strict=True):
@@ -90,21 +104,21 @@ class Equations:
     constant: float
 
 
-def equations(fit: Fit, powers: tuple[Array, ...], *, commanded: bool = False) -> Equations:
+def equations(fit: Fit, powers: tuple[Array, ...], by: Instruments | None = None, *, whole: bool = False) -> Equations:
     """Those of a fit about where it stands, in noise of these powers (L, 12) by flight.
 
-    ``commanded``: of forces and moments with the commands alone for instruments, and with all of air data and attitude.
+    ``whole``: with all of air data and attitude, whatever the instruments see of them.
     """
-    basis, rows, slopes = _seen(fit, powers, commanded=commanded)
+    basis, rows, slopes = _seen(fit, powers, by or instruments)
     precision, pull = priors(fit)
     information, right, constant = np.diag(precision), -precision * pull, float(precision @ pull**2)
     parts = [
         (directions.T @ r[:, :, axis].ravel(), directions.T @ J[:, :, axis].reshape(-1, J.shape[3]))
         for U, r, J in zip(basis, rows, slopes, strict=True)
         for axis, directions in U.items()
-        if axis < len(COEFFICIENTS) or not commanded
+        if axis < len(COEFFICIENTS) or not whole
     ]
-    if commanded:
+    if whole:
         kept = [(r[:, :, len(COEFFICIENTS) :], J[:, :, len(COEFFICIENTS) :]) for r, J in zip(rows, slopes, strict=True)]
         parts += [(r.ravel(), J.reshape(-1, J.shape[3])) for r, J in kept]
     for series, seen in [*parts, *_means(fit, powers)]:
@@ -129,7 +143,7 @@ def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]
 
 
 def _seen(
-    fit: Fit, powers: tuple[Array, ...], *, commanded: bool
+    fit: Fit, powers: tuple[Array, ...], by: Instruments
 ) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
     """By flight: the instruments' directions, residuals (W, 2 L, 12), slopes (W, 2 L, 12, unknowns), without means."""
     basis, rows, slopes = [], [], []
@@ -140,7 +154,7 @@ def _seen(
         ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
         rows.append((r * ratio).reshape(r.shape[0], -1, len(CHANNELS)))
         slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2]))
-        basis.append(_basis(view, weight, commanded=commanded))
+        basis.append(_basis(view, weight, by))
     return basis, rows, slopes
 
 
@@ -151,9 +165,9 @@ def priors(fit: Fit) -> tuple[Array, Array]:
     return np.concatenate([sigma, spread]) ** -2.0, np.concatenate([fit.values - centre, now])
 
 
-def _basis(view: View, weight: Array, *, commanded: bool) -> dict[int, Array]:
+def _basis(view: View, weight: Array, by: Instruments) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by coefficient that was measured."""
-    tables = view.once(f"instruments, {commanded=}", lambda: _spectra_of_instruments(view, commanded=commanded))
+    tables = view.once(f"spectra by {by.__name__}", lambda: _spectra(view, by))
     found = {}
     for axis in np.flatnonzero(view.axes):
         spectra = tables[0 if axis < len(COEFFICIENTS) else 1]
@@ -167,29 +181,66 @@ def _basis(view: View, weight: Array, *, commanded: bool) -> dict[int, Array]:
     return found
 
 
-def _spectra_of_instruments(view: View, *, commanded: bool) -> list[Complex]:
-    """``instruments`` by window and line, each (W, L, M); empty where there are none."""
-    tables = instruments(view, commanded=commanded)
-    return [view.windows.transform(t) if t.size else np.empty((0, 0, 0), complex) for t in tables]
+def _spectra(view: View, by: Instruments) -> list[Complex]:
+    """Instruments by window and line, each (W, L, M); empty where there are none."""
+    return [view.windows.transform(t) if t.size else np.empty((0, 0, 0), complex) for t in by(view)]
 
 
-def instruments(view: View, *, commanded: bool = False) -> tuple[Array, Array]:
-    """Signals (N, M) that owe nothing to rotating gusts, each of zero mean and unit spread.
-
-    And those that owe nothing to gusts of any kind, which are in every reading of the air data; there may be none.
-    ``commanded``: the first of commands alone. What holds the motion owes nothing to gusts on average, but what the air
-    does in one flight is coherent with it.
-    """
-    given, record = deliberate(view), view.record
+def instruments(view: View) -> tuple[Array, Array]:
+    """What owes nothing to rotating gusts; and what owes nothing to gusts of any kind, which are in all air data."""
+    given, late = deliberate(view), _late(view)
     if not given.all.size:
-        return np.empty((0, 0)), np.empty((0, 0))
-    late = record.time - record.time.mean()  # weather that does not change averages out of what is weighted by time
-    columns = [*_shaped(view, given.all), *(late * series for series in given.all.T)]
-    if not commanded:
-        moved = {n: record[n] - record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
-        columns += [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
-        columns += [late * series for series in moved.values()]
-    return _standard(columns), _standard(_shaped(view, given.steps))
+        return _NONE
+    moved = {n: view.record[n] - view.record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
+    flow = [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
+    aging = [late * series for series in moved.values()]
+    return _standard([*_foretelling(view, given.all), *flow, *aging]), _standard(_shaped(view, given.steps))
+
+
+def commands(view: View) -> tuple[Array, Array]:
+    """Of ``instruments`` those of commands alone.
+
+    What holds the motion owes nothing to gusts on average, but what the air does in one flight is coherent with it.
+    """
+    given = deliberate(view)
+    if not given.all.size:
+        return _NONE
+    return _standard(_foretelling(view, given.all)), _standard(_shaped(view, given.steps))
+
+
+def ringing(view: View) -> tuple[Array, Array]:
+    """Commands through resonators: what swings on after a manoeuvre by a motion of its own, as fuel or a load does.
+
+    Lags do not foretell it. Kautz functions (Wahlberg (1994), IEEE Trans. Automatic Control 39(6)).
+    """
+    given = deliberate(view)
+    if not given.all.size:
+        return _NONE
+    both = [[*signals.T, *_rung(view, signals)] for signals in (given.all, given.steps)]
+    return _standard(both[0]), _standard(both[1])
+
+
+_NONE = (np.empty((0, 0)), np.empty((0, 0)))
+
+
+def _late(view: View) -> Array:
+    """Time about the flight's middle, s: weather that does not change averages out of what is weighted by it."""
+    return np.asarray(view.record.time - view.record.time.mean())
+
+
+def _foretelling(view: View, given: Array) -> list[Array]:
+    """Signals (N, m) shaped, and weighted by time."""
+    return [*_shaped(view, given), *(_late(view) * series for series in given.T)]
+
+
+def _rung(view: View, given: Array) -> list[Array]:
+    """Signals (N, m) through each resonator, where it is and how fast it moves."""
+    found = []
+    for omega in 2.0 * np.pi * np.array(_RINGING):
+        for top in ([omega**2], [omega, 0.0]):
+            b, a = bilinear(top, [1.0, 2.0 * _DAMPING * omega, omega**2], view.simulator.rate)
+            found += [lfilter(b, a, series) for series in given.T]
+    return found
 
 
 def _shaped(view: View, given: Array) -> list[Array]:

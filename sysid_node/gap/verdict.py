@@ -14,9 +14,12 @@ from sysid_node.gap.attribute import Attribution
 from sysid_node.gap.belief import Cause
 from sysid_node.gap.deliberate import purposeful
 from sysid_node.gap.evidence import Evidence
+from sysid_node.gap.fit import Fit
 from sysid_node.gap.flown import BY_CHANCE
 from sysid_node.gap.holdout import Check
-from sysid_node.gap.view import View
+from sysid_node.gap.nuisance import CLOCKS
+from sysid_node.gap.spectra import power_of
+from sysid_node.gap.view import CHANNELS, View
 
 #: Probability from which an effect counts as told apart from its rivals.
 _TOLD_APART = 0.8
@@ -30,10 +33,7 @@ _CHANCE = 4.0
 #: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
 _EXPLAINED = 0.8
 
-#: Percentage of what could be closed of short flights, not fitted, that they must be able to close.
-_CLOSED = 50.0
-
-#: Percentage of what could be closed, below which derivatives within their tolerances surely do not close all of it.
+#: Percentage of what could be closed, below which what was found surely falls short of it.
 _ALL_BUT = 90.0
 
 #: Error beyond the noise, as a share of the motion, that derivatives within their tolerances may not leave.
@@ -54,8 +54,7 @@ def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) ->
         return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
-    short = check.flown is not None and check.flown.ci95[1] < _CLOSED  # most remains, whatever was found
-    if short or check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
+    if short(check) or check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
         return "unknown_effect"
     if unexplained(attribution) or wanting(attribution):
         return "unknown_effect"
@@ -81,10 +80,14 @@ def far_off(check: Check) -> bool:
     However much of the gap the derivatives close, where surely a tenth of the motion is left beyond the noise.
     """
     gap = check.flown
-    if gap is None:
-        return False
-    surely = gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > _LEFT**2
-    return surely or (gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT)
+    surely = gap is not None and gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > _LEFT**2
+    return surely or short(check)
+
+
+def short(check: Check) -> bool:
+    """Whether what was found surely falls short of what could be closed, by more than chance leaves."""
+    gap = check.flown
+    return gap is not None and gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT
 
 
 def unexplained(attribution: Attribution) -> bool:
@@ -97,8 +100,8 @@ def unexplained(attribution: Attribution) -> bool:
 
 def _structured(attribution: Attribution) -> NDArray[np.bool_]:
     """Channels (12,) on which structure that matters is left."""
-    left, size = attribution.left, np.sqrt(_structure_left(attribution))
-    return np.asarray((left.deviations > _DEVIATIONS) & (size > NOTICED))
+    power, noticed = _structure_left(attribution), NOTICED**2 + _sampling(attribution.chosen.fit)
+    return np.asarray((attribution.left.deviations > _DEVIATIONS) & (power > noticed))
 
 
 def explained(attribution: Attribution) -> float:
@@ -115,6 +118,21 @@ def _structure_left(attribution: Attribution) -> Array:
     left, evidence = attribution.left, attribution.chosen.evidence
     share = np.where(left.deviations > _CHANCE, left.share, 0.0)
     return np.asarray(share * power_left(evidence) / _motion(evidence))
+
+
+def _sampling(fit: Fit) -> Array:
+    """Power (12,) that stamps leave which are off by chance within a sample, as shares of the motion.
+
+    A step in a command falls anywhere between two messages, each time elsewhere: no clock's error is it, and coherent
+    with the commands it is.
+    """
+    left, motion = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
+    for view, point in zip(fit.views, fit.points, strict=True):
+        rates = np.array([view.flight.actuator_rate, view.flight.air_rate])
+        slopes = view.slopes(point, [view.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
+        left += sum(power_of(slopes[..., i]) / (12.0 * rate**2) for i, rate in enumerate(rates))
+        motion += (np.abs(view.measured[:, 1:]) ** 2).sum(axis=(0, 1))
+    return left / np.maximum(motion, 1e-300)
 
 
 def _motion(evidence: Evidence) -> Array:
