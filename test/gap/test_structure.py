@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
+from sysid_node.gap.deliberate import deliberate
 from sysid_node.gap.fit import _root
-from sysid_node.gap.structure import Structure
+from sysid_node.gap.structure import Structure, commands, ringing
+from sysid_node.gap.view import View
 
 DIRECTIONS, ROWS = 37, 400
 
@@ -40,3 +43,18 @@ def test_information_that_rounding_makes_singular_has_a_factor() -> None:
     np.testing.assert_allclose(root.T @ root, alike, atol=1e-9)
     clear = np.array([[1.0, 0.5], [0.5, 1.0]])
     np.testing.assert_array_equal(_root(clear), np.linalg.cholesky(clear).T)
+
+
+def foretold(table: np.ndarray, series: np.ndarray) -> float:
+    """Share of a series' power that the signals of a table hold."""
+    left = series - table @ np.linalg.lstsq(table, series, rcond=None)[0]
+    return float(1.0 - left.var() / series.var())
+
+
+def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_view: View) -> None:
+    """An oscillator at 1.15 Hz, between two of the resonators, of damping 0.08, driven by the elevator's command."""
+    omega, damping, rate = 2.0 * np.pi * 1.15, 0.08, plain_view.simulator.rate
+    given = deliberate(plain_view).all[:, 0]
+    rung = lsim(([omega**2], [1.0, 2.0 * damping * omega, omega**2]), given - given[0], np.arange(given.size) / rate)[1]
+    assert foretold(ringing(plain_view)[0], rung - rung.mean()) > 0.9
+    assert foretold(commands(plain_view)[0], rung - rung.mean()) < 0.75

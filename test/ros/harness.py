@@ -38,6 +38,7 @@ class Probe:
         self.estimates: list[Any] = []
         self.gaps: list[Any] = []
         self.diagnostics: dict[str, Any] = {}
+        self.clients: dict[str, Any] = {}
         self.imu = self.node.create_publisher(Imu, "imu/data", 100)
         self.air_data = self.node.create_publisher(AirData, "air_data", 100)
         self.actuators = self.node.create_publisher(JointState, "actuators", 100)
@@ -117,12 +118,14 @@ class Probe:
         self.actuators.publish(JointState(header=header, name=list(names), position=list(positions)))
 
     def ask(self, kind: Any, name: str, request: Any = None) -> Any:
-        """A service's answer."""
-        client = self.node.create_client(kind, name)
-        assert client.wait_for_service(timeout_sec=10.0), name
+        """A service's answer; what is asked first waits until the server has found who asks, too."""
+        client = self.clients.get(name)
+        if client is None:
+            client = self.clients[name] = self.node.create_client(kind, name)
+            assert client.wait_for_service(timeout_sec=10.0), name
+            self.spin(0.5)
         future = client.call_async(request or kind.Request())
         rclpy.spin_until_future_complete(self.node, future, timeout_sec=10.0)
-        self.node.destroy_client(client)
         assert future.done(), f"{name} gave no answer"
         return future.result()
 
