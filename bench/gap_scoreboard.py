@@ -5,7 +5,7 @@
 Effects drawn at random are flown by plants in processes of their own, which hand over bags and an aircraft file; the
 label is sealed until the diagnosis is written. Finished cases are kept: the same command goes on where it stopped.
 ``--judge`` flies and diagnoses nothing more, and scores what is there. ``--ledger`` keeps what was judged, a line a
-case: cases in it are not flown again, and count.
+case: cases in it are not flown again, and count; a ledger holds one version of the diagnosis only.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any
 from evaluation.pages import publish
 from withheld import judging, ledger, scoreboard
 from withheld.closing import closed
-from withheld.drawing import FOREIGN, SETS, draw
+from withheld.drawing import FOREIGN, SETS, Case, draw
 
 
 def main() -> None:
@@ -41,11 +41,14 @@ def main() -> None:
         "--out", type=Path, default=Path("out/withheld"), help="where cases are kept (default: out/withheld)"
     )
     parser.add_argument("--ledger", type=Path, help="file of judged cases, to count and to add to")
+    parser.add_argument(
+        "--further", type=int, default=1, metavar="N", help="every Nth case flies three times more (default: 1)"
+    )
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     folder = args.out.resolve() / args.set
     judged, failed = [], []
-    known = ledger.read(args.ledger)
+    known = _known(args.ledger, more=not args.judge)
     for seed in range(args.first, args.first + args.cases):
         case = draw(args.set, seed)
         if (args.plants and case.plant not in args.plants) or (args.kinds and case.kind not in args.kinds):
@@ -54,13 +57,21 @@ def main() -> None:
             judged.append(known[seed])
             continue
         if not args.judge and not _over(args.until):
-            _finish(args.set, seed, folder, fly_only=args.fly)
+            _finish(args.set, case, folder, fly_only=args.fly, further=seed % args.further == 0)
         for fresh in _judged(args.set, folder, seed):
             judged.append(fresh)
             if args.ledger is not None:
                 ledger.add(args.ledger, fresh, list(ledger.weighed_by(fresh.label, _said(folder / str(seed)))))
         failed += [said for said in _failed(folder / str(seed)) if not said.startswith("diagnosis")]
     publish(f"bench/gap_scoreboard.py {args.set}", scoreboard.page(judged, failed), args.page)
+
+
+def _known(path: Path | None, *, more: bool) -> dict[int, judging.Judged]:
+    """The cases of a ledger; ``more``: to which this version's are to be added."""
+    try:
+        return ledger.read(path, ledger.version() if more else None)
+    except ValueError as error:
+        sys.exit(f"gap_scoreboard: {error}")
 
 
 def _failed(case: Path) -> list[str]:
@@ -72,8 +83,9 @@ def _over(until: str | None) -> bool:
     return until is not None and time.strftime("%H:%M") >= until
 
 
-def _finish(which: str, seed: int, folder: Path, *, fly_only: bool) -> None:
+def _finish(which: str, truth: Case, folder: Path, *, fly_only: bool, further: bool) -> None:
     """Flies and diagnoses a case as far as it is not done; a line on how it went."""
+    seed = truth.seed
     out = folder / str(seed) / "out"
     if (out / "gap.json").exists() or (folder / str(seed) / "failed.txt").exists():
         return
@@ -92,8 +104,7 @@ def _finish(which: str, seed: int, folder: Path, *, fly_only: bool) -> None:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     (case / "seconds.txt").write_text(f"{seconds:.1f}\n", encoding="utf-8")
-    truth = draw(which, seed)
-    if truth.plant != FOREIGN and truth.kind != "unlisted":  # what the simulator can fly as it is
+    if further and truth.plant != FOREIGN and truth.kind != "unlisted":  # what the simulator can fly as it is
         _run([sys.executable, "-m", "withheld.covering", which, str(seed), str(folder)], folder, seed, "covering")
     for judged in _judged(which, folder, seed):
         print(seed, judging.line(judged), flush=True)

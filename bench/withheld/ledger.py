@@ -1,12 +1,20 @@
-"""Judged cases kept as lines of a file, so that a set can be gone on with where its bags are no more."""
+"""Judged cases kept as lines of a file, so that a set can be gone on with where its bags are no more.
+
+Each line holds the version of the diagnosis that was judged: a digest of the sources that decide. A set is one
+version's, or it says nothing of any.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
+
+import sysid_node
 
 from . import judging
 from .judging import Judged
@@ -18,18 +26,38 @@ Weighed = tuple[str, float, float, bool]
 _GAP = ("before", "after", "noise_floor", "shrink_percent", "ci95")
 
 
-def read(path: Path | None) -> dict[int, Judged]:
-    """The cases of a file by seed; none where there is no file."""
+#: Packages whose sources decide what a diagnosis says.
+_DECIDING = ("aircraft", "flight", "gap", "sim")
+
+
+@cache
+def version() -> str:
+    """Digest of the sources that decide what a diagnosis says."""
+    root = Path(sysid_node.__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(path for name in _DECIDING for path in (root / name).rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]
+
+
+def read(path: Path | None, wanted: str | None = None) -> dict[int, Judged]:
+    """The cases of a file by seed; none where there is no file.
+
+    Raises ValueError where they are of several versions, or not of the one wanted.
+    """
     if path is None or not path.exists():
         return {}
-    rows = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    versions = {row["version"] for row in rows} | ({wanted} if wanted else set())
+    if len(versions) > 1:
+        raise ValueError(f"{path}: cases of versions {', '.join(sorted(versions))}; a set is one's: take another file")
     return {int(row["label"]["seed"]): _judged(row) for row in rows}
 
 
 def add(path: Path, judged: Judged, weighed: list[Weighed]) -> None:
     """Adds a case at the end of a file."""
     row = asdict(replace(judged, gap={name: judged.gap[name] for name in _GAP if name in judged.gap}))
-    row["weighed"] = weighed
+    row["weighed"], row["version"] = weighed, version()
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row, ensure_ascii=False) + "\n")
 

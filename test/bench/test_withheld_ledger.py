@@ -41,3 +41,15 @@ def test_a_diagnosis_that_failed_is_kept_as_wrong(tmp_path: Path) -> None:
     ledger.add(file, judging.judge(LABEL, judging.FAILURE), list(ledger.weighed_by(LABEL, judging.FAILURE)))
     assert not ledger.read(file)[7].right
     assert json.loads(file.read_text())["weighed"] == []
+
+
+def test_a_ledger_holds_one_version(tmp_path: Path, judged: judging.Judged, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "final.jsonl"
+    ledger.add(file, judged, [])
+    assert list(ledger.read(file, ledger.version())) == [7]
+    with pytest.raises(ValueError, match=r"cases of versions \w+, \w+; a set is one's"):
+        ledger.read(file, "0" * 12)
+    monkeypatch.setattr(ledger, "version", lambda: "f" * 12)
+    ledger.add(file, replace(judged, label={**LABEL, "seed": 8}), [])
+    with pytest.raises(ValueError, match="take another file"):
+        ledger.read(file)
