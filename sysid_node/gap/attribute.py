@@ -40,6 +40,8 @@ class Attribution:
     doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
     table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
+    unseen: tuple[View, ...] = ()  # flights held out, and what is allowed for in each
+    own: tuple[Nuisances, ...] = ()
     beside: Fit | None = None  # what the sizes are from, where the corrected fit has the file's derivatives
 
     @property
@@ -74,14 +76,14 @@ class Attribution:
         """Without the cause that is the least probable."""
         weakest = min(self.causes, key=lambda cause: cause.probability)
         fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
-        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None, left=structure_left(fit),
-                       causes=causes)  # fmt: skip
+        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None,
+                       left=structure_left(fit, self.unseen, self.own), causes=causes)  # fmt: skip
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
         corrected = unbiased(self.base.fit)
         return replace(self, chosen=self.base, corrected=corrected, beside=None,
-                       left=structure_left(self.base.fit), causes=())  # fmt: skip
+                       left=structure_left(self.base.fit, self.unseen, self.own), causes=())  # fmt: skip
 
 
 def attribute(
@@ -109,9 +111,10 @@ def attribute(
     progress(0.8, "whether another effect would do as well")
     late = [candidate for candidate in candidates if candidate.effect in BETWEEN]
     chosen, causes, doubted = believed(trier, base, chosen, stages, late)
-    before, left = structure_of(base.fit, chosen.fit), structure_left(chosen.fit)
+    before, left = structure_of(base.fit, chosen.fit), structure_left(chosen.fit, unseen, own)
     ranked, corrected = _ranked(base, stages[0]), unbiased(chosen.fit)
-    return Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
+    found = Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
+    return replace(found, unseen=tuple(unseen), own=tuple(own))
 
 
 def _share_of(progress: Progress, count: int) -> Progress:

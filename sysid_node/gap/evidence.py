@@ -12,13 +12,13 @@ more than so many independent observations can say (Yao, Vehtari, Simpson & Gelm
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.fit import Fit, amplitudes, moved, real_rows, residual_power, solve, weights
+from sysid_node.gap.fit import Fit, amplitudes, linearised, moved, real_rows, residual_power, solve, weights
 from sysid_node.gap.nuisance import WIDENED, Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, View
@@ -159,6 +159,14 @@ def carried(fit: Fit, view: View) -> Array:
     carried = [*fit.indices, *shared]
     point[carried] = fit.points[0][carried]
     return np.asarray(point)
+
+
+def upon(fit: Fit, view: View, nuisances: Nuisances) -> Fit:
+    """The fit as it stands on a flight that it has not seen, all unknowns and their priors about there."""
+    kept = nuisances.without(fit.effects, view.simulator.names, fit.widened)
+    point = carried(fit, view)
+    power = residual_power(view, view.residual(point))
+    return linearised(replace(fit, views=(view,), nuisances=kept, points=(point,), power=(power,)))
 
 
 def written(fit: Fit, point: Array) -> Array:

@@ -10,7 +10,7 @@ model of the aircraft beats.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -19,9 +19,14 @@ from scipy.signal import bilinear, lfilter
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import prior
 from sysid_node.gap.deliberate import deliberate
+from sysid_node.gap.evidence import upon
 from sysid_node.gap.fit import Fit, bounded, real_rows, room, weights
+from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
+
+#: Standard deviations above chance below which coherence is taken as chance.
+CHANCE = 4.0
 
 #: Time constants through which commands act, s; zero is directly.
 _LAGS = (0.0, 0.06, 0.2, 0.6)
@@ -63,12 +68,24 @@ class Structure:
         return np.asarray(self.coherent / np.maximum(self.total, 1e-300))
 
 
-def structure_left(fit: Fit) -> Structure:
-    """Of a fit's remainder, by channel as the more telling of two tests has it: ``instruments`` and ``ringing``."""
-    usual, rings = structure_of(fit), structure_of(fit, by=ringing)
-    more = rings.deviations > usual.deviations
+def structure_left(fit: Fit, unseen: Sequence[View] = (), own: Sequence[Nuisances] = ()) -> Structure:
+    """Of a fit's remainder, and of that on flights held out, with what is allowed for in each.
+
+    By channel as ``instruments`` see it, or ``ringing`` where that sees more and beyond chance.
+    """
+    fits = [fit, *(upon(fit, view, theirs) for view, theirs in zip(unseen, own, strict=True))]
+    usual, rings = (pooled([structure_of(f, by=by) for f in fits]) for by in (instruments, ringing))
+    more = rings.deviations > np.maximum(usual.deviations, CHANCE)
     found = {f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(Structure)}
     return Structure(**found)
+
+
+def pooled(parts: Sequence[Structure]) -> Structure:
+    """Structure of several flights: what is in all of them adds up, chance does not."""
+    beyond, total, chance, noise = (np.array([getattr(part, f.name) for part in parts]) for f in fields(Structure))
+    weight = chance**2 / (chance**2).sum(axis=0)
+    return Structure(beyond.sum(axis=0), total.sum(axis=0), np.sqrt((chance**2).sum(axis=0)),
+                     (weight * noise).sum(axis=0))  # fmt: skip
 
 
 def structure_of(fit: Fit, like: Fit | None = None, by: Instruments | None = None) -> Structure:

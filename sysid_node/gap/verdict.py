@@ -19,6 +19,7 @@ from sysid_node.gap.flown import BY_CHANCE
 from sysid_node.gap.holdout import Check
 from sysid_node.gap.nuisance import CLOCKS
 from sysid_node.gap.spectra import power_of
+from sysid_node.gap.structure import CHANCE
 from sysid_node.gap.view import CHANNELS, View
 
 #: Probability from which an effect counts as told apart from its rivals.
@@ -26,9 +27,6 @@ _TOLD_APART = 0.8
 
 #: Standard deviations above chance from which what is left on some axis is structure, of twelve axes.
 _DEVIATIONS = 4.5
-
-#: Standard deviations above chance below which coherence is taken as chance.
-_CHANCE = 4.0
 
 #: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
 _EXPLAINED = 0.8
@@ -116,7 +114,7 @@ def explained(attribution: Attribution) -> float:
 def _structure_left(attribution: Attribution) -> Array:
     """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
     left, evidence = attribution.left, attribution.chosen.evidence
-    share = np.where(left.deviations > _CHANCE, left.share, 0.0)
+    share = np.where(left.deviations > CHANCE, left.share, 0.0)
     return np.asarray(share * power_left(evidence) / _motion(evidence))
 
 
