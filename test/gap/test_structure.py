@@ -6,7 +6,7 @@ from scipy.signal import lsim
 
 from sysid_node.gap.deliberate import deliberate
 from sysid_node.gap.fit import _root
-from sysid_node.gap.structure import Structure, commands, ringing
+from sysid_node.gap.structure import Structure, commands, pooled, ringing
 from sysid_node.gap.view import View
 
 DIRECTIONS, ROWS = 37, 400
@@ -35,6 +35,19 @@ def test_structure_in_strong_noise_is_still_seen() -> None:
     random = np.random.default_rng(5)
     found = np.array([measured(random, 1.8, structure=4.0).deviations[0] for _ in range(200)])
     assert np.median(found) > 4.5
+
+
+def test_flights_pooled_leave_chance_as_it_is_and_add_up_what_is_in_both() -> None:
+    random = np.random.default_rng(6)
+    chance = np.array([pooled([measured(random, 1.8), measured(random, 1.0)]).deviations[0] for _ in range(2000)])
+    assert abs(chance.mean()) < 0.2
+    assert chance.std() == pytest.approx(1.0, abs=0.15)
+    alone, both = [], []
+    for _ in range(200):
+        flights = [measured(random, 1.2, structure=1.0) for _ in range(2)]
+        alone.append(flights[0].deviations[0])
+        both.append(pooled(flights).deviations[0])
+    assert np.mean(both) == pytest.approx(np.sqrt(2.0) * np.mean(alone), rel=0.1)
 
 
 def test_information_that_rounding_makes_singular_has_a_factor() -> None:
