@@ -71,9 +71,11 @@ class Structure:
 def structure_left(fit: Fit, unseen: Sequence[View] = (), own: Sequence[Nuisances] = ()) -> Structure:
     """Of a fit's remainder, and of that on flights held out, with what is allowed for in each.
 
-    By channel as ``instruments`` see it, or ``ringing`` where that sees more and beyond chance.
+    By channel as ``instruments`` see it, or ``ringing`` where that sees more and beyond chance. A flight on which a
+    mode feeds itself without end is left out.
     """
-    fits = [fit, *(upon(fit, view, theirs) for view, theirs in zip(unseen, own, strict=True))]
+    there = [fit, *(upon(fit, view, theirs) for view, theirs in zip(unseen, own, strict=True))]
+    fits = [f for f in there if f.information is not None and np.isfinite(f.information).all()]
     usual, rings = (pooled([structure_of(f, by=by) for f in fits]) for by in (instruments, ringing))
     more = rings.deviations > np.maximum(usual.deviations, CHANCE)
     found = {f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(Structure)}

@@ -71,7 +71,7 @@ class Trier:
         def work() -> dict[str, list[float]]:
             problem = Projected(current.fit)
             looks = _spread(
-                lambda candidate: _first_look(current.fit, problem, candidate),
+                lambda candidate: _first_look_or_none(current.fit, problem, candidate),
                 fresh,
                 lambda s: progress(0.5 * s, "a first look at every effect"),
             )
@@ -164,6 +164,14 @@ def _spread(
             done.append(result)
             progress(len(done) / len(over))
     return done
+
+
+def _first_look_or_none(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
+    """The first look; infinitely much is left where no numbers come of it, as upon a mode that feeds itself."""
+    try:
+        return _first_look(fit, problem, candidate)
+    except np.linalg.LinAlgError:
+        return np.inf, candidate, candidate.starts[0]
 
 
 def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
