@@ -47,5 +47,9 @@ def test_what_gives_no_numbers_is_no_explanation(plain_view, monkeypatch) -> Non
     trier = Trier(nuisances, Steps())
     base = trier.trial(blank([plain_view], nuisances), [])
     (candidate,) = (c for c in candidates_of(plain_view.simulator, [plain_view]) if c.label == "command_delay")
-    monkeypatch.setattr(module, "judged", endless)
-    assert trier.upon(base, (0.0, candidate, (0.02,))) is None
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "judged", endless)
+        assert trier.upon(base, (0.0, candidate, (0.02,))) is None
+    monkeypatch.setattr(module, "_first_look", endless)
+    ((left, looked_at, _),) = trier.looks(base, [candidate], lambda share, text: None)
+    assert left == np.inf and looked_at is candidate

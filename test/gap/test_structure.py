@@ -1,12 +1,16 @@
 """When coherence is structure; truth: Monte Carlo of noise that is stronger than the level it is counted in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
+from sysid_node.gap import structure
 from sysid_node.gap.deliberate import deliberate
-from sysid_node.gap.fit import _root
-from sysid_node.gap.structure import Structure, commands, pooled, ringing
+from sysid_node.gap.fit import _root, blank, polish
+from sysid_node.gap.nuisance import nuisances_of
+from sysid_node.gap.structure import Structure, commands, pooled, ringing, structure_left
 from sysid_node.gap.view import View
 
 DIRECTIONS, ROWS = 37, 400
@@ -71,3 +75,17 @@ def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_vie
     rung = lsim(([omega**2], [1.0, 2.0 * damping * omega, omega**2]), given - given[0], np.arange(given.size) / rate)[1]
     assert foretold(ringing(plain_view)[0], rung - rung.mean()) > 0.9
     assert foretold(commands(plain_view)[0], rung - rung.mean()) < 0.75
+
+
+def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_view: View, monkeypatch) -> None:
+    """As where a mode feeds itself without end on a flight held out, but not on the one that was fitted."""
+    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
+    fit = polish(blank([plain_view], nuisances), rounds=1)
+    alone = structure_left(fit)
+    endless = replace(fit, information=np.full_like(fit.information, np.nan))
+    monkeypatch.setattr(structure, "upon", lambda *_: endless)
+    np.testing.assert_array_equal(structure_left(fit, [plain_view], [nuisances]).deviations, alone.deviations)
+    monkeypatch.setattr(structure, "upon", lambda *_: fit)  # seen twice
+    again = structure_left(fit, [plain_view], [nuisances])
+    np.testing.assert_allclose(again.beyond, 2.0 * alone.beyond)
+    np.testing.assert_allclose(again.share, alone.share)
