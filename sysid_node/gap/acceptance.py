@@ -103,11 +103,14 @@ def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
     """Power (12,) that comes back when what a trial has more than another is taken away, the others as they are.
 
     As a share of what nuisances alone leave, which do their best. The others would bend to hold what is gone: a lag
-    twice as long for an engine half as strong.
+    twice as long for an engine half as strong. Where the others alone grow without end, so does what comes back.
     """
     kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
     lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
-    points = Projected(lacking).points(lacking.values)
+    try:
+        points = Projected(lacking).points(lacking.values)
+    except np.linalg.LinAlgError:
+        return np.full(len(CHANNELS), np.inf)
     back, now, whole = (_powers(trial.fit, some) for some in (points, trial.fit.points, base.fit.points))
     return np.asarray(np.max((back - now) / np.maximum(whole, 1e-300), axis=0))
 

@@ -227,6 +227,8 @@ def _one_round(fit: Fit) -> Fit:
     if values.size:
         low, high = bounds(fit.views[0].simulator, fit.indices)
         start = np.clip(problem.together(values, low, high), low + 1e-9, high - 1e-9)
+        if not np.isfinite(problem.ahead(start)).all():
+            raise np.linalg.LinAlgError("the prediction grows without end")  # as slopes that do
         scale = fit.views[0].simulator.scales[list(fit.indices)]
         solution = least_squares(
             problem.ahead, start, problem.jacobian, bounds=(low, high), x_scale=scale, max_nfev=_EVALUATIONS,

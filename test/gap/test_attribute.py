@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap import acceptance
 from sysid_node.gap import trials as module
 from sysid_node.gap.attribute import attribute
 from sysid_node.gap.candidates import candidates_of
-from sysid_node.gap.fit import blank
+from sysid_node.gap.fit import Projected, blank, polish
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.steps import Steps
 from sysid_node.gap.trials import Trier
@@ -53,3 +54,23 @@ def test_what_gives_no_numbers_is_no_explanation(plain_view, monkeypatch) -> Non
     monkeypatch.setattr(module, "_first_look", endless)
     ((left, looked_at, _),) = trier.looks(base, [candidate], lambda share, text: None)
     assert left == np.inf and looked_at is candidate
+
+
+def test_what_is_needed_lest_the_others_grow_without_end_contributes_without_end(weak_and_slow, monkeypatch) -> None:
+    """Where the others alone give no numbers, that is no error of the diagnosis."""
+
+    def endless(*args: object) -> None:
+        raise np.linalg.LinAlgError("not positive definite")
+
+    base, chosen = weak_and_slow.base, weak_and_slow.chosen
+    assert np.isfinite(acceptance._contributed(base, base, chosen)).all()
+    monkeypatch.setattr(acceptance, "Projected", endless)
+    assert np.isinf(acceptance._contributed(base, base, chosen)).all()
+
+
+def test_a_fit_that_begins_where_nothing_is_finite_ends_as_one_without_numbers(weak_and_slow, monkeypatch) -> None:
+    """SciPy's own error for it would end the diagnosis."""
+    fit = weak_and_slow.chosen.fit
+    monkeypatch.setattr(Projected, "ahead", lambda self, values: np.full(self.matrix.shape[0], np.inf))
+    with pytest.raises(np.linalg.LinAlgError, match="grows without end"):
+        polish(fit, rounds=1)

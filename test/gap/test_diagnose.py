@@ -51,15 +51,15 @@ def test_effects_that_surely_leave_a_part_of_the_gap_open_do_not_explain_it(lagg
         assert verdict_of(lagging.views, lagging.attribution, check) == verdict
 
 
-def test_what_sampling_leaves_is_what_half_a_sample_early_and_late_leave_on_average(lagging) -> None:
-    """Truth: the prediction itself, of stamps drawn anywhere within a sample (no slope)."""
+def test_what_sampling_leaves_is_what_its_standard_deviation_of_a_delay_leaves(lagging) -> None:
+    """Truth: the prediction itself, its commands and air data moved by 1 / sqrt(12) of a sample, without a slope."""
     fit = lagging.attribution.chosen.fit
     (view,), (point,) = fit.views, fit.points
     shifted = np.zeros(6)
     for clock in ("actuator_stamp_delay.delay", "air_data_delay.delay"):
-        drawn = point.copy()
-        drawn[view.simulator.names.index(clock)] += 0.01 / np.sqrt(12.0)  # a sample's standard deviation, s
-        shifted += np.sum(np.abs(view.predicted(drawn) - view.predicted(point))[:, 1:, :6] ** 2, axis=(0, 1))
+        late = point.copy()
+        late[view.simulator.names.index(clock)] += 0.01 / np.sqrt(12.0)  # s
+        shifted += np.sum(np.abs(view.predicted(late) - view.predicted(point))[:, 1:, :6] ** 2, axis=(0, 1))
     motion = np.sum(np.abs(view.measured)[:, 1:, :6] ** 2, axis=(0, 1))
     np.testing.assert_allclose(_sampling(fit)[:6], shifted / motion, rtol=0.2)
 
