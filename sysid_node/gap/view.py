@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flights import Flight
-from sysid_node.gap.kinematics import READINGS, Motion, flow_of, motion_of, reconstruct
+from sysid_node.gap.kinematics import READINGS, Flow, Motion, flow_of, motion_of, reconstruct
 from sysid_node.gap.recent import Recent
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator, parameters
@@ -47,6 +47,9 @@ _BLOCK = 500
 
 _Kept = TypeVar("_Kept")
 
+#: Of layout, model, parameters (P,), what a flight gives, and the flow: a series (N, 6).
+Expected = Callable[..., Scalar]
+
 
 class Memory(NamedTuple):
     """How long what the inertial instruments tell of the air's motion is remembered, s."""
@@ -65,18 +68,31 @@ class Given(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def _forces(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
-    """Coefficients (N, 6) that parameters (P,) expect."""
+def _flow(layout: Layout, model: Model, theta: Scalar, given: Given) -> Flow | None:
+    """The flow by the inertial instruments, which ``kinematic`` parameters alone move; none without attitude."""
+    if given.motion is None:
+        return None
+    chain = Chain.of(layout, model, theta, given.step, jnp.zeros(()))
+    return flow_of(chain, given.motion, given.memory.vane)
+
+
+@partial(jax.jit, static_argnums=0)
+def _forces_in(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Scalar:
+    """Coefficients (N, 6) that parameters (P,) expect in a flow that is known."""
     signals = given.signals
-    if given.motion is not None:
-        chain = Chain.of(layout, model, theta, given.step, jnp.zeros(()))
-        flow = flow_of(chain, given.motion, given.memory.vane)
+    if flow is not None:
         signals = signals._replace(velocity=flow.velocity, alpha_rate=flow.alpha_rate)
     return coefficients(model, given.signals, predict(layout, model, theta, signals, given.step))
 
 
+def _forces(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Scalar:
+    """The same where the parameters move the flow, too."""
+    forces: Scalar = _forces_in(layout, model, theta, given, _flow(layout, model, theta, given))
+    return forces
+
+
 @partial(jax.jit, static_argnums=0)
-def _readings(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
+def _readings(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Scalar:
     """Air data and attitude (N, 6) that parameters (P,) expect; nothing without attitude."""
     if given.motion is None:
         return jnp.zeros((given.signals.density.size, len(READINGS)))
@@ -85,12 +101,14 @@ def _readings(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scal
 
 @partial(jax.jit, static_argnums=(0, 1))
 def _changes(
-    expected: Callable[..., Scalar], layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given
+    expected: Expected, layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given, flow: Flow | None
 ) -> tuple[Scalar, Scalar]:
     """What is expected (N, 6), and d expected along each of the directions (K, P): (N, 6, K)."""
 
     def along(direction: Scalar) -> tuple[Scalar, Scalar]:
-        slope: tuple[Scalar, Scalar] = jax.jvp(lambda t: expected(layout, model, t, given), (theta,), (direction,))
+        slope: tuple[Scalar, Scalar] = jax.jvp(
+            lambda t: expected(layout, model, t, given, flow), (theta,), (direction,)
+        )
         return slope
 
     values, slopes = jax.vmap(along, out_axes=(None, 2))(directions)
@@ -98,7 +116,7 @@ def _changes(
 
 
 @partial(jax.jit, static_argnums=0)
-def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: Given) -> Scalar:
+def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Scalar:
     """d coefficients / d each of the file's derivatives, (N, 6, D).
 
     The same as along ``derivative_error``, at a quarter of the cost: no slope of the flow, the actuators or the
@@ -106,7 +124,7 @@ def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: G
     """
 
     def forces(derivatives: Scalar) -> Scalar:
-        expected: Scalar = _forces(layout, model._replace(derivatives=derivatives), theta, given)
+        expected: Scalar = _forces_in(layout, model._replace(derivatives=derivatives), theta, given, flow)
         return expected
 
     slopes: Scalar = jax.jacfwd(forces)(model.derivatives)
@@ -132,6 +150,7 @@ class View:
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, as the aircraft file has it
     _forces: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
     _slopes: Recent[Complex] = field(default_factory=lambda: Recent(_SLOPES), init=False, repr=False, compare=False)
+    _flows: Recent[Flow | None] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
     _once: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     _readings: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
 
@@ -149,12 +168,12 @@ class View:
 
     def predicted_series(self, theta: Array) -> Array:
         """Channels (N, 12) that parameters (P,) expect."""
-        return np.concatenate([self._series(_forces, theta), self._series(_readings, theta)], axis=1)
+        return np.concatenate([self._series(_forces_in, theta), self._series(_readings, theta)], axis=1)
 
     def predicted(self, theta: Array) -> Complex:
         """The same by window and line, (W, L, 12)."""
         known = self._forces.get(theta.tobytes())
-        forces = self.windows.transform(self._series(_forces, theta)) if known is None else known
+        forces = self.windows.transform(self._series(_forces_in, theta)) if known is None else known
         key = theta[kinematic(self.simulator.layout)].tobytes()
         readings = self._readings.get(key)
         if readings is None:
@@ -187,27 +206,40 @@ class View:
         if linear:
             by_derivative = self._slopes_by_derivative(theta)
             slopes[:, :, :forces, linear] = by_derivative[..., [own[indices[k]] for k in linear]]
-        for some in _lanes(others):
-            slopes[:, :, :forces, some] = self._slopes_along(_forces, theta, [indices[k] for k in some])
+        for expected, some in _shared(others, [indices[k] in kinematic(layout) for k in others]):
+            slopes[:, :, :forces, some] = self._slopes_along(expected, theta, [indices[k] for k in some])
         slopes[:, :, forces:] = self.slopes_of_readings(theta, indices)
         return np.asarray(slopes * self.axes[:, None])
 
-    def _series(self, expected: Callable[..., Scalar], theta: Array) -> Array:
-        """One of ``_forces`` and ``_readings`` (N, 6) at parameters (P,)."""
+    def _flow(self, theta: Array) -> Flow | None:
+        """The flow at parameters (P,), as long as none moves it."""
+        s, key = self.simulator, theta[kinematic(self.simulator.layout)].tobytes()
+        known = self._flows.get(key)
+        return (
+            self._flows.keep(key, _flow(s.layout, s.model, jnp.asarray(theta), self.given)) if known is None else known
+        )
+
+    def _series(self, expected: Expected, theta: Array) -> Array:
+        """One of ``_forces_in`` and ``_readings`` (N, 6) at parameters (P,)."""
         s = self.simulator
-        return np.asarray(expected(s.layout, s.model, jnp.asarray(theta), self.given))[: len(self.record)]
+        series = expected(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
+        return np.asarray(series)[: len(self.record)]
 
     def _slopes_by_derivative(self, theta: Array) -> Complex:
         """Of every derivative of the file, (W, L, 6, D); air data and attitude know of none."""
         s, samples = self.simulator, len(self.record)
-        changes = np.asarray(_changes_by_derivative(s.layout, s.model, jnp.asarray(theta), self.given))[:samples]
+        changes = np.asarray(
+            _changes_by_derivative(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
+        )[:samples]
         return self.windows.transform(changes)
 
-    def _slopes_along(self, expected: Callable[..., Scalar], theta: Array, indices: list[int]) -> Complex:
+    def _slopes_along(self, expected: Expected, theta: Array, indices: list[int]) -> Complex:
         """Of at most ``_LANES`` entries of the vector, (W, L, 6, K); what is expected is kept."""
         s, directions, samples = self.simulator, np.zeros((_LANES, len(theta))), len(self.record)
         directions[np.arange(len(indices)), indices] = 1.0
-        values, changes = _changes(expected, s.layout, s.model, jnp.asarray(theta), directions, self.given)
+        values, changes = _changes(
+            expected, s.layout, s.model, jnp.asarray(theta), directions, self.given, self._flow(theta)
+        )
         entries = kinematic(s.layout) if expected is _readings else slice(None)
         kept, key = (self._readings if expected is _readings else self._forces), theta[entries].tobytes()
         if kept.get(key) is None:
@@ -232,6 +264,15 @@ def kinematic(layout: Layout) -> list[int]:
 def _lanes(places: list[int]) -> Iterator[list[int]]:
     """As many at a time as are differentiated at once."""
     return (places[first : first + _LANES] for first in range(0, len(places), _LANES))
+
+
+def _shared(places: list[int], moving: list[bool]) -> Iterator[tuple[Expected, list[int]]]:
+    """The same, with what to differentiate: those that move the flow first, for without them it need not be."""
+    first = [place for place, moves in zip(places, moving, strict=True) if moves]
+    rest = [place for place, moves in zip(places, moving, strict=True) if not moves]
+    return (
+        (_forces if i * _LANES < len(first) else _forces_in, some) for i, some in enumerate(_lanes([*first, *rest]))
+    )
 
 
 def bare(

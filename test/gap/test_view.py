@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sysid_node.gap import view
 from sysid_node.gap.view import kinematic
 
 
@@ -32,6 +33,17 @@ def test_kinematics_depend_on_no_other_entries_than_those_named(plain_view) -> N
     np.testing.assert_array_equal(
         plain_view.predicted_series(changed)[:, 6:], plain_view.predicted_series(somewhere)[:, 6:]
     )
+
+
+def test_the_flow_is_moved_by_no_other_entries_than_those_named(plain_view) -> None:
+    """Slopes in a flow that is known are those of everything together; truth: JAX, through the flow."""
+    simulator = plain_view.simulator
+    point = simulator.neutral() + 0.01 * np.random.default_rng(0).random(len(simulator.names))
+    entries = np.setdiff1d(np.arange(len(simulator.names)), kinematic(simulator.layout)).tolist()
+    assert len(entries) > 60
+    for some in (entries[first : first + 3] for first in range(0, len(entries), 3)):
+        through, known = (plain_view._slopes_along(e, point, some) for e in (view._forces, view._forces_in))
+        np.testing.assert_allclose(known, through, atol=1e-12 * max(np.abs(through).max(), 1e-3))
 
 
 def test_what_is_kept_along_with_slopes_is_what_is_predicted(plain_view) -> None:
