@@ -7,7 +7,7 @@ so that each measurement counts once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from typing import Any, NamedTuple, TypeVar
@@ -23,9 +23,17 @@ from sysid_node.gap.kinematics import READINGS, Flow, Motion, flow_of, motion_of
 from sysid_node.gap.recent import Recent
 from sysid_node.gap.spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator, parameters
+from sysid_node.sim.body import Vector
 from sysid_node.sim.chain import Chain
 from sysid_node.sim.layout import Layout, Model, Scalar
-from sysid_node.sim.prediction import ACCELERATIONS, COEFFICIENTS, Signals, coefficients, predict, signals_of
+from sysid_node.sim.prediction import (
+    COEFFICIENTS,
+    Accelerations,
+    Signals,
+    coefficients,
+    predict,
+    signals_of,
+)
 
 #: What is compared.
 CHANNELS = (*COEFFICIENTS, *READINGS)
@@ -47,8 +55,10 @@ _BLOCK = 500
 
 _Kept = TypeVar("_Kept")
 
-#: Of layout, model, parameters (P,), what a flight gives, and the flow: a series (N, 6).
-Expected = Callable[..., Scalar]
+#: Of layout, model, parameters (P,), what a flight gives, and the flow: six channels (N,), put together outside of XLA,
+#: which would work all of them out for each entry of a table.
+Channels = Sequence[Scalar]
+Expected = Callable[..., Channels]
 
 
 class Memory(NamedTuple):
@@ -77,61 +87,64 @@ def _flow(layout: Layout, model: Model, theta: Scalar, given: Given) -> Flow | N
 
 
 @partial(jax.jit, static_argnums=0)
-def _forces_in(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Scalar:
-    """Coefficients (N, 6) that parameters (P,) expect in a flow that is known."""
+def _forces_in(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Channels:
+    """Coefficients that parameters (P,) expect in a flow that is known."""
     signals = given.signals
     if flow is not None:
         signals = signals._replace(velocity=flow.velocity, alpha_rate=flow.alpha_rate)
     return coefficients(model, given.signals, predict(layout, model, theta, signals, given.step))
 
 
-def _forces(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Scalar:
+def _forces(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Channels:
     """The same where the parameters move the flow, too."""
-    forces: Scalar = _forces_in(layout, model, theta, given, _flow(layout, model, theta, given))
+    forces: Channels = _forces_in(layout, model, theta, given, _flow(layout, model, theta, given))
     return forces
 
 
 @partial(jax.jit, static_argnums=0)
-def _readings(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Scalar:
-    """Air data and attitude (N, 6) that parameters (P,) expect; nothing without attitude."""
+def _readings(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Channels:
+    """Air data and attitude that parameters (P,) expect; nothing without attitude."""
     if given.motion is None:
-        return jnp.zeros((given.signals.density.size, len(READINGS)))
-    return reconstruct(layout, model, theta, given.motion, given.memory.observer, given.step)
+        return (jnp.zeros(given.signals.density.size),) * len(READINGS)
+    return tuple(reconstruct(layout, model, theta, given.motion, given.memory.observer, given.step).T)
 
 
 @partial(jax.jit, static_argnums=(0, 1))
 def _changes(
     expected: Expected, layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given, flow: Flow | None
-) -> tuple[Scalar, Scalar]:
-    """What is expected (N, 6), and d expected along each of the directions (K, P): (N, 6, K)."""
+) -> tuple[Channels, Channels]:
+    """What is expected (N,) by channel, and d expected along each of the directions (K, P): (N, K)."""
 
-    def along(direction: Scalar) -> tuple[Scalar, Scalar]:
-        slope: tuple[Scalar, Scalar] = jax.jvp(
+    def along(direction: Scalar) -> tuple[Channels, Channels]:
+        slope: tuple[Channels, Channels] = jax.jvp(
             lambda t: expected(layout, model, t, given, flow), (theta,), (direction,)
         )
         return slope
 
-    values, slopes = jax.vmap(along, out_axes=(None, 2))(directions)
+    values, slopes = jax.vmap(along, out_axes=(None, 1))(directions)
     return values, slopes
 
 
 @partial(jax.jit, static_argnums=0)
-def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Scalar:
-    """d coefficients / d each of the file's derivatives, (N, 6, D).
+def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Channels:
+    """d coefficients / d each of the file's derivatives, (N, D) each.
 
     The same as along ``derivative_error``, at a quarter of the cost: no slope of the flow, the actuators or the
     kinematics has to be carried along.
     """
 
-    def forces(derivatives: Scalar) -> Scalar:
-        expected: Scalar = _forces_in(layout, model._replace(derivatives=derivatives), theta, given, flow)
+    def forces(derivatives: Scalar) -> Channels:
+        expected: Channels = _forces_in(layout, model._replace(derivatives=derivatives), theta, given, flow)
         return expected
 
-    slopes: Scalar = jax.jacfwd(forces)(model.derivatives)
+    slopes: Channels = jax.jacfwd(forces)(model.derivatives)
     return slopes
 
 
 _reduced = jax.jit(coefficients)
+
+#: Of a record: what the inertial instruments showed.
+_ACCELERATIONS = (("ax", "ay", "az"), ("p_rate", "q_rate", "r_rate"))
 
 
 @dataclass(frozen=True)
@@ -223,15 +236,13 @@ class View:
         """One of ``_forces_in`` and ``_readings`` (N, 6) at parameters (P,)."""
         s = self.simulator
         series = expected(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
-        return np.asarray(series)[: len(self.record)]
+        return _table(series, len(self.record))
 
     def _slopes_by_derivative(self, theta: Array) -> Complex:
         """Of every derivative of the file, (W, L, 6, D); air data and attitude know of none."""
         s, samples = self.simulator, len(self.record)
-        changes = np.asarray(
-            _changes_by_derivative(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
-        )[:samples]
-        return self.windows.transform(changes)
+        changes = _changes_by_derivative(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
+        return self.windows.transform(_table(changes, samples))
 
     def _slopes_along(self, expected: Expected, theta: Array, indices: list[int]) -> Complex:
         """Of at most ``_LANES`` entries of the vector, (W, L, 6, K); what is expected is kept."""
@@ -243,8 +254,8 @@ class View:
         entries = kinematic(s.layout) if expected is _readings else slice(None)
         kept, key = (self._readings if expected is _readings else self._forces), theta[entries].tobytes()
         if kept.get(key) is None:
-            kept.keep(key, self.windows.transform(np.asarray(values)[:samples]))
-        return self.windows.transform(np.asarray(changes)[:samples, :, : len(indices)])
+            kept.keep(key, self.windows.transform(_table(values, samples)))
+        return self.windows.transform(_table(changes, samples)[:, :, : len(indices)])
 
 
 #: Of clocks and instruments, the effects that kinematics do not see: stamps of commands, and noise that has no value.
@@ -293,12 +304,17 @@ def _given(simulator: Simulator, record: FlightRecord, memory: Memory) -> tuple[
     signals, short = signals_of(simulator, record), -len(record) % _BLOCK
     motion = motion_of(record)
     signals, motion = (jax.tree.map(lambda x: _padded(x, short), parts) for parts in (signals, motion))
-    shown = _padded(np.column_stack([record[name] for name in ACCELERATIONS]), short)
-    forces = np.asarray(_reduced(simulator.model, signals, shown))[: len(record)]
+    shown = [Vector(*(_padded(record[name], short) for name in names)) for names in _ACCELERATIONS]
+    forces = _table(_reduced(simulator.model, signals, Accelerations(*shown)), len(record))
     read = jnp.zeros((len(shown), len(READINGS))) if motion is None else jnp.hstack([motion.air, motion.attitude])
     readings = np.asarray(read)[: len(record)]
     given = Given(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
     return given, np.concatenate([forces, readings], axis=1)
+
+
+def _table(channels: Channels, samples: int) -> Array:
+    """Channels (n, ...), n at least the samples N, as one (N, channels, ...)."""
+    return np.stack([np.asarray(channel)[:samples] for channel in channels], axis=1)
 
 
 def _padded(series: Scalar | Array, short: int) -> Scalar:

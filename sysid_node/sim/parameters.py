@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,8 +30,8 @@ def names(layout: Layout) -> tuple[str, ...]:
 def unpack(layout: Layout, theta: Scalar) -> dict[str, Values]:
     """The vector (P,) as effect -> parameter -> value."""
     values: dict[str, dict[str, Scalar]] = {}
-    for i, (effect, parameter) in enumerate(table(layout)):
-        values.setdefault(effect, {})[parameter.name] = theta[i]
+    for (effect, parameter), value in zip(table(layout), jnp.unstack(theta), strict=True):
+        values.setdefault(effect, {})[parameter.name] = value
     return dict(values)
 
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
@@ -32,16 +33,14 @@ from sysid_node.sim.layout import Layout, Model, Scalar
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import actuator, airflow, command, mass, propulsion, sensors, structure
 from sysid_node.sim.stations.actuator import ActuatorState
+from sysid_node.sim.stations.aerodynamics import Coefficients
 from sysid_node.sim.stations.airflow import Air
 from sysid_node.sim.timing import shift_cubic, slope
 
 Array = NDArray[np.float64]
 
-#: Columns of ``predict``: readings of the accelerometers (m/s^2), and the rates of the gyroscopes' (rad/s^2).
-ACCELERATIONS = ("ax", "ay", "az", "p_rate", "q_rate", "r_rate")
-
-#: Columns of ``coefficients``.
-COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
+#: What ``coefficients`` gives, in this order.
+COEFFICIENTS = Coefficients._fields
 
 
 class Signals(NamedTuple):
@@ -56,16 +55,21 @@ class Signals(NamedTuple):
     alpha_rate: Scalar | None = None  # (N,) rad/s, the same
 
 
+class Accelerations(NamedTuple):
+    """What the inertial instruments show, N samples: columns apart, for XLA would work each out for all of a table."""
+
+    force: Vector  # (N,) readings of the accelerometers, m/s^2
+    turning: Vector  # (N,) rates of the gyroscopes' readings, rad/s^2
+
+
 class _Memory(NamedTuple):
-    """What has to be carried along the record."""
+    """What commands and flow leave behind, whatever forces come of it."""
 
     actuators: ActuatorState
     motor: Scalar
     motor_command: Scalar
     separation: Scalar
     attached: Scalar
-    mode: Scalar  # (2,) displacement, speed
-    load: Scalar  # specific force along z
 
 
 class _Sample(NamedTuple):
@@ -80,21 +84,29 @@ class _Sample(NamedTuple):
     time: Scalar
 
 
-def predict(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Scalar:
-    """Accelerations (N, 6), columns ``ACCELERATIONS``, that parameters (P,) expect of these signals; pure."""
+def predict(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Accelerations:
+    """What parameters (P,) expect the instruments to show, given these signals; pure.
+
+    Only what remembers is carried along, sample by sample; forces and moments of all samples are worked out at once.
+    """
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
     samples = _true_motion(chain, signals)
-    first = jax.tree.map(lambda series: series[0], samples)
-    _, readings = jax.lax.scan(lambda m, s: _advance(chain, m, s), _start(chain, first), samples)
-    return shift_cubic(readings, chain.effects["imu_delay"]["delay"] / step)
+    driven = _driven(chain, samples)
+    shaken, _ = _accelerations(chain, driven, samples)
+    mode = _rung(chain, shaken.z)
+    samples = samples._replace(rates=_without_nod(chain, mode, samples.rates))
+    force, acceleration = _accelerations(chain, driven, samples)
+    readings = _readings(chain, samples.rates, force, acceleration, mode)
+    late = chain.effects["imu_delay"]["delay"] / step
+    delayed: Accelerations = jax.tree.map(lambda series: shift_cubic(series, late), readings)
+    return delayed
 
 
-def coefficients(model: Model, signals: Signals, accelerations: Scalar) -> Scalar:
-    """CL CD CY Cl Cm Cn (N, 6) about the file's CG, of accelerations (N, 6), by the aircraft file alone."""
-    rates, turning = Vector(*signals.rates.T), Vector(*accelerations[:, 3:].T)
+def coefficients(model: Model, signals: Signals, accelerations: Accelerations) -> Coefficients:
+    """Coefficients (N,) about the file's CG that the instruments show, by the aircraft file alone."""
+    rates, turning = Vector(*signals.rates.T), accelerations.turning
     imu, probe = Vector(*model.imu), Vector(*model.air_data)
-    at_imu = Vector(*accelerations[:, :3].T)
-    specific_force = at_imu.minus(turning.cross(imu)).minus(rates.cross(rates.cross(imu)))
+    specific_force = accelerations.force.minus(turning.cross(imu)).minus(rates.cross(rates.cross(imu)))
     velocity = airflow.velocity_of(*signals.air.T).minus(rates.cross(probe))
     speed, _, _ = airflow.flow_angles(velocity)
     thrust = propulsion.commanded(model, signals.commands[:, -1])
@@ -107,11 +119,11 @@ def coefficients(model: Model, signals: Signals, accelerations: Scalar) -> Scala
 
 def _non_dimensional(
     model: Model, density: Scalar, speed: Scalar, velocity: Vector, force: Vector, moment: Vector
-) -> Scalar:
+) -> Coefficients:
     scale = 1.0 / (0.5 * density * speed * speed * model.area)
     forward = jnp.sqrt(velocity.x * velocity.x + velocity.z * velocity.z)
     cos, sin = velocity.x / forward, velocity.z / forward
-    columns = (
+    return Coefficients(
         scale * (force.x * sin - force.z * cos),
         -scale * (force.x * cos + force.z * sin),
         scale * force.y,
@@ -119,7 +131,6 @@ def _non_dimensional(
         scale / model.chord * moment.y,
         scale / model.span * moment.z,
     )
-    return jnp.stack(columns, 1)
 
 
 def signals_of(simulator: Simulator, record: FlightRecord) -> Signals:
@@ -193,99 +204,123 @@ def _flow(sample: _Sample) -> Air:
     return Air(sample.velocity, sample.rates, speed, alpha, beta, sample.density)
 
 
+def _driven(chain: Chain, samples: _Sample) -> _Memory:
+    """The memory at each sample (N,), everything settled on the first."""
+    start = _start(chain, jax.tree.map(lambda series: series[0], samples))
+    _, unpack = ravel_pytree(start)
+
+    def advance(memory: _Memory, sample: _Sample) -> tuple[_Memory, Scalar]:
+        now = _advance(chain, memory, sample)
+        return now, ravel_pytree(now)[0]  # one row out: XLA would copy whole series at every step
+
+    _, rows = jax.lax.scan(advance, start, samples)
+    driven: _Memory = jax.vmap(unpack)(rows)
+    return driven
+
+
 def _start(chain: Chain, sample: _Sample) -> _Memory:
-    """Everything settled on the first sample."""
-    air = _flow(sample)
-    zero = jnp.zeros_like(air.alpha)
-    attached = stall_separation.attached(chain.effects["stall_separation"], air.alpha, zero, zero)
+    air, values = _flow(sample), chain.effects["stall_separation"]
+    attached = stall_separation.attached(values, air.alpha, jnp.zeros_like(air.alpha), jnp.zeros_like(air.alpha))
     motor = propulsion.commanded(chain.model, sample.command[-1])
-    actuators = actuator.start(chain.model, sample.command[:-1])
-    memory = _Memory(actuators, motor, motor, attached, attached, jnp.zeros(2), zero)
-    specific_force, _ = _acceleration(chain, memory, sample, air)
-    mode = jnp.stack(structure.start(chain.effects, specific_force.z))
-    return memory._replace(mode=mode, load=specific_force.z)
+    return _Memory(actuator.start(chain.model, sample.command[:-1]), motor, motor, attached, attached)
 
 
-def _advance(chain: Chain, memory: _Memory, sample: _Sample) -> tuple[_Memory, Scalar]:
-    """The memory at this sample, and the readings (6,) expected of it."""
-    h, sample = chain.step, sample._replace(rates=_without_nod(chain, memory, sample.rates))
-    air = _flow(sample)
+def _advance(chain: Chain, memory: _Memory, sample: _Sample) -> _Memory:
+    """One sample on."""
+    h, air = chain.step, _flow(sample)
     actuators = actuator.advance(chain.layout, chain.model, chain.effects, memory.actuators, sample.command[:-1], h)
     motor_command = propulsion.commanded(chain.model, sample.command[-1])
     motor = propulsion.advance(chain.effects, memory.motor, memory.motor_command, motor_command, h)
     values, time_scale = chain.effects["stall_separation"], chain.model.chord / air.speed
     attached = stall_separation.attached(values, air.alpha, sample.alpha_rate, time_scale)
     separation = first_order(values["tau1"] * time_scale, memory.separation, memory.attached, attached, h)
-    now = memory._replace(
-        actuators=actuators, motor=motor, motor_command=motor_command, separation=separation, attached=attached
-    )
-    specific_force, acceleration = _acceleration(chain, now, sample, air)
-    mode = _ring(chain, memory.mode, memory.load, specific_force.z)
-    readings = _readings(chain, sample.rates, specific_force, acceleration, mode)
-    return now._replace(mode=mode, load=specific_force.z), readings
+    return _Memory(actuators, motor, motor_command, separation, attached)
 
 
-def _without_nod(chain: Chain, memory: _Memory, rates: Vector) -> Vector:
-    """The body's rates without what the structural mode adds to the gyroscopes', its load held for one sample."""
-    mode = _ring(chain, memory.mode, memory.load, memory.load)
-    _, nod = structure.felt(chain.effects, mode[1], mode[1])
+@jax.jit  # traced once for both passes
+def _accelerations(chain: Chain, driven: _Memory, samples: _Sample) -> tuple[Vector, Vector]:
+    """Specific force at the CG (m/s^2) and angular acceleration (rad/s^2), each (N,)."""
+
+    def at(memory: _Memory, sample: _Sample) -> tuple[Vector, Vector]:
+        air = _flow(sample)
+        drive, _ = drive_of(chain, memory.actuators, memory.motor, jnp.zeros(6), sample.time)
+        load = steady_load(chain, air, drive, memory.separation, sample.climb)
+        load = unsteady_load(chain, air, load, sample.alpha_rate)
+        return mass.accelerations(chain.body, sample.rates, load.force, load.moment)
+
+    accelerations: tuple[Vector, Vector] = jax.vmap(at)(driven, samples)
+    return accelerations
+
+
+def _rung(chain: Chain, load: Scalar) -> Scalar:
+    """The structural mode (N, 2), displacement m and speed m/s, under a specific force (N,) along z, at rest first."""
+
+    def advance(mode: Scalar, loads: Scalar) -> tuple[Scalar, Scalar]:
+        now = _ring(chain, mode, loads[0], loads[1])
+        return now, now
+
+    loads = jnp.stack([jnp.concatenate([load[:1], load[:-1]]), load], 1)
+    _, mode = jax.lax.scan(advance, jnp.stack(structure.start(chain.effects, load[0])), loads)
+    return mode
+
+
+def _without_nod(chain: Chain, mode: Scalar, rates: Vector) -> Vector:
+    """The body's rates (N,) without what the structural mode adds to the gyroscopes.
+
+    The mode is that under the force of the rates as they were read: what the nod adds to the force is small, and a mode
+    that rings by its own nod would have no end.
+    """
+    _, nod = structure.felt(chain.effects, mode[:, 1], mode[:, 1])
     return rates._replace(y=rates.y - nod)
 
 
-def _acceleration(chain: Chain, memory: _Memory, sample: _Sample, air: Air) -> tuple[Vector, Vector]:
-    """Specific force at the CG (m/s^2) and angular acceleration (rad/s^2)."""
-    drive, _ = drive_of(chain, memory.actuators, memory.motor, jnp.zeros(6), sample.time)
-    load = steady_load(chain, air, drive, memory.separation, sample.climb)
-    load = unsteady_load(chain, air, load, sample.alpha_rate)
-    return mass.accelerations(chain.body, sample.rates, load.force, load.moment)
-
-
-def _readings(chain: Chain, rates: Vector, force: Vector, acceleration: Vector, mode: Scalar) -> Scalar:
-    """Readings of the accelerometers, and the rates of the gyroscopes'."""
+def _readings(chain: Chain, rates: Vector, force: Vector, acceleration: Vector, mode: Scalar) -> Accelerations:
+    """What the instruments show of the motion, the airframe's own included."""
     effects, arm = chain.effects, sensors.imu_arm(chain.model, chain.effects, chain.body)
-    _, mode_acceleration = structure.rate(effects, mode[0], mode[1], force.z)
+    _, mode_acceleration = structure.rate(effects, mode[:, 0], mode[:, 1], force.z)
     shake, nod = structure.felt(effects, mode_acceleration, mode_acceleration)
     at_imu = sensors.at_imu(force, rates, acceleration, arm)
-    return jnp.stack(
-        [
-            *sensors.accelerometers(effects, at_imu._replace(z=at_imu.z + shake)),
-            *sensors.turned_by(effects, acceleration._replace(y=acceleration.y + nod)),
-        ]
+    return Accelerations(
+        sensors.accelerometers(effects, at_imu._replace(z=at_imu.z + shake)),
+        sensors.turned_by(effects, acceleration._replace(y=acceleration.y + nod)),
     )
 
 
 def _ring(chain: Chain, mode: Scalar, load0: Scalar, load1: Scalar) -> Scalar:
-    """The structural mode (2,) one sample on, its load linear meanwhile, by Runge-Kutta as in a rollout."""
+    """The structural mode (2,) one sample on, its load linear meanwhile, by Runge-Kutta as in a rollout.
+
+    In two steps: of the fastest mode that may be tried, one at the rate of the diagnosis would grow without end.
+    """
 
     def rate(y: Scalar, load: Scalar) -> Scalar:
         return jnp.stack(structure.rate(chain.effects, y[0], y[1], load))
 
-    h, middle = chain.step, 0.5 * (load0 + load1)
-    k1 = rate(mode, load0)
-    k2 = rate(mode + 0.5 * h * k1, middle)
-    k3 = rate(mode + 0.5 * h * k2, middle)
-    k4 = rate(mode + h * k3, load1)
-    return mode + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-
-
-_predict = jax.jit(predict, static_argnums=0)
-_coefficients = jax.jit(coefficients)
-
-
-def predict_coefficients(simulator: Simulator, theta: Scalar | Array, signals: Signals) -> Scalar:
-    """CL CD CY Cl Cm Cn (N, 6) that parameters (P,) expect of these signals, as the aircraft file reduces them."""
-    accelerations = _predict(simulator.layout, simulator.model, theta, signals, simulator.step)
-    expected: Scalar = _coefficients(simulator.model, signals, accelerations)
-    return expected
+    h, loads = 0.5 * chain.step, [load0 + share * (load1 - load0) for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    for before, middle, after in (loads[:3], loads[2:]):
+        k1 = rate(mode, before)
+        k2 = rate(mode + 0.5 * h * k1, middle)
+        k3 = rate(mode + 0.5 * h * k2, middle)
+        k4 = rate(mode + h * k3, after)
+        mode = mode + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return mode
 
 
 @partial(jax.jit, static_argnums=0)
-def _slopes(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Scalar:
-    slopes: Scalar = jax.jacfwd(lambda t: coefficients(model, signals, predict(layout, model, t, signals, step)))(theta)
+def _expected(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Coefficients:
+    return coefficients(model, signals, predict(layout, model, theta, signals, step))
+
+
+def predict_coefficients(simulator: Simulator, theta: Scalar | Array, signals: Signals) -> Array:
+    """CL CD CY Cl Cm Cn (N, 6) that parameters (P,) expect of these signals, as the aircraft file reduces them."""
+    return np.stack(_expected(simulator.layout, simulator.model, theta, signals, simulator.step), axis=1)
+
+
+@partial(jax.jit, static_argnums=0)
+def _slopes(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Coefficients:
+    slopes: Coefficients = jax.jacfwd(lambda t: _expected(layout, model, t, signals, step))(theta)
     return slopes
 
 
-def coefficient_slopes(simulator: Simulator, theta: Scalar | Array, signals: Signals) -> Scalar:
+def coefficient_slopes(simulator: Simulator, theta: Scalar | Array, signals: Signals) -> Array:
     """d ``predict_coefficients`` / d theta (N, 6, P), exact."""
-    slopes: Scalar = _slopes(simulator.layout, simulator.model, theta, signals, simulator.step)
-    return slopes
+    return np.stack(_slopes(simulator.layout, simulator.model, theta, signals, simulator.step), axis=1)

@@ -8,7 +8,9 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import EFFECTS, Simulator, trim_flight
 from sysid_node.sim.atmosphere import air_density
+from sysid_node.sim.body import Vector
 from sysid_node.sim.prediction import (
+    Accelerations,
     Signals,
     coefficient_slopes,
     coefficients,
@@ -37,7 +39,8 @@ def shown(simulator, flight, signals):
     turning = np.zeros((len(outputs), 3))
     rates = outputs[:, 3:6]
     turning[2:-2] = (8 * (rates[3:-1] - rates[1:-3]) - (rates[4:] - rates[:-4])) * simulator.rate / 12
-    return np.asarray(coefficients(simulator.model, signals, np.column_stack([outputs[:, :3], turning])))
+    seen = Accelerations(Vector(*outputs[:, :3].T), Vector(*turning.T))
+    return np.stack(coefficients(simulator.model, signals, seen), axis=1)
 
 
 def smooth_inputs(simulator, trim):
@@ -101,6 +104,21 @@ def test_turbulence_does_no_harm(fast):
     flight = fast.rollout(fast.neutral(), trim.initial, inputs)
     expected = np.asarray(predict_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands)))
     np.testing.assert_allclose(expected, flight.coefficients, atol=1e-10)
+
+
+@pytest.mark.parametrize("slope", [-20.0, 20.0])
+@pytest.mark.parametrize("frequency", [2.0, 8.0, 40.0])
+def test_no_mode_rings_without_end(slope, frequency):
+    """Neither by its own nod, as large as it may be, nor by the steps it is carried on in at the diagnosis' rate."""
+    slow = Simulator(make_aircraft(), 50.0)
+    theta = slow.neutral()
+    for name, value in {"gain": 5.0, "slope": slope, "frequency": frequency, "damping": 0.05}.items():
+        theta[slow.names.index(f"structural_mode.{name}")] = value
+    trim = trim_flight(slow)
+    inputs = smooth_inputs(slow, trim)
+    signals = signals_from(slow.rollout(slow.neutral(), trim.initial, inputs), inputs.commands)
+    without, expected = (np.abs(predict_coefficients(slow, t, signals)).max() for t in (slow.neutral(), theta))
+    assert expected < 3.0 * without
 
 
 def test_slopes_agree_with_finite_differences(fast):
