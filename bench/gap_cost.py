@@ -2,8 +2,8 @@
 
     python bench/gap_cost.py [--repeat 3] [--page docs/gap.md]
 
-The flights are flown first (cdrw, light turbulence, an actuator's lag). Run it on an idle machine: times by the clock tell
-of that machine only, the ratio of two flights to one of any.
+The flights are flown first (cdrw, light turbulence, an actuator's lag). Run it on an idle machine: times by the clock
+tell of that machine only, the ratio of two flights to one of any.
 """
 
 from __future__ import annotations
