@@ -11,7 +11,7 @@ model of the aircraft beats.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.signal import bilinear, lfilter
@@ -20,7 +20,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import prior
 from sysid_node.gap.deliberate import deliberate
 from sysid_node.gap.evidence import upon
-from sysid_node.gap.fit import Fit, bounded, real_rows, room, weights
+from sysid_node.gap.fit import Fit, amplitudes, bounded, real_rows, residual_power, room, weights
 from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex
 from sysid_node.gap.view import CHANNELS, COEFFICIENTS, View
@@ -76,7 +76,7 @@ def structure_left(fit: Fit, unseen: Sequence[View] = (), own: Sequence[Nuisance
     """
     there = [fit, *(upon(fit, view, theirs) for view, theirs in zip(unseen, own, strict=True))]
     fits = [f for f in there if f.information is not None and np.isfinite(f.information).all()]
-    usual, rings = (pooled([structure_of(f, by=by) for f in fits]) for by in (instruments, ringing))
+    usual, rings = (pooled([structure_of(f, weighed_anew(f, by), by) for f in fits]) for by in (instruments, ringing))
     more = rings.deviations > np.maximum(usual.deviations, CHANCE)
     found = {f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(Structure)}
     return Structure(**found)
@@ -105,6 +105,22 @@ def structure_of(fit: Fit, like: Fit | None = None, by: Instruments | None = Non
             others[axis] += SHARE * np.count_nonzero(series) - directions.shape[1]
     noise = np.maximum((total - coherent) / np.maximum(others, 1.0), 1.0)
     return Structure(coherent - size, total, np.sqrt(2.0 * np.maximum(size, 1.0)), noise)
+
+
+def weighed_anew(fit: Fit, by: Instruments) -> Fit:
+    """The fit with the power of what the instruments' own estimate leaves, for the weights of a second step.
+
+    Least squares leaves too little where it passed gusts off as derivatives: what a sharp step then leaves at other
+    frequencies would stand out of noise that is too low there (Hansen (1982): the covariance must be that at the true
+    parameters).
+    """
+    seen, powers = equations(fit, fit.power, by), []
+    step = within_limits(seen, fit)
+    for view, power, r, J in zip(fit.views, fit.power, seen.rows, seen.slopes, strict=True):
+        anew = residual_power(view, amplitudes((r - J @ step).reshape(len(r), -1), _weights(view, power)))
+        anew[0] = power[0]
+        powers.append(anew)
+    return replace(fit, power=tuple(powers))
 
 
 @dataclass(frozen=True)
@@ -167,14 +183,20 @@ def _seen(
     """By flight: the instruments' directions, residuals (W, 2 L, 12), slopes (W, 2 L, 12, unknowns), without means."""
     basis, rows, slopes = [], [], []
     for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
-        weight = weights(view.windows, power)
-        weight[[0, view.windows.frequencies.size]] = 0.0
+        weight = _weights(view, power)
         own = weights(view.windows, own_power)
         ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
         rows.append((r * ratio).reshape(r.shape[0], -1, len(CHANNELS)))
         slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2]))
         basis.append(_basis(view, weight, by))
     return basis, rows, slopes
+
+
+def _weights(view: View, power: Array) -> Array:
+    """``weights`` (2 L, 12) without those of means."""
+    weight = weights(view.windows, power)
+    weight[[0, view.windows.frequencies.size]] = 0.0
+    return weight
 
 
 def priors(fit: Fit) -> tuple[Array, Array]:
