@@ -12,7 +12,8 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.evidence import groups_of
-from sysid_node.gap.fit import Fit
+from sysid_node.gap.fit import Fit, onsets
+from sysid_node.gap.onset import uncertainty
 from sysid_node.gap.sizes import responses
 
 
@@ -22,4 +23,7 @@ def standard_errors(fit: Fit) -> Array:
                       for group in groups_of(view)])  # fmt: skip
     steps = steps - steps.mean(axis=0)
     scatter = (steps**2).sum(axis=0) * len(steps) / max(len(steps) - 1, 1)
-    return np.asarray(np.sqrt(np.maximum(np.diag(fit.covariance), scatter)))
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), scatter))
+    for place in onsets(fit):
+        errors[place] = uncertainty(fit, place)
+    return np.asarray(errors)

@@ -23,7 +23,7 @@ from sysid_node.gap.nuisance import Nuisances
 from sysid_node.gap.spectra import SHARE, Complex, Windows
 from sysid_node.gap.view import CHANNELS, View
 
-#: Weighted residual beyond which a prediction has grown without end, as that of a mode that feeds itself does.
+#: Weighted residual beyond which a prediction has grown without end.
 _ENDLESS = 1e100
 
 #: Most rounds of linearising the nuisances and weighing anew, and the deviance from which another changes nothing.
@@ -438,12 +438,16 @@ def moved(fit: Fit, step: Array) -> Fit:
 
 
 def linearised(fit: Fit) -> Fit:
-    """The fit with its residual, slopes and information where it stands, for evidence and errors."""
+    """The fit with its residual, slopes and information where it stands, for evidence and errors.
+
+    An onset has no slope but at the very moment: what it has there would make all others as uncertain as it is.
+    """
     own, chosen = list(fit.nuisances.indices), list(fit.indices)
     rows, slopes = [], []
     for i, (view, point, power) in enumerate(zip(fit.views, fit.points, fit.power, strict=True)):
         weight = weights(view.windows, power)
         raw = real_rows(view.slopes(point, [*chosen, *own]), weight)
+        raw[..., onsets(fit)] = 0.0
         rows.append(real_rows(view.residual(point), weight))
         wide = _placed(raw[..., len(chosen) :].reshape(-1, len(own)), fit.nuisances, i, len(fit.views))
         slopes.append(np.concatenate([raw[..., : len(chosen)], wide.reshape(*raw.shape[:2], -1)], axis=2))
@@ -453,6 +457,11 @@ def linearised(fit: Fit) -> Fit:
         information += flat.T @ flat
     cost = sum(float(np.sum(r**2)) for r in rows) - 2.0 * fit.prior_score
     return replace(fit, rows=tuple(rows), slopes=tuple(slopes), information=information, cost=cost)
+
+
+def onsets(fit: Fit) -> list[int]:
+    """Places of the times at which something begins, among the unknowns."""
+    return [k for k, i in enumerate(fit.indices) if fit.views[0].simulator.parameters[i][1].name == "onset"]
 
 
 def room(fit: Fit) -> tuple[Array, Array]:
@@ -478,8 +487,8 @@ def bounded(information: Array, right: Array, low: Array, high: Array) -> Array:
 def _root(information: Array) -> Array:
     """Upper factor R of information = R' R, whose diagonal is one.
 
-    Slopes of a mode that feeds itself may be so large, and so alike, that rounding drowns the priors: then a trace of
-    them is put back.
+    Slopes may be so large, and so alike, that rounding drowns the priors: then a trace of them is put
+    back.
     """
     try:
         return np.asarray(np.linalg.cholesky(information).T)

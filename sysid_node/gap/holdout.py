@@ -87,8 +87,7 @@ def _standing(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nu
     """What of an explanation stands, and what flight not fitted says of it.
 
     All causes, else with sizes as least squares has them, else without the least probable one, else none; each also
-    beside the file's own derivatives. No numbers come of a mode that feeds itself on flight not fitted (see
-    ``trials.upon``).
+    beside the file's own derivatives. Of one of which no numbers come on flight not fitted nothing stands.
     """
     for explanation in _explanations(attribution):
         try:

@@ -12,10 +12,15 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.candidates import Candidate, bounds
-from sysid_node.gap.fit import Fit, Projected
+from sysid_node.gap.fit import Fit, Projected, linearised
+from sysid_node.gap.nuisance import gusty
+from sysid_node.gap.structure import commands, equations, within_limits
 
 #: Steps between times that are tried, s, and how far about the best the finer ones reach, s.
 _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
+
+#: The same where all of them count, s.
+_GRAIN = 0.5
 
 
 def sought(fit: Fit, candidate: Candidate) -> Fit:
@@ -36,6 +41,35 @@ def sought(fit: Fit, candidate: Candidate) -> Fit:
     for point in points:
         point[list(fit.indices)] = values
     return replace(fit, points=points)
+
+
+def uncertainty(fit: Fit, place: int) -> float:
+    """How far (s, rms) the time at this place of the values may be from where it stands, by all times' likelihood.
+
+    A surface that rests tells nothing of when it failed, but that it did before it moved again; in moving air, at rest
+    is what only an autopilot moves, for it moves it with the gusts.
+    """
+    moving = any(gusty(view) for view in fit.views)
+    grain = _COARSE if moving else _GRAIN
+    times = np.arange(0.0, max(float(view.record.duration) for view in fit.views), grain)
+    if moving:
+        deviance = np.array([_foretold(fit, place, float(time)) for time in times])
+    else:
+        problem = Projected(fit)
+        deviance = np.array([_at(problem, fit.values, place, float(time))[0] for time in times])
+    weight = np.exp(-0.5 * (deviance - deviance.min()))
+    return float(np.sqrt(np.average((times - fit.values[place]) ** 2, weights=weight) + grain**2 / 12.0))
+
+
+def _foretold(fit: Fit, place: int, time: float) -> float:
+    """What of the remainder the commands foretell with an onset at a time, all else at its best, in noise levels."""
+    points = tuple(point.copy() for point in fit.points)
+    for point in points:
+        point[fit.indices[place]] = time
+    there = linearised(replace(fit, points=points))
+    seen = equations(there, fit.power, commands)
+    step = within_limits(seen, there)
+    return float(seen.constant - 2.0 * seen.right @ step + step @ seen.information @ step)
 
 
 def _best(problem: Projected, known: tuple[float, Array], place: int, times: Array) -> tuple[float, Array]:

@@ -71,8 +71,8 @@ class Structure:
 def structure_left(fit: Fit, unseen: Sequence[View] = (), own: Sequence[Nuisances] = ()) -> Structure:
     """Of a fit's remainder, and of that on flights held out, with what is allowed for in each.
 
-    By channel as ``instruments`` see it, or ``ringing`` where that sees more and beyond chance. A flight on which a
-    mode feeds itself without end is left out.
+    By channel as ``instruments`` see it, or ``ringing`` where that sees more and beyond chance. A flight on which no
+    numbers come of the fit is left out.
     """
     there = [fit, *(upon(fit, view, theirs) for view, theirs in zip(unseen, own, strict=True))]
     fits = [f for f in there if f.information is not None and np.isfinite(f.information).all()]

@@ -100,7 +100,7 @@ class Trier:
     def upon(self, current: Trial, look: Look) -> Trial | None:
         """A candidate added to an explanation; None where no numbers come of it.
 
-        Slopes of a mode that feeds itself grow without end: such a set predicts nothing, and is no explanation.
+        Where slopes grow without end a set predicts nothing, and is no explanation.
         """
         try:
             with _endless():
@@ -145,7 +145,7 @@ def narrowed(candidates: Sequence[Candidate], looks: Sequence[Look]) -> list[Can
 
 
 def _endless() -> np.errstate:
-    """Of predictions without end, as of a mode that feeds itself, the result tells: NumPy need not warn of them."""
+    """Of predictions without end the result tells: NumPy need not warn of them."""
     return np.errstate(over="ignore", invalid="ignore")
 
 
@@ -167,7 +167,7 @@ def _spread(
 
 
 def _first_look_or_none(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
-    """The first look; infinitely much is left where no numbers come of it, as upon a mode that feeds itself."""
+    """The first look; infinitely much is left where no numbers come of it."""
     try:
         return _first_look(fit, problem, candidate)
     except np.linalg.LinAlgError:

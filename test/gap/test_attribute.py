@@ -39,7 +39,7 @@ def test_what_adds_up_is_no_alternative(weak_and_slow) -> None:
 
 
 def test_what_gives_no_numbers_is_no_explanation(plain_view, monkeypatch) -> None:
-    """As where the slopes of a mode that feeds itself grow without end."""
+    """As where slopes grow without end."""
 
     def endless(*args: object) -> None:
         raise np.linalg.LinAlgError("not positive definite")

@@ -42,7 +42,7 @@ def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
     ("unbiased", "least_squares", "stands"),
     [
         (9.0, 4.0, 9.0),
-        (-1.0, 4.0, 4.0),  # of a mode that feeds itself no numbers come
+        (-1.0, 4.0, 4.0),  # of some fits no numbers come
         (0.5, 4.0, 4.0),  # worse than the file
         (-1.0, 1.5, 1.0),  # no better than the derivatives: nothing is blamed
         (-1.0, -1.0, 1.0),

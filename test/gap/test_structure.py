@@ -91,7 +91,7 @@ def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_vie
 
 
 def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_view: View, monkeypatch) -> None:
-    """As where a mode feeds itself without end on a flight held out, but not on the one that was fitted."""
+    """On a flight held out, that is; of the one that was fitted they do."""
     nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
     fit = polish(blank([plain_view], nuisances), rounds=1)
     alone = structure_left(fit)
