@@ -34,6 +34,7 @@ from sysid_node.sim.prediction import (
     predict,
     signals_of,
 )
+from sysid_node.sim.programs import kept
 
 #: What is compared.
 CHANNELS = (*COEFFICIENTS, *READINGS)
@@ -109,7 +110,7 @@ def _readings(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow
     return tuple(reconstruct(layout, model, theta, given.motion, given.memory.observer, given.step).T)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@kept(2)
 def _changes(
     expected: Expected, layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given, flow: Flow | None
 ) -> tuple[Channels, Channels]:
@@ -117,7 +118,7 @@ def _changes(
 
     def along(direction: Scalar) -> tuple[Channels, Channels]:
         slope: tuple[Channels, Channels] = jax.jvp(
-            lambda t: expected(layout, model, t, given, flow), (theta,), (direction,)
+            lambda t: tuple(expected(layout, model, t, given, flow)), (theta,), (direction,)
         )
         return slope
 
@@ -125,7 +126,7 @@ def _changes(
     return values, slopes
 
 
-@partial(jax.jit, static_argnums=0)
+@kept(1)
 def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Channels:
     """d coefficients / d each of the file's derivatives, (N, D) each.
 
@@ -134,8 +135,7 @@ def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: G
     """
 
     def forces(derivatives: Scalar) -> Channels:
-        expected: Channels = _forces_in(layout, model._replace(derivatives=derivatives), theta, given, flow)
-        return expected
+        return tuple(_forces_in(layout, model._replace(derivatives=derivatives), theta, given, flow))
 
     slopes: Channels = jax.jacfwd(forces)(model.derivatives)
     return slopes

@@ -32,7 +32,7 @@ def configure() -> None:
         os.environ["XLA_FLAGS"] = " ".join([flags, *missing]).strip()
     _set("jax_enable_x64", True)
     if jax.config.jax_compilation_cache_dir is None:  # type: ignore[attr-defined]
-        _set("jax_compilation_cache_dir", str(_cache_folder()))
+        _set("jax_compilation_cache_dir", str(cache_folder("xla")))
         _set("jax_persistent_cache_min_compile_time_secs", 0.0)  # dozens of small programs take half a second
 
 
@@ -40,7 +40,7 @@ def _set(option: str, value: object) -> None:
     jax.config.update(option, value)  # type: ignore[no-untyped-call]
 
 
-def _cache_folder() -> Path:
-    """``$XDG_CACHE_HOME/sysid/xla``, by default under ``~/.cache``."""
+def cache_folder(name: str) -> Path:
+    """``$XDG_CACHE_HOME/sysid/<name>``, by default under ``~/.cache``."""
     root = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(root) if root else Path.home() / ".cache") / "sysid" / "xla"
+    return (Path(root) if root else Path.home() / ".cache") / "sysid" / name
