@@ -15,6 +15,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import export
 
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim.atmosphere import GRAVITY
@@ -22,6 +23,7 @@ from sysid_node.sim.body import Vector
 from sysid_node.sim.chain import Chain
 from sysid_node.sim.effects import air_data_lag, imu_lever_arm, imu_misalignment
 from sysid_node.sim.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.parameters import Parameters
 from sysid_node.sim.stations import airflow, sensors
 from sysid_node.sim.timing import shift_cubic, slope
 
@@ -91,7 +93,7 @@ def motion_of(record: FlightRecord) -> Motion | None:
 
 
 def reconstruct(
-    layout: Layout, model: Model, theta: Scalar, motion: Motion, fading: Scalar | float, step: Scalar
+    layout: Layout, model: Model, theta: Parameters, motion: Motion, fading: Scalar | float, step: Scalar
 ) -> Scalar:
     """Readings (N, 6), columns ``READINGS``, that parameters (P,) expect, each from the samples before it; pure."""
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
@@ -121,6 +123,9 @@ class Flow(NamedTuple):
 
     velocity: Vector  # (N,) relative to the air at the CG, m/s
     alpha_rate: Scalar  # (N,) rad/s at the CG
+
+
+export.register_namedtuple_serialization(Flow, serialized_name="sysid.Flow")
 
 
 def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:

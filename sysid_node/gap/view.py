@@ -26,6 +26,7 @@ from sysid_node.sim import EFFECTS, Simulator, parameters
 from sysid_node.sim.body import Vector
 from sysid_node.sim.chain import Chain
 from sysid_node.sim.layout import Layout, Model, Scalar
+from sysid_node.sim.parameters import Parameters
 from sysid_node.sim.prediction import (
     COEFFICIENTS,
     Accelerations,
@@ -38,12 +39,14 @@ from sysid_node.sim.programs import kept
 
 #: What is compared.
 CHANNELS = (*COEFFICIENTS, *READINGS)
+_FORCES, _READINGS = slice(len(COEFFICIENTS)), slice(len(COEFFICIENTS), None)
 
 #: Longest memory of the observer of the air, s.
 LONGEST = 4.0
 
-#: Directions in which a prediction is differentiated at once: as many as most effects have parameters.
-_LANES = 3
+#: Directions in which a prediction is differentiated at once: as many as most effects have parameters, or as many as
+#: there are biases and clocks.
+_LANES, _WIDE = 3, 9
 
 #: Predictions that a view keeps: fits ask for the same point again, and kinematics stay while forces are fitted.
 _KEPT = 32
@@ -78,8 +81,7 @@ class Given(NamedTuple):
     step: Scalar  # s
 
 
-@partial(jax.jit, static_argnums=0)
-def _flow(layout: Layout, model: Model, theta: Scalar, given: Given) -> Flow | None:
+def _flow(layout: Layout, model: Model, theta: Parameters, _: Scalar, given: Given) -> Flow | None:
     """The flow by the inertial instruments, which ``kinematic`` parameters alone move; none without attitude."""
     if given.motion is None:
         return None
@@ -87,39 +89,63 @@ def _flow(layout: Layout, model: Model, theta: Scalar, given: Given) -> Flow | N
     return flow_of(chain, given.motion, given.memory.vane)
 
 
-@partial(jax.jit, static_argnums=0)
-def _forces_in(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Channels:
-    """Coefficients that parameters (P,) expect in a flow that is known."""
+@partial(jax.jit, static_argnums=0)  # traced once for all that it is part of
+def _forces_in(
+    layout: Layout, model: Model, theta: Parameters, acting: Scalar, given: Given, flow: Flow | None
+) -> Channels:
+    """Coefficients that parameters (P,) expect in a flow that is known; ``acting`` (P,) as ``predict`` has it."""
     signals = given.signals
     if flow is not None:
         signals = signals._replace(velocity=flow.velocity, alpha_rate=flow.alpha_rate)
-    return coefficients(model, given.signals, predict(layout, model, theta, signals, given.step))
-
-
-def _forces(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Channels:
-    """The same where the parameters move the flow, too."""
-    forces: Channels = _forces_in(layout, model, theta, given, _flow(layout, model, theta, given))
-    return forces
+    return tuple(coefficients(model, given.signals, predict(layout, model, theta, signals, given.step, acting)))
 
 
 @partial(jax.jit, static_argnums=0)
-def _readings(layout: Layout, model: Model, theta: Scalar, given: Given, _: Flow | None) -> Channels:
+def _readings(
+    layout: Layout, model: Model, theta: Parameters, _: Scalar, given: Given, __: Flow | None = None
+) -> Channels:
     """Air data and attitude that parameters (P,) expect; nothing without attitude."""
     if given.motion is None:
         return (jnp.zeros(given.signals.density.size),) * len(READINGS)
     return tuple(reconstruct(layout, model, theta, given.motion, given.memory.observer, given.step).T)
 
 
+def _channels(
+    layout: Layout, model: Model, theta: Parameters, acting: Scalar, given: Given, _: Flow | None
+) -> Channels:
+    """All of them, where the parameters move the flow, too."""
+    forces = _forces_in(layout, model, theta, acting, given, _flow(layout, model, theta, acting, given))
+    return (*forces, *_readings(layout, model, theta, acting, given))
+
+
+@kept(2)
+def _at(expected: Callable[..., _Kept], layout: Layout, *where: Any) -> _Kept:
+    """What is expected, or the flow, there."""
+    return expected(layout, *where)
+
+
 @kept(2)
 def _changes(
-    expected: Expected, layout: Layout, model: Model, theta: Scalar, directions: Scalar, given: Given, flow: Flow | None
+    expected: Expected,
+    layout: Layout,
+    model: Model,
+    theta: Scalar,
+    acting: Scalar,
+    directions: Scalar,
+    given: Given,
+    flow: Flow | None,
 ) -> tuple[Channels, Channels]:
-    """What is expected (N,) by channel, and d expected along each of the directions (K, P): (N, K)."""
+    """What is expected (N,) by channel, and d expected along directions (K, M) of what may ``move`` it: (N, K)."""
+    moving, still = _moving(expected, layout), jnp.unstack(theta)
+
+    def there(entries: Scalar) -> Channels:
+        point = list(still)
+        for place, entry in zip(moving, jnp.unstack(entries), strict=True):
+            point[place] = entry
+        return tuple(expected(layout, model, point, acting, given, flow))
 
     def along(direction: Scalar) -> tuple[Channels, Channels]:
-        slope: tuple[Channels, Channels] = jax.jvp(
-            lambda t: tuple(expected(layout, model, t, given, flow)), (theta,), (direction,)
-        )
+        slope: tuple[Channels, Channels] = jax.jvp(there, (theta[np.array(moving)],), (direction,))
         return slope
 
     values, slopes = jax.vmap(along, out_axes=(None, 1))(directions)
@@ -127,7 +153,9 @@ def _changes(
 
 
 @kept(1)
-def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: Given, flow: Flow | None) -> Channels:
+def _changes_by_derivative(
+    layout: Layout, model: Model, theta: Scalar, acting: Scalar, given: Given, flow: Flow | None
+) -> Channels:
     """d coefficients / d each of the file's derivatives, (N, D) each.
 
     The same as along ``derivative_error``, at a quarter of the cost: no slope of the flow, the actuators or the
@@ -135,7 +163,7 @@ def _changes_by_derivative(layout: Layout, model: Model, theta: Scalar, given: G
     """
 
     def forces(derivatives: Scalar) -> Channels:
-        return tuple(_forces_in(layout, model._replace(derivatives=derivatives), theta, given, flow))
+        return tuple(_forces_in(layout, model._replace(derivatives=derivatives), theta, acting, given, flow))
 
     slopes: Channels = jax.jacfwd(forces)(model.derivatives)
     return slopes
@@ -205,57 +233,72 @@ class View:
 
     def slopes_of_readings(self, theta: Array, indices: list[int]) -> Complex:
         """d predicted air data and attitude / d parameters of these indices, (W, L, 6, K)."""
-        slopes = np.zeros((*self.measured.shape[:2], len(READINGS), len(indices)), complex)
-        for some in _lanes([k for k, index in enumerate(indices) if index in kinematic(self.simulator.layout)]):
-            slopes[..., some] = self._slopes_along(_readings, theta, [indices[k] for k in some])
-        return slopes
+        slopes = np.zeros((*self.measured.shape, len(indices)), complex)
+        self._fill(slopes, theta, indices, [k for k, i in enumerate(indices) if i in kinematic(self.simulator.layout)])
+        return slopes[:, :, len(COEFFICIENTS) :]
 
     def _slopes_of(self, theta: Array, indices: list[int]) -> Complex:
         slopes = np.zeros((*self.measured.shape, len(indices)), complex)
-        layout, forces = self.simulator.layout, len(COEFFICIENTS)
+        layout, motion, forces = self.simulator.layout, kinematic(self.simulator.layout), len(COEFFICIENTS)
         own = {self.simulator.names.index(f"derivative_error.{n}"): d for d, n in enumerate(layout.derivatives)}
-        linear = [k for k, index in enumerate(indices) if index in own]
-        others = [k for k, index in enumerate(indices) if index not in own]
+        linear, moving = ([k for k, index in enumerate(indices) if index in some] for some in (own, motion))
         if linear:
             by_derivative = self._slopes_by_derivative(theta)
             slopes[:, :, :forces, linear] = by_derivative[..., [own[indices[k]] for k in linear]]
-        for expected, some in _shared(others, [indices[k] in kinematic(layout) for k in others]):
-            slopes[:, :, :forces, some] = self._slopes_along(expected, theta, [indices[k] for k in some])
-        slopes[:, :, forces:] = self.slopes_of_readings(theta, indices)
+        for some in _lanes([k for k, index in enumerate(indices) if index not in own and index not in motion], _LANES):
+            slopes[:, :, :forces, some] = self._slopes_along(_forces_in, theta, [indices[k] for k in some])
+        self._fill(slopes, theta, indices, moving)
         return np.asarray(slopes * self.axes[:, None])
+
+    def _fill(self, slopes: Complex, theta: Array, indices: list[int], moving: list[int]) -> None:
+        """Puts slopes of all channels where they belong: those of the places (of indices) that move the flow."""
+        wide = len(moving) // _WIDE * _WIDE if len(moving) % _WIDE <= _LANES else len(moving)
+        for some in (*_lanes(moving[:wide], _WIDE), *_lanes(moving[wide:], _LANES)):
+            slopes[..., some] = self._slopes_along(_channels, theta, [indices[k] for k in some])
 
     def _flow(self, theta: Array) -> Flow | None:
         """The flow at parameters (P,), as long as none moves it."""
-        s, key = self.simulator, theta[kinematic(self.simulator.layout)].tobytes()
+        key = theta[kinematic(self.simulator.layout)].tobytes()
         known = self._flows.get(key)
-        return (
-            self._flows.keep(key, _flow(s.layout, s.model, jnp.asarray(theta), self.given)) if known is None else known
-        )
+        return self._flows.keep(key, self._at(_flow, theta)) if known is None else known
 
     def _series(self, expected: Expected, theta: Array) -> Array:
         """One of ``_forces_in`` and ``_readings`` (N, 6) at parameters (P,)."""
-        s = self.simulator
-        series = expected(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
-        return _table(series, len(self.record))
+        return _table(self._at(expected, theta, self._flow(theta)), len(self.record))
+
+    def _at(self, expected: Callable[..., _Kept], theta: Array, *flow: Flow | None) -> _Kept:
+        layout, model = self.simulator.layout, self.simulator.model
+        there: _Kept = _at(expected, layout, model, theta, self._acting(theta), self.given, *flow)
+        return there
+
+    def _acting(self, theta: Array) -> NDArray[np.bool_]:
+        """Which parameters (P,) are not neutral."""
+        return np.asarray(theta != self.simulator.neutral())
 
     def _slopes_by_derivative(self, theta: Array) -> Complex:
         """Of every derivative of the file, (W, L, 6, D); air data and attitude know of none."""
         s, samples = self.simulator, len(self.record)
-        changes = _changes_by_derivative(s.layout, s.model, jnp.asarray(theta), self.given, self._flow(theta))
+        changes = _changes_by_derivative(s.layout, s.model, theta, self._acting(theta), self.given, self._flow(theta))
         return self.windows.transform(_table(changes, samples))
 
     def _slopes_along(self, expected: Expected, theta: Array, indices: list[int]) -> Complex:
-        """Of at most ``_LANES`` entries of the vector, (W, L, 6, K); what is expected is kept."""
-        s, directions, samples = self.simulator, np.zeros((_LANES, len(theta))), len(self.record)
-        directions[np.arange(len(indices)), indices] = 1.0
+        """Of at most ``_WIDE`` entries of the vector, (W, L, channels, K); what is expected is kept."""
+        s, acting, moving = self.simulator, self._acting(theta), _moving(expected, self.simulator.layout)
+        acting[indices] = True
+        directions = np.zeros((_LANES if len(indices) <= _LANES else _WIDE, len(moving)))
+        directions[np.arange(len(indices)), [moving.index(i) for i in indices]] = 1.0
         values, changes = _changes(
-            expected, s.layout, s.model, jnp.asarray(theta), directions, self.given, self._flow(theta)
+            expected, s.layout, s.model, theta, acting, directions, self.given, self._flow(theta)
         )
-        entries = kinematic(s.layout) if expected is _readings else slice(None)
-        kept, key = (self._readings if expected is _readings else self._forces), theta[entries].tobytes()
-        if kept.get(key) is None:
-            kept.keep(key, self.windows.transform(_table(values, samples)))
-        return self.windows.transform(_table(changes, samples)[:, :, : len(indices)])
+        self._keep(theta, _table(values, len(self.record)))
+        return self.windows.transform(_table(changes, len(self.record))[:, :, : len(indices)])
+
+    def _keep(self, theta: Array, series: Array) -> None:
+        """Forces (N, 6), or all channels (N, 12), that are expected at parameters (P,)."""
+        motion = theta[kinematic(self.simulator.layout)].tobytes()
+        for known, key, channels in ((self._forces, theta.tobytes(), _FORCES), (self._readings, motion, _READINGS)):
+            if series[:, channels].size and known.get(key) is None:
+                known.keep(key, self.windows.transform(series[:, channels]))
 
 
 #: Of clocks and instruments, the effects that kinematics do not see: stamps of commands, and noise that has no value.
@@ -272,18 +315,16 @@ def kinematic(layout: Layout) -> list[int]:
     ]
 
 
-def _lanes(places: list[int]) -> Iterator[list[int]]:
-    """As many at a time as are differentiated at once."""
-    return (places[first : first + _LANES] for first in range(0, len(places), _LANES))
+@cache
+def _moving(expected: Expected, layout: Layout) -> list[int]:
+    """Entries of the parameter vector that what is expected is differentiated by."""
+    motion = kinematic(layout)
+    return [i for i in range(len(parameters.table(layout))) if i not in motion] if expected is _forces_in else motion
 
 
-def _shared(places: list[int], moving: list[bool]) -> Iterator[tuple[Expected, list[int]]]:
-    """The same, with what to differentiate: those that move the flow first, for without them it need not be."""
-    first = [place for place, moves in zip(places, moving, strict=True) if moves]
-    rest = [place for place, moves in zip(places, moving, strict=True) if not moves]
-    return (
-        (_forces if i * _LANES < len(first) else _forces_in, some) for i, some in enumerate(_lanes([*first, *rest]))
-    )
+def _lanes(places: list[int], most: int) -> Iterator[list[int]]:
+    """At most so many at a time."""
+    return (places[first : first + most] for first in range(0, len(places), most))
 
 
 def bare(

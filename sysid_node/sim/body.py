@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
+from jax import export
 
 from sysid_node.sim.layout import Scalar
 
@@ -46,6 +47,9 @@ class Vector(NamedTuple):
             self.z * other.x - self.x * other.z,
             self.x * other.y - self.y * other.x,
         )
+
+
+export.register_namedtuple_serialization(Vector, serialized_name="sysid.Vector")
 
 
 class Body(NamedTuple):

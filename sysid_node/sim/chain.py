@@ -14,7 +14,7 @@ from sysid_node.sim.atmosphere import GRAVITY, air_density
 from sysid_node.sim.body import MassProperties, Vector
 from sysid_node.sim.effects import stall_separation, steady_wind, unsteady_aerodynamics
 from sysid_node.sim.layout import Layout, Model, Scalar, Values
-from sysid_node.sim.parameters import unpack
+from sysid_node.sim.parameters import Parameters, unpack
 from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
 from sysid_node.sim.stations.actuator import ActuatorState
 from sysid_node.sim.stations.aerodynamics import Coefficients
@@ -41,7 +41,7 @@ class Chain:
     altitude: Scalar  # m, at the start
 
     @classmethod
-    def of(cls, layout: Layout, model: Model, theta: Scalar, step: Scalar, altitude: Scalar) -> Chain:
+    def of(cls, layout: Layout, model: Model, theta: Parameters, step: Scalar, altitude: Scalar) -> Chain:
         """From the parameter vector (P,)."""
         effects = unpack(layout, theta)
         return cls(layout, model, effects, mass.properties(model, effects), step, altitude)

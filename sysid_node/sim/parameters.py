@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +28,15 @@ def names(layout: Layout) -> tuple[str, ...]:
     return tuple(f"{effect}.{p.name}" for effect, p in table(layout))
 
 
-def unpack(layout: Layout, theta: Scalar) -> dict[str, Values]:
+#: The vector (P,), or its entries one by one: only those that move are differentiated then.
+Parameters = Scalar | Sequence[Scalar]
+
+
+def unpack(layout: Layout, theta: Parameters) -> dict[str, Values]:
     """The vector (P,) as effect -> parameter -> value."""
     values: dict[str, dict[str, Scalar]] = {}
-    for (effect, parameter), value in zip(table(layout), jnp.unstack(theta), strict=True):
+    entries = jnp.unstack(theta) if isinstance(theta, jax.Array) else theta
+    for (effect, parameter), value in zip(table(layout), entries, strict=True):
         values.setdefault(effect, {})[parameter.name] = value
     return dict(values)
 

@@ -11,8 +11,9 @@ by the aircraft file (Klein & Morelli (2006), "Aircraft System Identification", 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +31,7 @@ from sysid_node.sim.chain import Chain, drive_of, steady_load, unsteady_load
 from sysid_node.sim.effects import stall_separation
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.layout import Layout, Model, Scalar
+from sysid_node.sim.parameters import Parameters, table
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import actuator, airflow, command, mass, propulsion, sensors, structure
 from sysid_node.sim.stations.actuator import ActuatorState
@@ -38,6 +40,12 @@ from sysid_node.sim.stations.airflow import Air
 from sysid_node.sim.timing import shift_cubic, slope
 
 Array = NDArray[np.float64]
+
+_Result = TypeVar("_Result")
+
+#: Effects that give commands a memory, the flow one, and those of an airframe that rings.
+_REMEMBERED = frozenset({"actuator_lag", "actuator_backlash", "actuator_rate_limit", "motor_lag"})
+_SEPARATED, _RINGING = frozenset({"stall_separation"}), frozenset({"structural_mode"})
 
 #: What ``coefficients`` gives, in this order.
 COEFFICIENTS = Coefficients._fields
@@ -62,14 +70,28 @@ class Accelerations(NamedTuple):
     turning: Vector  # (N,) rates of the gyroscopes' readings, rad/s^2
 
 
-class _Memory(NamedTuple):
-    """What commands and flow leave behind, whatever forces come of it."""
+class _Engines(NamedTuple):
+    """What commands leave behind."""
 
     actuators: ActuatorState
     motor: Scalar
     motor_command: Scalar
+
+
+class _Memory(NamedTuple):
+    """What commands and flow leave behind, whatever forces come of it."""
+
+    engines: _Engines
     separation: Scalar
-    attached: Scalar
+
+
+class _Shaken(NamedTuple):
+    """The motion (N,) of an airframe that rings."""
+
+    rates: Vector  # rad/s, the body's alone
+    force: Vector  # specific, at the CG, m/s^2
+    acceleration: Vector  # rad/s^2
+    mode: Scalar  # (N, 2) displacement m and speed m/s
 
 
 class _Sample(NamedTuple):
@@ -84,19 +106,26 @@ class _Sample(NamedTuple):
     time: Scalar
 
 
-def predict(layout: Layout, model: Model, theta: Scalar, signals: Signals, step: Scalar) -> Accelerations:
+def predict(
+    layout: Layout, model: Model, theta: Parameters, signals: Signals, step: Scalar, acting: Scalar | None = None
+) -> Accelerations:
     """What parameters (P,) expect the instruments to show, given these signals; pure.
 
     Only what remembers is carried along, sample by sample; forces and moments of all samples are worked out at once.
+    ``acting`` (P,): which parameters are not neutral or will be differentiated; what none of these needs is left out.
     """
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
     samples = _true_motion(chain, signals)
-    driven = _driven(chain, samples)
-    shaken, _ = _accelerations(chain, driven, samples)
-    mode = _rung(chain, shaken.z)
-    samples = samples._replace(rates=_without_nod(chain, mode, samples.rates))
-    force, acceleration = _accelerations(chain, driven, samples)
-    readings = _readings(chain, samples.rates, force, acceleration, mode)
+    remembers, separates, rings = (_any_acts(layout, acting, e) for e in (_REMEMBERED, _SEPARATED, _RINGING))
+    at_rest = partial(jax.vmap(partial(_engines_at_rest, chain)), samples.command)
+    memory = _Memory(
+        _either(remembers, lambda: _engines(chain, samples.command), at_rest),
+        _either(separates, lambda: _separation(chain, samples), lambda: jnp.ones_like(samples.time)),
+    )
+    force, acceleration = _accelerations(chain, memory, samples)
+    still = _Shaken(samples.rates, force, acceleration, jnp.zeros((*force.z.shape, 2)))
+    shaken = _either(rings, lambda: _shaken(chain, memory, samples, force), lambda: still)
+    readings = _readings(chain, *shaken)
     late = chain.effects["imu_delay"]["delay"] / step
     delayed: Accelerations = jax.tree.map(lambda series: shift_cubic(series, late), readings)
     return delayed
@@ -176,6 +205,19 @@ def _speed_of_climb(roll: Scalar, pitch: Scalar, airspeed: Scalar, alpha: Scalar
     return -rigid.to_earth(attitude, airflow.velocity_of(airspeed, alpha, beta)).z
 
 
+def _any_acts(layout: Layout, acting: Scalar | None, effects: frozenset[str]) -> Scalar | None:
+    """Whether any of these effects does something; None: not known."""
+    if acting is None:
+        return None
+    return acting[np.array([i for i, (effect, p) in enumerate(table(layout)) if effect in effects and p.switch])].any()
+
+
+def _either(condition: Scalar | None, this: Callable[[], _Result], other: Callable[[], _Result]) -> _Result:
+    """The one or the other; without a condition, this."""
+    result: _Result = this() if condition is None else jax.lax.cond(condition, this, other)
+    return result
+
+
 def _true_motion(chain: Chain, signals: Signals) -> _Sample:
     """What the sensors' effects hide: the motion and flow at the times of the samples."""
     effects, step = chain.effects, chain.step
@@ -204,59 +246,82 @@ def _flow(sample: _Sample) -> Air:
     return Air(sample.velocity, sample.rates, speed, alpha, beta, sample.density)
 
 
-def _driven(chain: Chain, samples: _Sample) -> _Memory:
-    """The memory at each sample (N,), everything settled on the first."""
-    start = _start(chain, jax.tree.map(lambda series: series[0], samples))
+def _engines(chain: Chain, commands: Scalar) -> _Engines:
+    """Actuators and motor at each sample (N,) of commands (N, controls + 1), settled on the first."""
+    start = _engines_at_rest(chain, commands[0])
     _, unpack = ravel_pytree(start)
 
-    def advance(memory: _Memory, sample: _Sample) -> tuple[_Memory, Scalar]:
-        now = _advance(chain, memory, sample)
+    def advance(engines: _Engines, command: Scalar) -> tuple[_Engines, Scalar]:
+        now = _advance(chain, engines, command)
         return now, ravel_pytree(now)[0]  # one row out: XLA would copy whole series at every step
 
-    _, rows = jax.lax.scan(advance, start, samples)
-    driven: _Memory = jax.vmap(unpack)(rows)
-    return driven
+    _, rows = jax.lax.scan(advance, start, commands)
+    engines: _Engines = jax.vmap(unpack)(rows)
+    return engines
 
 
-def _start(chain: Chain, sample: _Sample) -> _Memory:
-    air, values = _flow(sample), chain.effects["stall_separation"]
-    attached = stall_separation.attached(values, air.alpha, jnp.zeros_like(air.alpha), jnp.zeros_like(air.alpha))
-    motor = propulsion.commanded(chain.model, sample.command[-1])
-    return _Memory(actuator.start(chain.model, sample.command[:-1]), motor, motor, attached, attached)
+def _engines_at_rest(chain: Chain, command: Scalar) -> _Engines:
+    """As a command (controls + 1,) that has long been the same leaves them."""
+    motor = propulsion.commanded(chain.model, command[-1])
+    return _Engines(actuator.start(chain.model, command[:-1]), motor, motor)
 
 
-def _advance(chain: Chain, memory: _Memory, sample: _Sample) -> _Memory:
+def _advance(chain: Chain, engines: _Engines, command: Scalar) -> _Engines:
     """One sample on."""
-    h, air = chain.step, _flow(sample)
-    actuators = actuator.advance(chain.layout, chain.model, chain.effects, memory.actuators, sample.command[:-1], h)
-    motor_command = propulsion.commanded(chain.model, sample.command[-1])
-    motor = propulsion.advance(chain.effects, memory.motor, memory.motor_command, motor_command, h)
-    values, time_scale = chain.effects["stall_separation"], chain.model.chord / air.speed
-    attached = stall_separation.attached(values, air.alpha, sample.alpha_rate, time_scale)
-    separation = first_order(values["tau1"] * time_scale, memory.separation, memory.attached, attached, h)
-    return _Memory(actuators, motor, motor_command, separation, attached)
+    h = chain.step
+    actuators = actuator.advance(chain.layout, chain.model, chain.effects, engines.actuators, command[:-1], h)
+    motor_command = propulsion.commanded(chain.model, command[-1])
+    motor = propulsion.advance(chain.effects, engines.motor, engines.motor_command, motor_command, h)
+    return _Engines(actuators, motor, motor_command)
+
+
+def _separation(chain: Chain, samples: _Sample) -> Scalar:
+    """Attached fraction of the flow at each sample (N,), settled on the first."""
+    air, values = _flow(samples), chain.effects["stall_separation"]
+    time_scale = chain.model.chord / air.speed
+    attached = stall_separation.attached(values, air.alpha, samples.alpha_rate, time_scale)
+    start = stall_separation.attached(values, air.alpha[0], jnp.zeros(()), jnp.zeros(()))
+
+    def advance(last: Scalar, sample: Scalar) -> tuple[Scalar, Scalar]:
+        now = first_order(sample[0], last, sample[1], sample[2], chain.step)
+        return now, now
+
+    before = jnp.concatenate([start[None], attached[:-1]])
+    _, separation = jax.lax.scan(advance, start, jnp.stack([values["tau1"] * time_scale, before, attached], 1))
+    return separation
 
 
 @jax.jit  # traced once for both passes
-def _accelerations(chain: Chain, driven: _Memory, samples: _Sample) -> tuple[Vector, Vector]:
+def _accelerations(chain: Chain, memories: _Memory, samples: _Sample) -> tuple[Vector, Vector]:
     """Specific force at the CG (m/s^2) and angular acceleration (rad/s^2), each (N,)."""
 
     def at(memory: _Memory, sample: _Sample) -> tuple[Vector, Vector]:
         air = _flow(sample)
-        drive, _ = drive_of(chain, memory.actuators, memory.motor, jnp.zeros(6), sample.time)
+        drive, _ = drive_of(chain, memory.engines.actuators, memory.engines.motor, jnp.zeros(6), sample.time)
         load = steady_load(chain, air, drive, memory.separation, sample.climb)
         load = unsteady_load(chain, air, load, sample.alpha_rate)
         return mass.accelerations(chain.body, sample.rates, load.force, load.moment)
 
-    accelerations: tuple[Vector, Vector] = jax.vmap(at)(driven, samples)
+    accelerations: tuple[Vector, Vector] = jax.vmap(at)(memories, samples)
     return accelerations
+
+
+def _shaken(chain: Chain, memory: _Memory, samples: _Sample, force: Vector) -> _Shaken:
+    """The motion of an airframe that rings under a specific force (N,) at the CG."""
+    mode = _rung(chain, force.z)
+    samples = samples._replace(rates=_without_nod(chain, mode, samples.rates))
+    force, acceleration = _accelerations(chain, memory, samples)
+    return _Shaken(samples.rates, force, acceleration, mode)
 
 
 def _rung(chain: Chain, load: Scalar) -> Scalar:
     """The structural mode (N, 2), displacement m and speed m/s, under a specific force (N,) along z, at rest first."""
 
+    unit = jnp.eye(4)
+    effects = jax.vmap(lambda mode, load0, load1: _ring(chain, mode, load0, load1))(unit[:, :2], unit[:, 2], unit[:, 3])
+
     def advance(mode: Scalar, loads: Scalar) -> tuple[Scalar, Scalar]:
-        now = _ring(chain, mode, loads[0], loads[1])
+        now = (jnp.concatenate([mode, loads])[:, None] * effects).sum(axis=0)
         return now, now
 
     loads = jnp.stack([jnp.concatenate([load[:1], load[:-1]]), load], 1)

@@ -26,7 +26,8 @@ def kept(fixed: int) -> Callable[[Callable[..., _Result]], Callable[..., _Result
     """Decorator: a compiled program for each value of the first ``fixed`` arguments, traced once and for all.
 
     These arguments must be hashable and look the same in every process (functions go by their names); the others and
-    the result are trees of arrays, the result's of plain tuples. Programs cannot be differentiated further.
+    the result are trees of arrays, the result's of tuples that ``jax.export`` knows. Programs cannot be differentiated
+    further.
     """
 
     def decorated(function: Callable[..., _Result]) -> Callable[..., _Result]:

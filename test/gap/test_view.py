@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import jax
 import numpy as np
 
 from sysid_node.gap import view
@@ -35,15 +36,30 @@ def test_kinematics_depend_on_no_other_entries_than_those_named(plain_view) -> N
     )
 
 
-def test_the_flow_is_moved_by_no_other_entries_than_those_named(plain_view) -> None:
-    """Slopes in a flow that is known are those of everything together; truth: JAX, through the flow."""
+def test_slopes_know_what_moves_the_flow(plain_view) -> None:
+    """Slopes by what moves the flow, and by what does not in a flow that is known; truth: JAX, of everything."""
     simulator = plain_view.simulator
     point = simulator.neutral() + 0.01 * np.random.default_rng(0).random(len(simulator.names))
-    entries = np.setdiff1d(np.arange(len(simulator.names)), kinematic(simulator.layout)).tolist()
-    assert len(entries) > 60
-    for some in (entries[first : first + 3] for first in range(0, len(entries), 3)):
-        through, known = (plain_view._slopes_along(e, point, some) for e in (view._forces, view._forces_in))
-        np.testing.assert_allclose(known, through, atol=1e-12 * max(np.abs(through).max(), 1e-3))
+    acting = np.ones(len(point), bool)
+
+    @jax.jit
+    def along(direction: jax.Array) -> list[jax.Array]:
+        def channels(theta: jax.Array) -> list[jax.Array]:
+            return list(view._channels(simulator.layout, simulator.model, theta, acting, plain_view.given, None))
+
+        return jax.jvp(channels, (point,), (direction,))[1]
+
+    motion = kinematic(simulator.layout)
+    others = np.setdiff1d(np.arange(len(point)), motion).tolist()
+    assert len(others) > 60 and len(motion) > 20
+    for expected, entries in ((view._forces_in, others), (view._channels, motion)):
+        direction = np.zeros(len(point))
+        direction[entries] = np.random.default_rng(1).normal(size=len(entries)) * simulator.scales[entries]
+        parts = (entries[first : first + 3] for first in range(0, len(entries), 3))
+        found = sum(plain_view._slopes_along(expected, point, some) @ direction[some] for some in parts)
+        series = np.stack(along(direction), axis=1)[: len(plain_view.record)]
+        truth = plain_view.windows.transform(series)[:, :, : found.shape[2]]
+        np.testing.assert_allclose(found, truth, atol=1e-12 * np.abs(truth).max())
 
 
 def test_what_is_kept_along_with_slopes_is_what_is_predicted(plain_view) -> None:

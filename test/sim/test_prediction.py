@@ -1,5 +1,9 @@
 """Both views of the chain against each other: what a rollout shows, the prediction expects of its own signals."""
 
+from functools import partial
+
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from plain import make_aircraft, three_axes
@@ -14,6 +18,7 @@ from sysid_node.sim.prediction import (
     Signals,
     coefficient_slopes,
     coefficients,
+    predict,
     predict_coefficients,
     signals_of,
 )
@@ -62,6 +67,22 @@ NOT_SEEN = {
     "gust": "the vanes measure it",
     "sensor_noise": "it is in the signals",
 }
+
+
+@pytest.mark.parametrize("effect", [None, "actuator_lag", "stall_separation", "structural_mode"])
+def test_what_does_nothing_may_be_left_out(fast, effect):
+    """Truth: the same with everything worked out."""
+    theta = fast.neutral()
+    for i, (name, parameter) in enumerate(fast.parameters):
+        if name == effect and parameter.switch:
+            theta[i] += 0.5 * parameter.scale
+    trim = trim_flight(fast)
+    inputs = smooth_inputs(fast, trim)
+    signals = signals_from(fast.rollout(fast.neutral(), trim.initial, inputs), inputs.commands)
+    expected = partial(predict, fast.layout, fast.model, jnp.asarray(theta), signals, jnp.asarray(fast.step))
+    whole, part = jax.jit(expected)(), jax.jit(expected)(theta != fast.neutral())
+    for truth, found in zip(jax.tree.leaves(whole), jax.tree.leaves(part), strict=True):
+        np.testing.assert_allclose(found, truth, rtol=0, atol=1e-12 * np.abs(truth).max())
 
 
 @pytest.mark.parametrize("effect", [name for name in EFFECTS if name not in NOT_SEEN])
