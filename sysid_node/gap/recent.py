@@ -10,7 +10,7 @@ _Value = TypeVar("_Value")
 
 
 class Recent(Generic[_Value]):
-    """The latest ``size`` values by key; older ones are forgotten."""
+    """The ``size`` values by key that were asked for last; others are forgotten."""
 
     def __init__(self, size: int) -> None:
         self._size, self._kept, self._lock = size, OrderedDict[bytes, _Value](), Lock()
@@ -18,12 +18,15 @@ class Recent(Generic[_Value]):
     def get(self, key: bytes) -> _Value | None:
         """What was kept under a key, or None."""
         with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
             return self._kept.get(key)
 
     def keep(self, key: bytes, value: _Value) -> _Value:
         """Keeps a value and gives it back."""
         with self._lock:
             self._kept[key] = value
+            self._kept.move_to_end(key)
             if len(self._kept) > self._size:
                 self._kept.popitem(last=False)
         return value

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 from scipy.signal import bilinear, lfilter
@@ -188,7 +189,8 @@ def _seen(
         ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
         rows.append((r * ratio).reshape(r.shape[0], -1, len(CHANNELS)))
         slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2]))
-        basis.append(_basis(view, weight, by))
+        key = by.__name__.encode() + weight.tobytes()
+        basis.append(view.lately(key, partial(_basis, view, weight, by)))
     return basis, rows, slopes
 
 

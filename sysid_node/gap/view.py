@@ -51,8 +51,8 @@ _LANES, _WIDE = 3, 9
 #: Predictions that a view keeps: fits ask for the same point again, and kinematics stay while forces are fitted.
 _KEPT = 32
 
-#: The same of slopes, which are large.
-_SLOPES = 4
+#: The same of slopes, and of what others keep here, which are large.
+_SLOPES, _LATELY = 4, 16
 
 #: Flights are padded to multiples of so many samples: each length is another program to compile.
 _BLOCK = 500
@@ -192,6 +192,7 @@ class View:
     _forces: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
     _slopes: Recent[Complex] = field(default_factory=lambda: Recent(_SLOPES), init=False, repr=False, compare=False)
     _flows: Recent[Flow | None] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
+    _lately: Recent[Any] = field(default_factory=lambda: Recent(_LATELY), init=False, repr=False, compare=False)
     _once: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     _readings: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
 
@@ -201,6 +202,20 @@ class View:
             self._once[name] = work()
         kept: _Kept = self._once[name]
         return kept
+
+    def lately(self, key: bytes, work: Callable[[], _Kept]) -> _Kept:
+        """What follows from this view and what the key tells of: worked out anew when it was long not asked for."""
+        kept: _Kept | None = self._lately.get(key)
+        return self._lately.keep(key, work()) if kept is None else kept
+
+    def programs(self) -> Iterator[Callable[[], object]]:
+        """What calls each of the programs of slopes, which take their time to load or to compile, once."""
+        neutral, motion = self.simulator.neutral(), kinematic(self.simulator.layout)
+        other = _moving(_forces_in, self.simulator.layout)[:1]
+        yield partial(self._slopes_along, _channels, neutral, motion[:_WIDE])
+        yield partial(self._slopes_along, _channels, neutral, motion[:1])
+        yield partial(self._slopes_along, _forces_in, neutral, other)
+        yield partial(self._slopes_by_derivative, neutral)
 
     @property
     def commands(self) -> Array:
@@ -291,7 +306,7 @@ class View:
             expected, s.layout, s.model, theta, acting, directions, self.given, self._flow(theta)
         )
         self._keep(theta, _table(values, len(self.record)))
-        return self.windows.transform(_table(changes, len(self.record))[:, :, : len(indices)])
+        return self.windows.transform(_table(changes, len(self.record), len(indices)))
 
     def _keep(self, theta: Array, series: Array) -> None:
         """Forces (N, 6), or all channels (N, 12), that are expected at parameters (P,)."""
@@ -353,9 +368,10 @@ def _given(simulator: Simulator, record: FlightRecord, memory: Memory) -> tuple[
     return given, np.concatenate([forces, readings], axis=1)
 
 
-def _table(channels: Channels, samples: int) -> Array:
-    """Channels (n, ...), n at least the samples N, as one (N, channels, ...)."""
-    return np.stack([np.asarray(channel)[:samples] for channel in channels], axis=1)
+def _table(channels: Channels, samples: int, *most: int) -> Array:
+    """Channels (n, ...), n at least the samples N, as one (N, channels, ...); of further axes the first ``most``."""
+    wanted = tuple(map(slice, (samples, *most)))
+    return np.stack([np.asarray(channel)[wanted] for channel in channels], axis=1)
 
 
 def _padded(series: Scalar | Array, short: int) -> Scalar:

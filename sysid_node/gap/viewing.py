@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +43,11 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
     axes[[CHANNELS.index(name) for name in flight.inferred]] = False
     axes[CHANNELS.index(unmetered.CHANNEL)] &= flight.metered
-    calm = _measured_noise(bare(simulator, flight, record, windows, axes, Memory(LONGEST, LONGEST)), seed)
+    silent = bare(simulator, flight, record, windows, axes, Memory(LONGEST, LONGEST))
+    with ThreadPoolExecutor(2) as pool:  # meanwhile: most of it needs neither Python's lock nor each other
+        for program in silent.programs():
+            pool.submit(program)
+        calm = _measured_noise(silent, seed)
     instruments = instruments_at_best(calm)
     calm = replace(calm, gusts=gusts_of(calm, instruments))
     memory = memory_of(calm, instruments)

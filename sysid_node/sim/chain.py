@@ -16,7 +16,6 @@ from sysid_node.sim.effects import stall_separation, steady_wind, unsteady_aerod
 from sysid_node.sim.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.parameters import Parameters, unpack
 from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
-from sysid_node.sim.stations.actuator import ActuatorState
 from sysid_node.sim.stations.aerodynamics import Coefficients
 from sysid_node.sim.stations.airflow import Air
 
@@ -136,10 +135,9 @@ def separation_rate(chain: Chain, air: Air, separation: Scalar, alpha_rate: Scal
     return stall_separation.rate(values, separation, attached, time_scale)
 
 
-def drive_of(
-    chain: Chain, actuators: ActuatorState, motor: Scalar, gusts: Scalar, time: Scalar
-) -> tuple[Drive, Scalar]:
-    """What moves the body, and the true surfaces and thrust (controls + 1,), at a time (s)."""
+def drive_of(chain: Chain, actuators: Scalar, motor: Scalar, gusts: Scalar, time: Scalar) -> tuple[Drive, Scalar]:
+    """What moves the body, and the true surfaces and thrust (controls + 1,), at a time (s), by where the actuators
+    (controls,) stand (rad) and the motor (N)."""
     surfaces = actuator.positions(chain.layout, chain.effects, actuators, time)
     effective = actuator.effective(chain.layout, chain.effects, surfaces, time)
     thrust = propulsion.thrust(chain.effects, motor)

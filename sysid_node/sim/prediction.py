@@ -18,7 +18,6 @@ from typing import NamedTuple, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
@@ -28,13 +27,12 @@ from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import body as rigid
 from sysid_node.sim.body import Vector
 from sysid_node.sim.chain import Chain, drive_of, steady_load, unsteady_load
-from sysid_node.sim.effects import stall_separation
+from sysid_node.sim.effects import actuator_backlash, actuator_lag, actuator_rate_limit, stall_separation
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.layout import Layout, Model, Scalar
 from sysid_node.sim.parameters import Parameters, table
 from sysid_node.sim.simulator import Simulator
-from sysid_node.sim.stations import actuator, airflow, command, mass, propulsion, sensors, structure
-from sysid_node.sim.stations.actuator import ActuatorState
+from sysid_node.sim.stations import airflow, command, mass, propulsion, sensors, structure
 from sysid_node.sim.stations.aerodynamics import Coefficients
 from sysid_node.sim.stations.airflow import Air
 from sysid_node.sim.timing import shift_cubic, slope
@@ -43,9 +41,8 @@ Array = NDArray[np.float64]
 
 _Result = TypeVar("_Result")
 
-#: Effects that give commands a memory, the flow one, and those of an airframe that rings.
-_REMEMBERED = frozenset({"actuator_lag", "actuator_backlash", "actuator_rate_limit", "motor_lag"})
-_SEPARATED, _RINGING = frozenset({"stall_separation"}), frozenset({"structural_mode"})
+#: Whether an effect does something; None: not known.
+_Acts = Callable[[str], Scalar | None]
 
 #: What ``coefficients`` gives, in this order.
 COEFFICIENTS = Coefficients._fields
@@ -70,19 +67,12 @@ class Accelerations(NamedTuple):
     turning: Vector  # (N,) rates of the gyroscopes' readings, rad/s^2
 
 
-class _Engines(NamedTuple):
-    """What commands leave behind."""
-
-    actuators: ActuatorState
-    motor: Scalar
-    motor_command: Scalar
-
-
 class _Memory(NamedTuple):
     """What commands and flow leave behind, whatever forces come of it."""
 
-    engines: _Engines
-    separation: Scalar
+    actuators: Scalar  # (N, controls) rad
+    motor: Scalar  # (N,) N
+    separation: Scalar  # (N,) attached fraction of the flow
 
 
 class _Shaken(NamedTuple):
@@ -116,15 +106,15 @@ def predict(
     """
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
     samples = _true_motion(chain, signals)
-    remembers, separates, rings = (_any_acts(layout, acting, e) for e in (_REMEMBERED, _SEPARATED, _RINGING))
-    at_rest = partial(jax.vmap(partial(_engines_at_rest, chain)), samples.command)
+    acts = partial(_acts, layout, acting)
     memory = _Memory(
-        _either(remembers, lambda: _engines(chain, samples.command), at_rest),
-        _either(separates, lambda: _separation(chain, samples), lambda: jnp.ones_like(samples.time)),
+        _actuators(chain, samples.command[:, :-1], acts),
+        _motor(chain, samples.command[:, -1], acts),
+        _either(acts("stall_separation"), lambda: _separation(chain, samples), lambda: jnp.ones_like(samples.time)),
     )
     force, acceleration = _accelerations(chain, memory, samples)
     still = _Shaken(samples.rates, force, acceleration, jnp.zeros((*force.z.shape, 2)))
-    shaken = _either(rings, lambda: _shaken(chain, memory, samples, force), lambda: still)
+    shaken = _either(acts("structural_mode"), lambda: _shaken(chain, memory, samples, force), lambda: still)
     readings = _readings(chain, *shaken)
     late = chain.effects["imu_delay"]["delay"] / step
     delayed: Accelerations = jax.tree.map(lambda series: shift_cubic(series, late), readings)
@@ -205,11 +195,11 @@ def _speed_of_climb(roll: Scalar, pitch: Scalar, airspeed: Scalar, alpha: Scalar
     return -rigid.to_earth(attitude, airflow.velocity_of(airspeed, alpha, beta)).z
 
 
-def _any_acts(layout: Layout, acting: Scalar | None, effects: frozenset[str]) -> Scalar | None:
-    """Whether any of these effects does something; None: not known."""
+def _acts(layout: Layout, acting: Scalar | None, effect: str) -> Scalar | None:
+    """Whether an effect does something; None: not known."""
     if acting is None:
         return None
-    return acting[np.array([i for i, (effect, p) in enumerate(table(layout)) if effect in effects and p.switch])].any()
+    return acting[np.array([i for i, (name, p) in enumerate(table(layout)) if name == effect and p.switch])].any()
 
 
 def _either(condition: Scalar | None, this: Callable[[], _Result], other: Callable[[], _Result]) -> _Result:
@@ -246,33 +236,49 @@ def _flow(sample: _Sample) -> Air:
     return Air(sample.velocity, sample.rates, speed, alpha, beta, sample.density)
 
 
-def _engines(chain: Chain, commands: Scalar) -> _Engines:
-    """Actuators and motor at each sample (N,) of commands (N, controls + 1), settled on the first."""
-    start = _engines_at_rest(chain, commands[0])
-    _, unpack = ravel_pytree(start)
+def _actuators(chain: Chain, commands: Scalar, acts: _Acts) -> Scalar:
+    """Where the actuators stand at each sample (N, controls) of their commands, at rest on the first.
 
-    def advance(engines: _Engines, command: Scalar) -> tuple[_Engines, Scalar]:
-        now = _advance(chain, engines, command)
-        return now, ravel_pytree(now)[0]  # one row out: XLA would copy whole series at every step
+    Stage by stage, as ``actuator.advance`` has them.
+    """
+    effects, h, controls = chain.effects, chain.step, chain.layout.controls
 
-    _, rows = jax.lax.scan(advance, start, commands)
-    engines: _Engines = jax.vmap(unpack)(rows)
-    return engines
+    def linked(x: Scalar, u: Scalar) -> Scalar:
+        play = effects["actuator_backlash"]
+        return jnp.stack([actuator_backlash.advance(play, name, x[i], u[i]) for i, name in enumerate(controls)])
 
-
-def _engines_at_rest(chain: Chain, command: Scalar) -> _Engines:
-    """As a command (controls + 1,) that has long been the same leaves them."""
-    motor = propulsion.commanded(chain.model, command[-1])
-    return _Engines(actuator.start(chain.model, command[:-1]), motor, motor)
+    limited = jnp.clip(commands, -chain.model.limits, chain.model.limits)
+    lag, rate = (partial(e.advance, effects[e.EFFECT.name]) for e in (actuator_lag, actuator_rate_limit))
+    position = _lagged(acts("actuator_lag"), lambda x, before, now: lag(x, before, now, h), limited)
+    position = _carried(acts("actuator_backlash"), linked, position)
+    return _carried(acts("actuator_rate_limit"), lambda x, u: rate(x, u, h), position)
 
 
-def _advance(chain: Chain, engines: _Engines, command: Scalar) -> _Engines:
-    """One sample on."""
-    h = chain.step
-    actuators = actuator.advance(chain.layout, chain.model, chain.effects, engines.actuators, command[:-1], h)
-    motor_command = propulsion.commanded(chain.model, command[-1])
-    motor = propulsion.advance(chain.effects, engines.motor, engines.motor_command, motor_command, h)
-    return _Engines(actuators, motor, motor_command)
+def _motor(chain: Chain, commands: Scalar, acts: _Acts) -> Scalar:
+    """The motor's thrust (N,) at each sample of its commands."""
+    able = propulsion.commanded(chain.model, commands)
+    advance = partial(propulsion.advance, chain.effects, step=chain.step)
+    return _lagged(acts("motor_lag"), advance, able)
+
+
+def _carried(acts: Scalar | None, advance: Callable[[Scalar, Scalar], Scalar], series: Scalar) -> Scalar:
+    """What remembers where it was, at each sample of a series (N, ...) that moves it; the series, if it does not."""
+
+    def step(last: Scalar, now: Scalar) -> tuple[Scalar, Scalar]:
+        there = advance(last, now)
+        return there, there
+
+    return _either(acts, lambda: jax.lax.scan(step, series[0], series)[1], lambda: series)
+
+
+def _lagged(acts: Scalar | None, advance: Callable[[Scalar, Scalar, Scalar], Scalar], series: Scalar) -> Scalar:
+    """The same of what also remembers what moved it."""
+
+    def step(last: tuple[Scalar, Scalar], now: Scalar) -> tuple[tuple[Scalar, Scalar], Scalar]:
+        there = advance(*last, now)
+        return (there, now), there
+
+    return _either(acts, lambda: jax.lax.scan(step, (series[0], series[0]), series)[1], lambda: series)
 
 
 def _separation(chain: Chain, samples: _Sample) -> Scalar:
@@ -297,7 +303,7 @@ def _accelerations(chain: Chain, memories: _Memory, samples: _Sample) -> tuple[V
 
     def at(memory: _Memory, sample: _Sample) -> tuple[Vector, Vector]:
         air = _flow(sample)
-        drive, _ = drive_of(chain, memory.engines.actuators, memory.engines.motor, jnp.zeros(6), sample.time)
+        drive, _ = drive_of(chain, memory.actuators, memory.motor, jnp.zeros(6), sample.time)
         load = steady_load(chain, air, drive, memory.separation, sample.climb)
         load = unsteady_load(chain, air, load, sample.alpha_rate)
         return mass.accelerations(chain.body, sample.rates, load.force, load.moment)

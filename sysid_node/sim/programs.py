@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
 from collections.abc import Callable
 from functools import cache, partial, wraps
 from importlib.util import find_spec
@@ -67,7 +68,7 @@ def _program(what: str, traced: Callable[[], export.Exported]) -> export.Exporte
         found = traced()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        own = path.with_suffix(f".{os.getpid()}")
+        own = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         own.write_bytes(found.serialize())
         own.replace(path)
     except OSError:

@@ -98,7 +98,7 @@ def advance(
     actuators = actuator.advance(chain.layout, chain.model, chain.effects, carry.actuators, arriving[:-1], h)
     motor_command = propulsion.commanded(chain.model, arriving[-1])
     motor = propulsion.advance(chain.effects, carry.motor, carry.motor_command, motor_command, h)
-    drive, surfaces = drive_of(chain, actuators, motor, gusts, time)
+    drive, surfaces = drive_of(chain, actuators.position, motor, gusts, time)
     x = _runge_kutta(chain, carry.x, k1, carry.drive, drive)
     moved = jnp.concatenate([surfaces, given])
     row = (reading, carry.x[:13], jnp.stack(motion.coefficients), moved)
@@ -163,7 +163,7 @@ def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_s
     """Everything settled on the first sample's command and flow, and the surfaces (controls + 1,) there."""
     actuators = actuator.start(chain.model, planned[:-1])
     motor = propulsion.commanded(chain.model, planned[-1])
-    drive, surfaces = drive_of(chain, actuators, motor, gusts, jnp.zeros_like(chain.step))
+    drive, surfaces = drive_of(chain, actuators.position, motor, gusts, jnp.zeros_like(chain.step))
     x = settled(chain, initial, drive)
     _, motion = derivative(chain, x, drive)
     truth = _at_probe(chain, motion)

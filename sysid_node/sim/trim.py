@@ -129,7 +129,7 @@ def _residual(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scal
     command = z[len(_ANGLES) :]
     zero = jnp.zeros(())
     motor = propulsion.commanded(model, command[-1])
-    drive, _ = drive_of(chain, actuator.start(model, command[:-1]), motor, jnp.zeros(6), zero)
+    drive, _ = drive_of(chain, actuator.start(model, command[:-1]).position, motor, jnp.zeros(6), zero)
     state = _state(point, z)
     rates, _ = derivative(chain, settled(chain, state, drive), drive)
     body = rigid.unpack(state)

@@ -34,7 +34,7 @@ def slopes() -> tuple[np.ndarray, np.ndarray]:
         command = jnp.asarray(trim.command).at[:3].add(z[5:])
         zero = jnp.zeros(())
         motor = propulsion.commanded(simulator.model, command[-1])
-        drive, _ = drive_of(chain, actuator.start(simulator.model, command[:-1]), motor, jnp.zeros(6), zero)
+        drive, _ = drive_of(chain, actuator.start(simulator.model, command[:-1]).position, motor, jnp.zeros(6), zero)
         d = np.asarray(derivative(chain, settled(chain, initial, drive), drive)[0])
         u_dot, v_dot, w_dot = d[3:6]
         a = trim.alpha + alpha

@@ -55,7 +55,7 @@ class Trimmed:
         theta = jnp.asarray(simulator.vector(effects))
         chain = Chain.of(simulator.layout, simulator.model, theta, jnp.asarray(0.01), -initial[2])
         rest = actuator.start(simulator.model, jnp.asarray(self.trim.command[:-1]))
-        drive, _ = drive_of(chain, rest, jnp.asarray(self.trim.command[-1]), jnp.zeros(6), jnp.zeros(()))
+        drive, _ = drive_of(chain, rest.position, jnp.asarray(self.trim.command[-1]), jnp.zeros(6), jnp.zeros(()))
         return derivative(chain, settled(chain, initial, drive), drive)
 
     def fly(self, effects, deflections=None, **inputs):

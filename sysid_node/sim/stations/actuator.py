@@ -52,11 +52,11 @@ def advance(
     return ActuatorState(limited, jnp.stack(lagged), jnp.stack(linked), jnp.stack(position))
 
 
-def positions(layout: Layout, effects: dict[str, Values], state: ActuatorState, time: Scalar) -> list[Scalar]:
-    """Where each surface stands, rad."""
+def positions(layout: Layout, effects: dict[str, Values], actuators: Scalar, time: Scalar) -> list[Scalar]:
+    """Where each surface stands, rad, by where the actuators (..., controls) do."""
     surfaces = []
     for i, control in enumerate(layout.controls):
-        x = actuator_bias.apply(effects["actuator_bias"], control, state.position[..., i])
+        x = actuator_bias.apply(effects["actuator_bias"], control, actuators[..., i])
         surfaces.append(stuck_surface.apply(effects["stuck_surface"], control, x, time))
     return surfaces
 
