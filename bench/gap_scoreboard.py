@@ -26,6 +26,9 @@ from withheld import judging, ledger, scoreboard
 from withheld.closing import closed
 from withheld.drawing import FOREIGN, SETS, Case, draw
 
+#: Minutes of a day.
+_DAY = 24 * 60
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -80,7 +83,11 @@ def _failed(case: Path) -> list[str]:
 
 
 def _over(until: str | None) -> bool:
-    return until is not None and time.strftime("%H:%M") >= until
+    """Whether a time of day has come: twelve hours before it, it has not, whatever midnight lies between."""
+    if until is None:
+        return False
+    wanted, now = (60 * int(said[:2]) + int(said[3:]) for said in (until, time.strftime("%H:%M")))
+    return (wanted - now) % _DAY > _DAY // 2 or wanted == now
 
 
 def _finish(which: str, truth: Case, folder: Path, *, fly_only: bool, further: bool) -> None:
