@@ -52,7 +52,7 @@ _LANES, _WIDE = 3, 9
 _KEPT = 32
 
 #: The same of slopes, and of what others keep here, which are large.
-_SLOPES, _LATELY = 4, 16
+_SLOPES, _LATELY = 4, 8
 
 #: Flights are padded to multiples of so many samples: each length is another program to compile.
 _BLOCK = 500
