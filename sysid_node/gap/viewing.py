@@ -44,7 +44,7 @@ def view_of(simulator: Simulator, flight: Flight, seed: int = 0) -> View:
     axes[[CHANNELS.index(name) for name in flight.inferred]] = False
     axes[CHANNELS.index(unmetered.CHANNEL)] &= flight.metered
     silent = bare(simulator, flight, record, windows, axes, Memory(LONGEST, LONGEST))
-    with ThreadPoolExecutor(2) as pool:  # meanwhile: most of it needs neither Python's lock nor each other
+    with ThreadPoolExecutor(1) as pool:  # meanwhile: it needs the processor more than Python's lock
         for program in silent.programs():
             pool.submit(program)
         calm = _measured_noise(silent, seed)
