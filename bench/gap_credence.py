@@ -1,6 +1,6 @@
 """How far a cause can be believed: the weights of ``sysid_node.gap.credence``, learned from flights of known truth.
 
-    python bench/gap_credence.py out/development.jsonl out/final.jsonl:36-59 [--page docs/gap.md]
+    python bench/gap_credence.py bench/withheld/seeds_820.jsonl bench/withheld/seeds_1200.jsonl [--page docs/gap.md]
 
 Reads ledgers of ``bench/gap_scoreboard.py`` (or some seeds of them): the grounds of every cause that was named or
 doubted, and by the label whether it was there. A logistic regression by Firth's (1993) penalised

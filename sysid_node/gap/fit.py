@@ -485,10 +485,9 @@ def bounded(information: Array, right: Array, low: Array, high: Array) -> Array:
 
 
 def _root(information: Array) -> Array:
-    """Upper factor R of information = R' R, whose diagonal is one.
+    """Upper factor R (K, K) of information = R' R (K, K), whose diagonal is one.
 
-    Slopes may be so large, and so alike, that rounding drowns the priors: then a trace of them is put
-    back.
+    Where slopes are so large, and so alike, that rounding drowns the priors, a trace of these is added again.
     """
     try:
         return np.asarray(np.linalg.cholesky(information).T)

@@ -86,8 +86,9 @@ def settled(
 def _standing(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
     """What of an explanation stands, and what flight not fitted says of it.
 
-    All causes, else with sizes as least squares has them, else without the least probable one, else none; each also
-    beside the file's own derivatives. Of one of which no numbers come on flight not fitted nothing stands.
+    The first that predicts better: all causes; the same with sizes as least squares has them; without the least
+    probable one; none. Each is also held beside the file's own derivatives, and passed over where its predictions of
+    flight not fitted are no numbers.
     """
     for explanation in _explanations(attribution):
         try:
