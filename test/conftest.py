@@ -1,6 +1,11 @@
 """What all tests share."""
 
 import os
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import hypothesis
@@ -12,6 +17,12 @@ hypothesis.settings.load_profile("fixed")
 
 ROOT = Path(__file__).resolve().parents[1]
 
+_BROWSER_FLAGS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--enable-logging=stderr", "--virtual-time-budget=20000", "--host-resolver-rules=MAP * ~NOTFOUND"),
+)
+
 
 @pytest.fixture(scope="session")
 def flights() -> Path:
@@ -20,3 +31,32 @@ def flights() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real flight records not found at {folder} (set SYSID_FLIGHTS to their folder)")
     return folder
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a browser made of a report."""
+
+    complaints: list[str]
+    plots: int
+    drawn: int
+
+
+@pytest.fixture
+def browse(tmp_path) -> Callable[[Path], Page]:
+    """Opens a report in a real browser, without a network; the test skips where there is none."""
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("no Chromium or Chrome found")
+
+    def page(path: Path) -> Page:
+        command = [chromium, *_BROWSER_FLAGS, f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", path.as_uri()]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+        drawn = done.stdout.count('class="user-select-none svg-container"')
+        return Page(
+            re.findall(r".*CONSOLE.*", done.stderr),
+            len(re.findall(r'<div class="plot\b[^>]*role="img"', done.stdout)),
+            drawn,
+        )
+
+    return page

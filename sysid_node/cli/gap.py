@@ -88,7 +88,8 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
         (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
         _write_csv(folder / "where.csv", ["station", "axis", "share"],
                    [[w["station"], w["axis"], w["share"]] for w in found.where])  # fmt: skip
-        _write_csv(folder / "candidates.csv", ["effect", "probability"], [list(row) for row in found.attribution.table])
+        _write_csv(folder / "candidates.csv", ["effect", "probability", "share"],
+                   [list(candidate.values()) for candidate in content["candidates"]])  # fmt: skip
         (folder / "corrected.yaml").write_text(dump_aircraft(corrected(found)), encoding="utf-8")
         (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
         write_gap_report(folder / "report.html", found)

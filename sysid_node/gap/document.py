@@ -34,7 +34,9 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
         "doubted": [_doubted(cause) for cause in attribution.doubted],
-        "candidates": [{"effect": label, "probability": p} for label, p in attribution.table],
+        "candidates": [
+            {"effect": label, "probability": probability, "share": share} for label, probability, share in ranked(found)
+        ],
         "unexplained": {
             "share": 1.0 - explained(attribution) if structured(attribution) or wanting(attribution) else 0.0,
             "where": [w for w in found.where if w["station"] == "unexplained"][:3],
@@ -42,6 +44,21 @@ def document(found: Diagnosis) -> dict[str, Any]:
         },
         "next_flight": found.next_flight,
     }
+
+
+def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
+    """Effects that were tried alone, the one that predicts best first: label, probability that it is there, share.
+
+    Shares rank predictions of flight not fitted among one another, of derivatives within their tolerances ("none") too:
+    one of them is always the best, whatever is there. What did not pass as a cause, or as one that it cannot be told
+    from, has no probability.
+    """
+    attribution = found.attribution
+    effects = {t.added.label: t.added.effect for t in attribution.trials if t.added}
+    weighed = (*attribution.doubted, *attribution.causes)
+    instead = {e: share * cause.grounds.credence for cause in weighed for e, share in cause.alternatives}
+    own = {cause.candidate.label: cause.probability for cause in weighed}
+    return [(label, own.get(label, instead.get(effects.get(label, ""))), p) for label, p in attribution.table]
 
 
 def _gap(gap: Gap) -> dict[str, Any]:

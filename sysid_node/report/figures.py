@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#AA4499"
-INK, MUTED, GRID = "#1f2933", "#8a94a0", "#e6eaef"
+INK, MUTED, PALE, GRID = "#1f2933", "#8a94a0", "#bcc5cf", "#e6eaef"
 BLUE_BAND, GREY_BAND = "rgba(0,114,178,0.20)", "rgba(138,148,160,0.20)"
 
 Trace = dict[str, Any]

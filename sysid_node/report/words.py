@@ -156,6 +156,13 @@ def number(value: float, digits: int = 3) -> str:
     return _power(value / 10.0**exponent, digits - 1, exponent)
 
 
+def likely(probability: float) -> str:
+    """A probability in two decimals, never as certain: ``0.83``, ``over 0.99``, ``under 0.01``."""
+    if probability >= 0.995:
+        return "over 0.99"
+    return f"{probability:.2f}" if probability >= 0.005 else "under 0.01"
+
+
 def with_interval(value: float, half_width: float) -> str:
     """``value \u00b1 half width``, the half width with two significant digits; NONE where there is no value."""
     if not math.isfinite(value):

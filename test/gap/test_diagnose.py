@@ -13,6 +13,7 @@ from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.holdout import Check
 from sysid_node.gap.verdict import _sampling, verdict_of
+from sysid_node.report.gap import write_gap_report
 from sysid_node.report.sections.gap import candidates
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
@@ -70,13 +71,32 @@ def test_the_document_is_json_and_its_shares_add_up(lagging) -> None:
     assert {"verdict", "gap", "where", "causes", "unexplained", "next_flight"} <= found.keys()
 
 
+def test_its_report_is_drawn_without_a_complaint(lagging, tmp_path, browse) -> None:
+    write_gap_report(tmp_path / "report.html", lagging)
+    page = browse(tmp_path / "report.html")
+    assert page.complaints == []
+    assert page.drawn == page.plots > len(lagging.flown.per_channel)
+
+
 def test_what_is_doubted_is_told(lagging) -> None:
     attribution = replace(lagging.attribution, causes=(), doubted=lagging.attribution.causes)
     found = replace(lagging, attribution=attribution)
     assert [c["effect"] for c in document(found)["doubted"]] == ["actuator_lag"]
     assert document(found)["doubted"][0]["parameters"] == document(lagging)["causes"][0]["parameters"]
-    assert re.match(r"actuator lag \(\S+; time constant 0\.0[78]\S* ± \S+ s\)", candidates(found)["doubted"])
+    assert re.match(
+        r"actuator lag \(probability over 0\.99; time constant 0\.0[78]\S* ± \S+ s\)", candidates(found)["doubted"]
+    )
     assert not candidates(lagging)["doubted"]
+
+
+def test_the_best_of_the_list_is_not_there_for_that(lagging) -> None:
+    (cause,) = lagging.attribution.causes
+    best, *others = document(lagging)["candidates"]
+    assert (best["effect"], best["probability"]) == ("actuator_lag", cause.probability)
+    assert best["share"] + sum(c["share"] for c in others) == pytest.approx(1.0)
+    found = replace(lagging, attribution=replace(lagging.attribution, causes=(), doubted=()))
+    best, *others = document(found)["candidates"]
+    assert best["share"] > 0.9 and {c["probability"] for c in (best, *others)} == {None}
 
 
 def test_tolerances_are_no_gap(aircraft) -> None:

@@ -58,6 +58,12 @@ def test_every_standard_derivative_has_words_of_its_own():
     assert not any("_" in text for text in said)
 
 
+def test_no_probability_is_certainty():
+    assert [words.likely(p) for p in (1.0, 0.9996, 0.994, 0.8312, 0.005, 0.0)] == [
+        *("over 0.99", "over 0.99", "0.99", "0.83", "0.01", "under 0.01")
+    ]
+
+
 def test_symbols():
     assert words.symbol("Cm_alpha") == '<span class="symbol"><i>C</i><sub>m\u202fα</sub></span>'
     assert "δe" in words.symbol("CL_de")

@@ -14,13 +14,14 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.evidence import carried
 from sysid_node.gap.flown import READINGS, WINDOW, drawn, shows
+from sysid_node.gap.localise import REGIMES
 from sysid_node.gap.verdict import structured
 from sysid_node.gap.view import CHANNELS
 from sysid_node.report import figures
-from sysid_node.report.figures import BLUE, GREEN, INK, MUTED, PURPLE, VERMILION, Figure
+from sysid_node.report.figures import BLUE, GREEN, INK, MUTED, PALE, PURPLE, VERMILION, Figure
 from sysid_node.report.sections.gap_words import WORDS, paragraph, percent, units_of
 from sysid_node.report.thin import thin_curve
-from sysid_node.report.words import number, symbol, with_interval, words_of
+from sysid_node.report.words import NONE, REGRESSOR_WORDS, likely, number, symbol, with_interval, words_of
 from sysid_node.sim.layout import OUTPUTS
 from sysid_node.sim.prediction import COEFFICIENTS
 
@@ -39,6 +40,9 @@ _STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
 _UNITS = {**dict.fromkeys(("ax", "ay", "az"), "m/s²"), **dict.fromkeys("pqr", "rad/s"), "V": "m/s"}
 _GREEK = {"phi": "φ", "theta": "θ", "psi": "ψ", "alpha": "α", "beta": "β"}
 _UNITS |= dict.fromkeys(("phi", "theta", "alpha", "beta"), "rad")
+
+#: Signals of a regime, in words.
+_SIGNALS = {**WORDS, "thrust": "thrust"}
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, "#E69F00", "#56B4E9", "#CC79A7", "#999999")
 
@@ -67,10 +71,10 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
         (w["station"], WORDS[w["axis"]], percent(w["share"]),
          "{} to {} Hz".format(*(number(x, 2) for x in w["band_hz"])),
          "{} to {} s".format(*(number(x, 3) for x in w["window_s"])),
-         ", ".join(f"{n} {number(a, 2)} to {number(b, 2)}" for n, (a, b) in w["regime"].items()))
+         ", ".join(f"{_SIGNALS[n]} {number(a, 2)} to {number(b, 2)} {REGIMES[n]}" for n, (a, b) in w["regime"].items()))
         for w in found.where[:8]
     ]  # fmt: skip
-    return {"figure": _waterfall(found), "rows": rows}
+    return {"figure": _waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect"}
 
 
 def _waterfall(found: Diagnosis) -> Figure:
@@ -161,7 +165,7 @@ def _coefficients(found: Diagnosis) -> list[Panel]:
 
 def _panel(name: str, time: Array, measured: Array, before: Array, after: Array, unit: str = "") -> Panel:
     time, *curves = thin_curve(time, measured, before, after)
-    styles = (("measured", MUTED, "solid", 2.2), ("file", VERMILION, "solid", 1.2), ("corrected", BLUE, "solid", 1.4))
+    styles = (("measured", PALE, "solid", 4.5), ("file", VERMILION, "solid", 1.2), ("corrected", BLUE, "solid", 1.4))
     traces = [
         figures.line(time, c, n, colour=colour, dash=dash, width=width)
         for c, (n, colour, dash, width) in zip(curves, styles, strict=True)
@@ -177,23 +181,30 @@ def _panel(name: str, time: Array, measured: Array, before: Array, after: Array,
 
 def candidates(found: Diagnosis) -> Mapping[str, Any]:
     """Every effect that was fitted to the end, alone; and the causes with their parameters."""
-    rows = [(words_of(label), f"{100 * p:.1f}", 100 * p) for label, p in found.attribution.table]
     said = document(found)
-    doubted = [
-        f"{words_of(c['label'])} ({'; '.join([number(c['probability'], 2), *map(' '.join, _parameters(c))])})"
-        for c in said["doubted"]
-    ]
+    rows = [
+        (words_of(c["effect"]), NONE if c["probability"] is None else likely(c["probability"]),
+         f"{100 * c['share']:.1f}", 100 * c["share"])
+        for c in said["candidates"]
+    ]  # fmt: skip
+    doubted = [_doubted(c) for c in said["doubted"]]
     causes = [
         {
             "name": words_of(c["label"]),
             "station": c["station"],
-            "probability": number(c["probability"], 2),
+            "probability": likely(c["probability"]),
             "parameters": _parameters(c),
             "rivals": ", ".join(words_of(r) for r in c["indistinguishable_from"]),
         }
         for c in said["causes"]
     ]
     return {"rows": rows, "causes": causes, "doubted": ", ".join(doubted), "confusion": _confusion(found)}
+
+
+def _doubted(cause: Mapping[str, Any]) -> str:
+    """``actuator lag (probability 0.42; time constant 0.110 ± 0.006 s)``."""
+    said = [f"probability {likely(cause['probability'])}", *map(" ".join, _parameters(cause))]
+    return f"{words_of(cause['label'])} ({'; '.join(said)})"
 
 
 def _parameters(cause: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -239,13 +250,14 @@ def shape(found: Diagnosis) -> Mapping[str, Any]:
     missing = found.shape
     if missing is None:
         return {"figure": None, "words": "", "left": structured(found.attribution)}
+    signal = _SIGNALS.get(missing.signal) or REGRESSOR_WORDS.get(missing.signal, missing.signal)
     trace = figures.line(missing.centres, missing.means, missing.axis)
     trace |= {"mode": "lines+markers", "error_y": {"type": "data", "array": (1.96 * missing.errors).tolist()}}
     layout = {
-        "xaxis": figures.axis(f"{missing.signal}, {missing.unit}"),
+        "xaxis": figures.axis(f"{signal}, {missing.unit}"),
         "yaxis": figures.axis(f"missing {missing.axis}"),
     }
-    words = f"The missing {WORDS[missing.axis]} against {missing.signal}"
+    words = f"The missing {WORDS[missing.axis]} against {signal}"
     return {
         "figure": Figure(words, [trace], layout, 300),
         "words": f"{words}; the bins explain {number(100 * missing.explained, 2)} % of it",

@@ -11,7 +11,7 @@ from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.flown import WINDOW
-from sysid_node.report.words import COEFFICIENT_WORDS, REGRESSOR_WORDS, number, with_interval, words_of
+from sysid_node.report.words import COEFFICIENT_WORDS, REGRESSOR_WORDS, likely, number, with_interval, words_of
 from sysid_node.sim import EFFECTS
 from sysid_node.sim.layout import Layout
 
@@ -167,7 +167,7 @@ def _cause(cause: Mapping[str, Any]) -> str:
     ]
     rivals = cause["indistinguishable_from"]
     beside = f"; or {', '.join(words_of(r) for r in rivals)}" if rivals else ""
-    sure = f"probability {number(cause['probability'], 2)}"
+    sure = f"probability {likely(cause['probability'])}"
     return f"{words_of(cause['label'])} ({'; '.join([*shown[:4], sure])}{beside})"
 
 
