@@ -71,6 +71,12 @@ def _wholly(cases: _Cases) -> list[Judged]:
     return [c for c in _named(cases) if c.every is not False]
 
 
+def _held(cases: _Cases, *, still: bool) -> list[bool]:
+    """Whether each size lies within its own 95 % interval, however narrow."""
+    own = [c for c in _named(cases) if (c.label["turbulence"] == "none") == still]
+    return [abs(found - true) <= 1.96 * error for c in own for _, true, found, error in c.parameters]
+
+
 def _of_kind(cases: _Cases, kind: str) -> list[Judged]:
     return [c for c in cases if c.kind == kind]
 
@@ -83,6 +89,8 @@ _SCORES = (
     ("two effects: both named", lambda c: [bool(x.every) for x in _of_kind(c, "two")], "70 %"),
     ("of those named: parameters within 15 % or their intervals",
      lambda c: [x.sized for x in _named(c) if x.sized is not None], "90 %"),
+    ("each parameter: within its 95 % interval, still air", lambda c: _held(c, still=True), ""),
+    ("the same, turbulence", lambda c: _held(c, still=False), ""),
     ("of those with an onset: within 2 s", lambda c: [x.onset <= 2.0 for x in _named(c) if x.onset is not None], "all"),
     ("no effect: no_gap",
      lambda c: [x.right for x in _of_kind(c, "none") if x.label["plant"] != FOREIGN], "95 %"),
