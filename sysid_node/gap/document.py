@@ -8,7 +8,7 @@ from typing import Any
 from sysid_node.gap.belief import Cause
 from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.errors import standard_errors
+from sysid_node.gap.errors import standard_errors, stated
 from sysid_node.gap.fit import Fit
 from sysid_node.gap.flown import WINDOW
 from sysid_node.gap.sizes import unbiased
@@ -102,14 +102,11 @@ def _doubted(cause: Cause) -> dict[str, Any]:
 def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:
     """Value and standard error of each of a cause's parameters, in the simulator's units."""
     simulator, places = fit.views[0].simulator, {index: place for place, index in enumerate(fit.indices)}
-    errors = standard_errors(fit)
-    if cause.candidate.indices:
-        return {
-            simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])]
-            for i in cause.candidate.indices
-        }
-    ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-    ordered += [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if not s]
-    places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
-    own = [i for i in ordered if i in cause.candidate.widened]
-    return {simulator.parameters[i][1].name: [float(fit.points[0][i]), float(errors[places[i]])] for i in own}
+    own = cause.candidate.indices
+    if not own:
+        ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+        ordered += [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if not s]
+        places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
+        own = tuple(i for i in ordered if i in cause.candidate.widened)
+    errors, names = standard_errors(fit), {i: simulator.parameters[i][1].name for i in own}
+    return {name: stated(name, float(fit.points[0][i]), float(errors[places[i]])) for i, name in names.items()}
