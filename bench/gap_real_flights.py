@@ -164,8 +164,8 @@ def section(folder: Path, flight: Flight) -> str:
         parts.append(f"To fly next: {found['next_flight']}")
     best = found.get("candidates", [])[:6]
     if best:
-        said = ", ".join(f"{c['effect']} {c['probability']:.2f}" for c in best)
-        parts.append(f"Candidates by themselves, with their probabilities: {said}.")
+        said = ", ".join(f"{c['effect']} {c['share']:.2f}" for c in best)
+        parts.append(f"What predicts best by itself, whether it is there or not, as shares of all tried: {said}.")
     return "\n\n".join(parts)
 
 
