@@ -25,6 +25,9 @@ FAILURE = {
 
 _WITHIN, _ONSET = 0.15, 2.0  # share by which a parameter may be off; seconds of an onset
 
+#: What rounding makes of a percentage: all that could be closed may be 100.00000000000001 % of it.
+_ROUNDING = 1e-9
+
 #: Parameters that only shape an effect, or that the drawn value does not determine.
 _SHAPES = frozenset({"alpha_star", "frequency", "slope", "onset", "damping"})
 
@@ -80,7 +83,7 @@ class Judged:
         if not self.further or self.further["noise_floor"] > 0.95 * self.further["before"]:
             return None
         low, high = self.gap["ci95"]
-        return bool(low <= self.further["shrink_percent"] <= high)
+        return bool(low - _ROUNDING <= self.further["shrink_percent"] <= high + _ROUNDING)
 
 
 def judge(label: Mapping[str, Any], said: Mapping[str, Any]) -> Judged:

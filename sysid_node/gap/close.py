@@ -101,7 +101,7 @@ def shrinkage(errors: Array) -> Array:
     before, _, after, floor = np.moveaxis(errors, -1, 0)
     room = before - floor
     open_ = room > 1e-9 * floor
-    return np.asarray(np.where(open_, 100.0 * (before - after) / np.where(open_, room, 1.0), 0.0))
+    return np.asarray(np.where(open_, 100.0 * ((before - after) / np.where(open_, room, 1.0)), 0.0))
 
 
 def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:

@@ -136,6 +136,8 @@ def test_the_stated_interval_covers_what_further_flights_show() -> None:
     further = {"before": 0.5, "after": 0.1, "noise_floor": 0.08, "shrink_percent": 95.2}
     assert replace(case, further=further).covers is True
     assert replace(case, further={**further, "shrink_percent": 88.0}).covers is False
+    whole = replace(case, gap={**case.gap, "ci95": [90.0, 100.0]})
+    assert replace(whole, further={**further, "shrink_percent": 100.00000000000001}).covers is True  # rounding
     assert replace(case, further={**further, "noise_floor": 0.49}).covers is None  # next to no gap
 
 
