@@ -75,7 +75,7 @@ def page(cases: Sequence[str], X: Array, right: Array, refuted: Sequence[bool]) 
             f"beside them {len(refuted)} whose law is refuted by what they leave, {sum(refuted)} of them there.",
             table(("weight of", "learned", "in use"), rows),
             "Each case by weights learned from all the others:",
-            table(("stated", "mean stated", "right", "causes"), calibration(stated)),
+            calibration(stated),
         ]
     )
 

@@ -112,19 +112,21 @@ _SCORES = (
 
 
 def _calibrated(cases: _Cases) -> str:
-    return table(("stated", "mean stated", "right", "causes"), calibration([s for c in cases for s in c.stated]))
+    return calibration([s for c in cases for s in c.stated])
 
 
-def calibration(stated: Sequence[tuple[float, bool]]) -> list[list[str]]:
-    """Rows of bins, and the expected calibration error: Naeini, Cooper & Hauskrecht (2015), AAAI."""
+def calibration(stated: Sequence[tuple[float, bool]]) -> str:
+    """A table of bins, and the expected calibration error: Naeini, Cooper & Hauskrecht (2015), AAAI."""
     rows, error = [], 0.0
     for low, high in pairwise(_EDGES):
         own = [pair for pair in stated if low <= pair[0] < high]
         if own:
             said, right = (sum(column) / len(own) for column in zip(*own, strict=True))
             error += abs(said - right) * len(own) / len(stated)
-            rows.append([f"{low:g} to {min(high, 1.0):g}", f"{said:.2f}", f"{right:.2f}", str(len(own))])
-    return [*rows, ["expected calibration error (wanted: under 0.08)", "", f"{error:.2f}", str(len(stated))]]
+            ends = "-".join(f"{end:.2f}" for end in interval(sum(r for _, r in own), len(own)))
+            rows.append([f"{low:g} to {min(high, 1.0):g}", f"{said:.2f}", f"{right:.2f}", ends, str(len(own))])
+    rows.append(["expected calibration error (wanted: under 0.08)", "", f"{error:.2f}", "", str(len(stated))])
+    return table(("stated", "mean stated", "right", "95 %", "causes"), rows)
 
 
 def _confusion(cases: _Cases) -> list[list[str]]:

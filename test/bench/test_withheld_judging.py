@@ -112,7 +112,9 @@ def test_the_interval_of_a_share_is_clopper_and_pearsons() -> None:
 def test_calibration_is_the_mean_distance_of_the_bins() -> None:
     """Ten stated 0.95 of which eight are right, ten stated 0.65 of which six are: (0.15 + 0.05) / 2."""
     stated = [(0.95, i < 8) for i in range(10)] + [(0.65, i < 6) for i in range(10)]
-    assert calibration(stated)[-1][2] == "0.10"
+    *_, low, high, error = calibration(stated).splitlines()
+    assert low.split(" | ")[1:3] == ["0.65", "0.60"] and high.split(" | ")[1:4] == ["0.95", "0.80", "0.44-0.97"]
+    assert error.split(" | ")[2] == "0.10"
 
 
 def test_a_page_is_made_of_few_cases_and_of_none() -> None:
