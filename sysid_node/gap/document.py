@@ -50,8 +50,8 @@ def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
     """Effects that were tried alone, the one that predicts best first: label, probability that it is there, share.
 
     Shares rank predictions of flight not fitted among one another, of derivatives within their tolerances ("none") too:
-    one of them is always the best, whatever is there. What did not pass as a cause, or as one that it cannot be told
-    from, has no probability.
+    one of them is always the best, whatever is there. What neither passed as a cause nor was weighed in its stead
+    has no probability.
     """
     attribution = found.attribution
     effects = {t.added.label: t.added.effect for t in attribution.trials if t.added}

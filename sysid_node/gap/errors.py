@@ -21,12 +21,12 @@ from sysid_node.gap.onset import uncertainty
 from sysid_node.gap.sizes import responses
 
 #: Share of itself by which a size is off beyond chance, 1 sigma.
-SHARE = 0.03
+DISCREPANCY = 0.03
 
 
 def stated(name: str, value: float, error: float) -> list[float]:
     """A parameter's value and its standard error by chance and by the model together; a moment in time is no size."""
-    return [value, error if name == "onset" else float(np.hypot(error, SHARE * value))]
+    return [value, error if name == "onset" else float(np.hypot(error, DISCREPANCY * value))]
 
 
 def standard_errors(fit: Fit) -> Array:

@@ -100,9 +100,7 @@ def _smallest(power: Array) -> tuple[int, int]:
 def _regime(view: View, by_window: Array) -> dict[str, list[float]]:
     """Range of the signal whose departures go with the gap by window, where one does."""
     best, found = 0.5, {}
-    for name in REGIMES:
-        if name not in view.record.columns:
-            continue
+    for name in _signals(view):
         values = view.record[name]
         pieces = [values[window] for window in view.windows.slices]
         spread = np.array([np.abs(p - values.mean()).max() for p in pieces])
@@ -130,6 +128,7 @@ def missing(attribution: Attribution) -> Shape | None:
 
 
 def _signals(view: View) -> dict[str, str]:
+    """Signals of the flight and of its controls that moved, and their units."""
     controls = dict.fromkeys(view.simulator.aircraft.control_symbols, "rad")
     return {n: u for n, u in {**REGIMES, **controls}.items() if n in view.record.columns and view.record[n].std() > 0}
 

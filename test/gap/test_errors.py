@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.errors import SHARE, standard_errors, stated
+from sysid_node.gap.errors import DISCREPANCY, standard_errors, stated
 from sysid_node.gap.fit import blank
 from sysid_node.gap.nuisance import nuisances_of
 from sysid_node.gap.sizes import unbiased
@@ -37,6 +37,6 @@ def test_what_changes_in_flight_is_less_certain(aircraft, make_flight, turbulenc
 
 
 def test_a_size_is_no_better_known_than_the_model_and_a_moment_is_no_size() -> None:
-    assert stated("time_constant", 0.1, 0.0) == [0.1, pytest.approx(SHARE * 0.1)]
-    assert stated("arm", -0.2, 0.01) == [-0.2, pytest.approx(np.hypot(0.01, SHARE * 0.2))]
+    assert stated("time_constant", 0.1, 0.0) == [0.1, pytest.approx(DISCREPANCY * 0.1)]
+    assert stated("arm", -0.2, 0.01) == [-0.2, pytest.approx(np.hypot(0.01, DISCREPANCY * 0.2))]
     assert stated("onset", 30.0, 0.02) == [30.0, 0.02]

@@ -41,9 +41,6 @@ _UNITS = {**dict.fromkeys(("ax", "ay", "az"), "m/s²"), **dict.fromkeys("pqr", "
 _GREEK = {"phi": "φ", "theta": "θ", "psi": "ψ", "alpha": "α", "beta": "β"}
 _UNITS |= dict.fromkeys(("phi", "theta", "alpha", "beta"), "rad")
 
-#: Signals of a regime, in words.
-_SIGNALS = {**WORDS, "thrust": "thrust"}
-
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, "#E69F00", "#56B4E9", "#CC79A7", "#999999")
 
 
@@ -71,10 +68,20 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
         (w["station"], WORDS[w["axis"]], percent(w["share"]),
          "{} to {} Hz".format(*(number(x, 2) for x in w["band_hz"])),
          "{} to {} s".format(*(number(x, 3) for x in w["window_s"])),
-         ", ".join(f"{_SIGNALS[n]} {number(a, 2)} to {number(b, 2)} {REGIMES[n]}" for n, (a, b) in w["regime"].items()))
+         ", ".join(_span(name, *ends) for name, ends in w["regime"].items()))
         for w in found.where[:8]
     ]  # fmt: skip
     return {"figure": _waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect"}
+
+
+def _span(name: str, low: float, high: float) -> str:
+    """``roll rate −1.1 to 1.8 rad/s``."""
+    return f"{_signal(name)} {number(low, 2)} to {number(high, 2)} {REGIMES.get(name, 'rad')}"
+
+
+def _signal(name: str) -> str:
+    """A signal of the flight, or a control, in words."""
+    return WORDS.get(name) or REGRESSOR_WORDS.get(name, name)
 
 
 def _waterfall(found: Diagnosis) -> Figure:
@@ -250,7 +257,7 @@ def shape(found: Diagnosis) -> Mapping[str, Any]:
     missing = found.shape
     if missing is None:
         return {"figure": None, "words": "", "left": structured(found.attribution)}
-    signal = _SIGNALS.get(missing.signal) or REGRESSOR_WORDS.get(missing.signal, missing.signal)
+    signal = _signal(missing.signal)
     trace = figures.line(missing.centres, missing.means, missing.axis)
     trace |= {"mode": "lines+markers", "error_y": {"type": "data", "array": (1.96 * missing.errors).tolist()}}
     layout = {
