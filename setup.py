@@ -27,7 +27,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "adapter = sysid_node.ros.adapters.node:main",
+            "adapter = sysid_node.ros.adapter:main",
             "adaptive_controller = sysid_node.ros.adaptive_controller:main",
             "exciter = sysid_node.ros.exciter:main",
             "fault_monitor = sysid_node.ros.fault_monitor:main",

@@ -22,8 +22,8 @@ from evaluation.pages import publish, table
 from numpy.typing import NDArray
 
 from sysid_node.online.settings import METHODS
-from sysid_node.sim.live import Air
-from sysid_node.sim.picture import Panel, draw
+from sysid_node.sim.flying.live import Air
+from sysid_node.sim.pages.line_chart import Panel, draw
 
 Array = NDArray[np.float64]
 

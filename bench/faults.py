@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
-from sysid_node.faults.blocks import of_record
+from sysid_node.faults.model.blocks import of_record
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.state import State
 from sysid_node.faults.types import (

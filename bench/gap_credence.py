@@ -1,4 +1,4 @@
-"""How far a cause can be believed: the weights of ``sysid_node.gap.credence``, learned from flights of known truth.
+"""The weights of ``sysid_node.gap.selection.calibration``, learned from flights of known truth.
 
     python bench/gap_credence.py bench/withheld/seeds_820.jsonl bench/withheld/seeds_1200.jsonl [--page docs/gap.md]
 
@@ -21,7 +21,7 @@ from scipy.optimize import minimize
 from withheld import ledger
 from withheld.scoreboard import calibration
 
-from sysid_node.gap.credence import PLIABLE, WEIGHTS, Grounds
+from sysid_node.gap.selection.calibration import PLIABLE, WEIGHTS, Grounds
 
 Array = NDArray[np.float64]
 

@@ -24,15 +24,15 @@ from sysid_node.aircraft.model import Aircraft, Derivative
 from sysid_node.errors import InputError
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
-from sysid_node.gap.candidates import UNSEEN
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.flights import Flight, complete
-from sysid_node.gap.inferred import ANGLES
+from sysid_node.gap.estimation.candidates import UNSEEN
+from sysid_node.gap.flightdata.flow_angles import ANGLES
+from sysid_node.gap.flightdata.gap_flight import Flight, complete
 from sysid_node.sim import EFFECTS, Simulator
-from sysid_node.sim.document import AIRCRAFT, EXAMPLES
-from sysid_node.sim.recording import Recorder
-from sysid_node.sim.sortie import Conditions, fly_sortie
+from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.sortie import Conditions, fly_sortie
+from sysid_node.sim.pages.effects_page import AIRCRAFT, EXAMPLES
 
 RATE, DURATION = 100.0, 44.0
 THROTTLE = "doublet:throttle:amplitude=0.3:width=2:start=38"

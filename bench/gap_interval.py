@@ -18,18 +18,18 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
-from sysid_node.gap.candidates import candidates_of
-from sysid_node.gap.evidence import Evidence, groups_of, held_out
-from sysid_node.gap.fit import Fit, blank, polish, with_candidates
-from sysid_node.gap.flights import RATE, Flight, complete
-from sysid_node.gap.flown import flown
-from sysid_node.gap.nuisance import nuisances_of
-from sysid_node.gap.sizes import unbiased
-from sysid_node.gap.view import View
-from sysid_node.gap.viewing import view_of
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.estimation.fit import Fit, blank, polish, with_candidates
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.predictive_density import Evidence, groups_of, held_out
+from sysid_node.gap.flightdata.gap_flight import RATE, Flight, complete
+from sysid_node.gap.instruments.liml import unbiased
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.validation.simulation_error import flown
 from sysid_node.sim import Simulator
-from sysid_node.sim.recording import Recorder
-from sysid_node.sim.sortie import Conditions, fly_sortie
+from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.sortie import Conditions, fly_sortie
 
 Effects = Mapping[str, Mapping[str, float]]
 

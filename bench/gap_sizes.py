@@ -4,9 +4,9 @@
 
 Reads ledgers of ``bench/gap_scoreboard.py``: the sizes of the effects that were named rightly, and what was drawn. An
 aircraft is not its simulator, so sizes are off by more than chance: by a share of themselves, which is learned here and
-added in quadrature by ``sysid_node.gap.errors`` (a discrepancy of the model: Kennedy & O'Hagan (2001), J. R. Stat. Soc.
-B 63(3)). The share is the one with which 68 % and 95 % intervals hold as nearly as they should; not the likeliest,
-which a few sizes that are plainly wrong would rule.
+added in quadrature by ``sysid_node.gap.validation.standard_errors`` (a discrepancy of the model: Kennedy & O'Hagan
+(2001), J. R. Stat. Soc. B 63(3)). The share is the one with which 68 % and 95 % intervals hold as nearly as they
+should; not the likeliest, which a few sizes that are plainly wrong would rule.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from evaluation.pages import publish, table
 from numpy.typing import NDArray
 from withheld import ledger
 
-from sysid_node.gap.errors import DISCREPANCY
+from sysid_node.gap.validation.standard_errors import DISCREPANCY
 
 Array = NDArray[np.float64]
 

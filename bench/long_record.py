@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online import estimator, transform
+from sysid_node.online import estimator
+from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.settings import Settings
 
 Array = NDArray[np.float64]
@@ -37,12 +38,12 @@ def samples(aircraft: Aircraft, start: float, rng: np.random.Generator) -> tuple
 
 def phase_error(start: float, rng: np.random.Generator) -> float:
     """Largest error of a minute's lines that begins at ``start`` (s), over the largest line."""
-    grid = transform.lines(*Settings().frequencies)
+    grid = fourier_transform.lines(*Settings().frequencies)
     at, x = start + np.arange(round(MINUTE * RATE)) / RATE, rng.normal(size=round(MINUTE * RATE))
-    state, steps = transform.start(grid, 1), np.diff(at)
+    state, steps = fourier_transform.start(grid, 1), np.diff(at)
     areas, slants = 0.5 * steps * (x[1:] + x[:-1]), 0.5 * steps**2 * np.diff(x)
-    transform.add_many(state, at[:-1], at[1:], areas[:, None], slants[:, None])
-    lines, F = transform.current(state)[:, 0], grid.count
+    fourier_transform.add_many(state, at[:-1], at[1:], areas[:, None], slants[:, None])
+    lines, F = fourier_transform.current(state)[:, 0], grid.count
     phase = np.outer(grid.omega.astype(np.longdouble), at[:-1].astype(np.longdouble) + 0.5 * steps)
     wave = np.exp(-1j * np.remainder(phase, 2 * np.longdouble(np.pi)).astype(float))
     phi = 0.5 * np.outer(grid.omega, steps)

@@ -23,12 +23,12 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Sensors
 from sysid_node.cli.estimates_bag import write_estimates
 from sysid_node.cli.replay import replay, write_replay
-from sysid_node.flight.bag import read_streams
-from sysid_node.flight.bag_writer import write_streams
-from sysid_node.flight.messages import type_store
+from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
-from sysid_node.online.alignment import align_streams
+from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.settings import Settings
 
 GRAVITY = 9.81

@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import math
 import os
 import shlex
 import shutil
@@ -236,9 +237,13 @@ def _number(cell: str) -> object:
         return cell
 
 
+def _missing(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
 def _difference(one: object, other: object) -> float | None:
     """Relative difference of two numbers; 0 for equal values; None for words that differ."""
-    if one == other or (one != one and other != other):
+    if one == other or (_missing(one) and _missing(other)):
         return 0.0
     if isinstance(one, bool) or not (isinstance(one, int | float) and isinstance(other, int | float)):
         return None

@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.sim import Inputs, Simulator, trim_flight
 from sysid_node.sim.export.jsbsim import jsbsim_model
-from sysid_node.sim.layout import Layout, Model
-from sysid_node.sim.rollout import rollout
+from sysid_node.sim.flying.rollout import rollout
+from sysid_node.sim.model.layout import Layout, Model
 
 SAMPLES = 6001  # 60 s at 100 Hz
 BATCH, BATCH_SAMPLES = 256, 1001

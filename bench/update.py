@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online import estimator
-from sysid_node.online.alignment import align_streams
-from sysid_node.online.estimates import estimate
-from sysid_node.online.judgement import judge
-from sysid_node.online.present import present
+from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.published import estimate
+from sysid_node.online.estimates.validity import judge
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.state import State
 

@@ -78,7 +78,8 @@ def test_only_ros_and_above_import_ros() -> None:
 
 def test_online_imports_numpy_and_scipy_only() -> None:
     """Directly by its own text, and in all by what is loaded once every module of the layer is."""
-    names = [f"sysid_node.online.{path.stem}" for path in (PACKAGE / "online").glob("*.py") if path.stem != "__init__"]
+    paths = [path for path in (PACKAGE / "online").rglob("*.py") if path.stem != "__init__"]
+    names = [".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts) for path in paths]
     program = (
         "import importlib, json, sys\n"
         "before = set(sys.modules)\n"

@@ -19,8 +19,9 @@ from sysid_node.excite.inflight import Settings as Excitation
 from sysid_node.online.settings import Settings as Estimation
 from sysid_node.ros.beliefs import beliefs_of, precision_of
 from sysid_node.ros.session import Session
-from sysid_node.sim import Simulator, Trim, live, trim_flight
-from sysid_node.sim.live import Air
+from sysid_node.sim import Simulator, Trim, trim_flight
+from sysid_node.sim.flying import live
+from sysid_node.sim.flying.live import Air
 
 Array = NDArray[np.float64]
 

@@ -22,12 +22,12 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
-from sysid_node.sim.atmosphere import air_density
-from sysid_node.sim.autopilot import Autopilot, autopilot_for, fly_held
-from sysid_node.sim.dryden import INTENSITIES, Dryden
-from sysid_node.sim.layout import OUTPUTS
-from sysid_node.sim.rollout import Flight, Inputs
-from sysid_node.sim.trim import Trim
+from sysid_node.sim.flying.autopilot import Autopilot, autopilot_for, fly_held
+from sysid_node.sim.flying.rollout import Flight, Inputs
+from sysid_node.sim.flying.trim import Trim
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.signals.atmosphere import air_density
+from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.flights import RATE as ANALYSIS_RATE
-from sysid_node.gap.flights import load_flight
-from sysid_node.gap.flown import flown
-from sysid_node.gap.viewing import view_of
+from sysid_node.gap.flightdata.gap_flight import RATE as ANALYSIS_RATE
+from sysid_node.gap.flightdata.gap_flight import load_flight
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.validation.simulation_error import flown
 from sysid_node.sim import Simulator
 
 from .drawing import FOREIGN, Case

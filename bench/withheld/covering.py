@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.flight.bag_writer import write_streams
-from sysid_node.gap.flights import RATE as ANALYSIS_RATE
-from sysid_node.gap.flights import load_flight
-from sysid_node.gap.flown import flown
-from sysid_node.gap.view import View
-from sysid_node.gap.viewing import view_of
+from sysid_node.flight.bag.writer import write_streams
+from sysid_node.gap.flightdata.gap_flight import RATE as ANALYSIS_RATE
+from sysid_node.gap.flightdata.gap_flight import load_flight
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.validation.simulation_error import flown
 from sysid_node.sim import Simulator
 
 from .closing import effects_of

@@ -19,8 +19,8 @@ from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
-from sysid_node.flight.bag_writer import write_streams
-from sysid_node.sim.dryden import INTENSITIES, Dryden
+from sysid_node.flight.bag.writer import write_streams
+from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
 from .actuators import servo_lag
 from .drawing import SECONDS, SETS, Case, draw

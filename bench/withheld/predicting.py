@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.evidence import Evidence, groups_of
-from sysid_node.gap.view import View
+from sysid_node.gap.estimation.predictive_density import Evidence, groups_of
+from sysid_node.gap.residuals.residual_model import View
 from sysid_node.sim import Simulator
 
 Array = NDArray[np.float64]

@@ -3,6 +3,6 @@
 Imported for its side effect as well: JAX in float64, with the compiler options and the cache of the simulator.
 """
 
-from sysid_node.sim import xla
+from sysid_node.sim.compiled import xla
 
 xla.configure()

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.filter_error import filter_error
-from sysid_node.batch.manoeuvres import manoeuvre, segments, with_forces_at_cg
+from sysid_node.batch.methods.filter_error import filter_error
 from sysid_node.batch.models.kinematics import STATES, sensor_errors
-from sysid_node.batch.result import Fit
-from sysid_node.batch.signals import averaged
+from sysid_node.batch.models.manoeuvres import manoeuvre, segments, with_forces_at_cg
+from sysid_node.batch.regression.filtering import averaged
+from sysid_node.batch.results.result import Fit
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 

@@ -8,20 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.coefficients import equations
 from sysid_node.batch.compatibility import check_sensors, corrected
-from sysid_node.batch.constrained_least_squares import constrained_least_squares
-from sysid_node.batch.equation_error import columns, equation_error
-from sysid_node.batch.error_filtering import error_filtering
-from sysid_node.batch.frequency_equation_error import frequency_equation_error
-from sysid_node.batch.integrated import Integrated
-from sysid_node.batch.neural_gauss_newton import neural_gauss_newton
-from sysid_node.batch.recursive_least_squares import recursive_least_squares
-from sysid_node.batch.result import Answer, Fit
+from sysid_node.batch.methods.constrained_least_squares import constrained_least_squares
+from sysid_node.batch.methods.equation_error import columns, equation_error
+from sysid_node.batch.methods.error_filtering import error_filtering
+from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error
+from sysid_node.batch.methods.integrated_models import Integrated
+from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
+from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
+from sysid_node.batch.methods.stepwise import Selection, supported
+from sysid_node.batch.regression.equations import equations
+from sysid_node.batch.regression.filtering import lowpass
+from sysid_node.batch.results.result import Answer, Fit
+from sysid_node.batch.results.validation import figures
 from sysid_node.batch.settings import Settings
-from sysid_node.batch.signals import lowpass
-from sysid_node.batch.structure import Selection, supported
-from sysid_node.batch.validation import figures
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
-from sysid_node.batch.equation_error import DEFAULT_LOWPASS
-from sysid_node.batch.frequency_equation_error import DEFAULT_FREQUENCIES, Frequencies
+from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS
+from sysid_node.batch.methods.frequency_equation_error import DEFAULT_FREQUENCIES, Frequencies
 from sysid_node.errors import InputError
 from sysid_node.setting import check_frequencies, parsed
 

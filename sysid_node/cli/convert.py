@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.flight.bag_writer import STORAGES, write_streams
+from sysid_node.flight.autopilots.base import Settings, adapter_for
+from sysid_node.flight.autopilots.known import ADAPTERS
+from sysid_node.flight.autopilots.recorded import read_recorded
+from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.logs import READERS, read_log, streams_of
 from sysid_node.flight.streams import Streams
-from sysid_node.ros.adapters.base import Settings, adapter_for
-from sysid_node.ros.adapters.known import ADAPTERS
-from sysid_node.ros.adapters.recorded import read_recorded
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

@@ -17,7 +17,7 @@ from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.show import progress_bar
 from sysid_node.errors import InputError
-from sysid_node.flight.bag_writer import write_streams
+from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.logs import streams_of
 
 if TYPE_CHECKING:

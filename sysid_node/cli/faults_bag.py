@@ -7,10 +7,10 @@ from typing import Any
 
 from rosbags.typesys.store import Typestore
 
-from sysid_node.faults.record import Said
+from sysid_node.faults.recorded_flight import Said
 from sysid_node.faults.types import Fault
-from sysid_node.flight.bag_writer import header
-from sysid_node.flight.messages import type_store
+from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.writer import header
 
 FAULTS, FAULTS_TYPE = "/fault_monitor/faults", "diagnostic_msgs/msg/DiagnosticArray"
 ERROR = 2  # diagnostic_msgs/DiagnosticStatus

@@ -51,7 +51,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Diagnoses and writes."""
     from sysid_node.gap.diagnose import diagnose  # noqa: PLC0415  # JAX takes its time
-    from sysid_node.gap.flights import load_flight  # noqa: PLC0415
+    from sysid_node.gap.flightdata.gap_flight import load_flight  # noqa: PLC0415
     from sysid_node.report.gap import opening_text  # noqa: PLC0415
 
     aircraft, topics = load_aircraft(args.aircraft), topic_names(args.topic)

@@ -16,7 +16,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import METHODS, Identification, identify
 from sysid_node.batch.models.rigid_body import OUTPUTS
-from sysid_node.batch.result import Answer, Estimate, quality
+from sysid_node.batch.results.result import Answer, Estimate, quality
 from sysid_node.batch.settings import Settings
 from sysid_node.cli.show import progress_bar, show_estimates
 from sysid_node.errors import InputError

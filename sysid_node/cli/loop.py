@@ -22,8 +22,8 @@ from rich.text import Text
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.apart import make_folder, own_domain
 from sysid_node.cli.processes import node_process
+from sysid_node.cli.ros_domain import make_folder, own_domain
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
 from sysid_node.report.loop import Episode, Event, write_loop
@@ -114,7 +114,8 @@ def _fly(plan: Plan) -> Episode:
 
 def _check_effects(plan: Plan) -> None:
     """Raise InputError on effects that the simulator would refuse half a minute later."""
-    from sysid_node.sim import Simulator, live  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim import Simulator  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.flying import live  # noqa: PLC0415  # JAX takes its time
 
     live.vector(Simulator(plan.aircraft), _effects(plan, failed=True).split())
 

@@ -19,23 +19,23 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.estimates_bag import write_estimates
 from sysid_node.cli.show import progress_bar, show_estimates, show_faults
 from sysid_node.errors import InputError
-from sysid_node.faults.held import known_of
-from sysid_node.faults.record import Heard, Verdict, judge
+from sysid_node.faults.model.reference_model import known_of
+from sysid_node.faults.recorded_flight import Heard, Verdict, judge
 from sysid_node.faults.settings import Settings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import flat, why_nothing_aligned
-from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commands import read_commands
 from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import Truth, truth_at_end
-from sysid_node.online import reconstruction
-from sysid_node.online.alignment import Aligned, align_streams
-from sysid_node.online.run import run as run_online
-from sysid_node.online.schedule import due_times
+from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.alignment.schedule import due_times
+from sysid_node.online.alignment.whole_record import Aligned, align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
+from sysid_node.online.whole_record import run as run_online
 from sysid_node.report.folder import write_run
 from sysid_node.report.replay import replay_result
 
@@ -105,9 +105,9 @@ def write_replay(folder: Path, done: Replay, truth: Truth | None = None, faults:
     every = max(len(done.history) // TABLE_ROWS, 1)
     # While the estimator settles nothing is included yet, and estimates have the same time.
     shown = {estimates.time: estimates for estimates in (*done.history[every - 1 :: every], done.final)}
-    flow = reconstruction.init(done.aircraft)
+    flow = flow_angle_filter.init(done.aircraft)
     aligned, gap = done.aligned, done.settings.max_gap
-    samples = reconstruction.complete_many(flow, aligned.time, aligned.samples, gap)
+    samples = flow_angle_filter.complete_many(flow, aligned.time, aligned.samples, gap)
     result = replay_result(
         done.aircraft,
         done.settings,
@@ -118,7 +118,7 @@ def write_replay(folder: Path, done: Replay, truth: Truth | None = None, faults:
         truth=truth.values if truth else None,
         truth_since=truth.since if truth else None,
         faults=faults,
-        remarks=reconstruction.remarks(flow),
+        remarks=flow_angle_filter.remarks(flow),
     )
     settings = {**result.settings, "publish_rate": done.publish_rate}
     write_run(folder, replace(result, settings=settings))

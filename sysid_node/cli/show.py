@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from sysid_node.faults.record import Verdict
+from sysid_node.faults.recorded_flight import Verdict
 from sysid_node.online.types import Estimates
 
 

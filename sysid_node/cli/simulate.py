@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.bag_writer import STORAGES, write_streams
+from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.streams import Streams
 from sysid_node.flight.truth import truth_path
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
+    from sysid_node.sim.flying.sortie import Sortie
     from sysid_node.sim.simulator import Simulator
-    from sysid_node.sim.sortie import Sortie
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -61,9 +61,9 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Flies, writes the bag, then the truth."""
-    from sysid_node.sim.recording import Recorder  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.flying.recording import Recorder  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.flying.sortie import Conditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
-    from sysid_node.sim.sortie import Conditions, fly_sortie  # noqa: PLC0415
 
     if args.out.exists():
         raise InputError(f"bag {args.out}: exists already; remove it or choose another name")

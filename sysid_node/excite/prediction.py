@@ -16,12 +16,13 @@ from sysid_node.excite.information import Information, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
 from sysid_node.excite.spec import Segment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
-from sysid_node.sim import Flight, Inputs, Simulator, parameters
-from sysid_node.sim.atmosphere import air_density
-from sysid_node.sim.autopilot import autopilot_for, fly_held
-from sysid_node.sim.layout import OUTPUTS, Layout, Model
-from sysid_node.sim.rollout import rollout
-from sysid_node.sim.trim import Trim, trim_flight
+from sysid_node.sim import Flight, Inputs, Simulator
+from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
+from sysid_node.sim.flying.rollout import rollout
+from sysid_node.sim.flying.trim import Trim, trim_flight
+from sysid_node.sim.model import parameters
+from sysid_node.sim.model.layout import OUTPUTS, Layout, Model
+from sysid_node.sim.signals.atmosphere import air_density
 
 Array = NDArray[np.float64]
 

@@ -19,18 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults import blocks, colour, gusts, held
-from sysid_node.faults.blocks import PERIOD, Block
-from sysid_node.faults.colour import ORDER
-from sysid_node.faults.evidence import Shifts
-from sysid_node.faults.held import Belief, Known
-from sysid_node.faults.hypotheses import hypotheses
-from sysid_node.faults.report import Found, fault_of
-from sysid_node.faults.settings import Settings
-from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
-from sysid_node.faults.terms import Terms, terms
-from sysid_node.faults.types import DAMAGE, VANE_STUCK, Fault
-from sysid_node.faults.weighing import (
+from sysid_node.faults.hypotheses.bayes_factors import Shifts
+from sysid_node.faults.hypotheses.catalogue import hypotheses
+from sysid_node.faults.hypotheses.weighing import (
     VANES,
     Stretch,
     doubted,
@@ -45,7 +36,16 @@ from sysid_node.faults.weighing import (
     vane_noise,
     weights,
 )
-from sysid_node.online.signals import OFFSET
+from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening
+from sysid_node.faults.model.blocks import PERIOD, Block
+from sysid_node.faults.model.reference_model import Belief, Known
+from sysid_node.faults.model.residual_whitening import ORDER
+from sysid_node.faults.model.terms import Terms, terms
+from sysid_node.faults.report import Found, fault_of
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
+from sysid_node.faults.types import DAMAGE, VANE_STUCK, Fault
+from sysid_node.online.frequency.regression_signals import OFFSET
 
 Array = NDArray[np.float64]
 
@@ -67,13 +67,14 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
     """A monitor that has seen nothing."""
     made = blocks.init(aircraft)
     known = terms(aircraft, made.layout)
-    return State(aircraft, settings, known, made, held.init(known), colour.init(settings.memory, PERIOD))
+    colour = residual_whitening.init(settings.memory, PERIOD)
+    return State(aircraft, settings, known, made, reference_model.init(known), colour)
 
 
 def hear(state: State, time: float, known: Mapping[str, Known]) -> None:
     """The identifier's estimates at a time (s, as of the samples)."""
     if state.alarm is None:
-        held.hear(state.held, time, known)
+        reference_model.hear(state.held, time, known)
 
 
 def update(state: State, time: float, sample: Sequence[float]) -> Fault | None:
@@ -95,7 +96,7 @@ def take(state: State, block: Block) -> None:
     if learning:
         _learn(state, block, residual)
         if state.count % RENEWED == 0:
-            colour.settle(state.colour)
+            residual_whitening.settle(state.colour)
     if len(state.raw) == ORDER:
         piece = _piece(state, block, design, residual)
         state.pieces.append(piece)
@@ -142,7 +143,7 @@ def _judge(state: State, piece: Piece) -> None:
 
 def _learn(state: State, block: Block, residual: Array) -> None:
     """From a block of sound flight."""
-    colour.learn(state.colour, residual, block.follows)
+    residual_whitening.learn(state.colour, residual, block.follows)
     known = state.held
     weight = max(PERIOD / OFFSETS, 1.0 / (state.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
@@ -161,7 +162,7 @@ def _learn_model(state: State) -> None:
         last = islice(state.pieces, len(state.pieces) - LAG - 1, None)
         state.explained = _explained(state.terms, [piece.block for piece in last])
     old = state.pieces[-LAG - 1]
-    held.learn(state.held, old.J, old.v, state.explained)
+    reference_model.learn(state.held, old.J, old.v, state.explained)
 
 
 def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
@@ -180,15 +181,18 @@ def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
 
 def _renew(state: State, now: Block) -> None:
     """What is held, and how it could fail, from what has been learned."""
-    colour.settle(state.colour)
-    if held.ripen(state.held, now.time):
+    residual_whitening.settle(state.colour)
+    if reference_model.ripen(state.held, now.time):
         _rebuild(state)
     variances = vane_noise(state, now.samples)
-    noise = {vane: held.noise_of(state.terms, state.colour, vane, variance) for vane, variance in variances.items()}
-    state.belief = held.belief(state.held, sum(noise.values()) * state.held.blocks, state.settings.slack)
+    noise = {
+        vane: reference_model.noise_of(state.terms, state.colour, vane, variance)
+        for vane, variance in variances.items()
+    }
+    state.belief = reference_model.belief(state.held, sum(noise.values()) * state.held.blocks, state.settings.slack)
     believed = state.held.values + state.belief.shift
     state.flattened = {vane: (variances[vane], added @ believed) for vane, added in noise.items()}
-    state.hypotheses = hypotheses(state.aircraft, state.terms, held.whole(state.held, state.belief.shift))
+    state.hypotheses = hypotheses(state.aircraft, state.terms, reference_model.whole(state.held, state.belief.shift))
     state.shifts = Shifts([hypothesis.shift for hypothesis in state.hypotheses])
 
 
@@ -226,7 +230,7 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
     """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
     threshold = state.settings.threshold
     whole = np.array([hypothesis.whole for hypothesis in state.hypotheses])
-    usual = gusts.surprise(whole, usual, len(over.pieces))
+    usual = gust_correlation.surprise(whole, usual, len(over.pieces))
     found = promising(state, over, usual, squares, threshold)
     best = float(stuck_vanes(state, over.pieces).max()) if len(over.pieces) >= PATIENT else 0.0
     if any(weighed.factor > threshold for weighed in found):

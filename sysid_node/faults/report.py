@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.faults.evidence import Weighed
-from sysid_node.faults.hypotheses import Hypothesis
-from sysid_node.faults.terms import Terms
+from sysid_node.faults.hypotheses.bayes_factors import Weighed
+from sysid_node.faults.hypotheses.catalogue import Hypothesis
+from sysid_node.faults.model.terms import Terms
 from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, Change, Fault
 
 Array = NDArray[np.float64]

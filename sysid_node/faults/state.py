@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults.blocks import Block, Blocks
-from sysid_node.faults.colour import ORDER, Colour
-from sysid_node.faults.evidence import Shifts
-from sysid_node.faults.held import Belief, Held
-from sysid_node.faults.hypotheses import Hypothesis
+from sysid_node.faults.hypotheses.bayes_factors import Shifts
+from sysid_node.faults.hypotheses.catalogue import Hypothesis
+from sysid_node.faults.model.blocks import Block, Blocks
+from sysid_node.faults.model.reference_model import Belief, Held
+from sysid_node.faults.model.residual_whitening import ORDER, Colour
+from sysid_node.faults.model.terms import Terms
 from sysid_node.faults.settings import Settings
-from sysid_node.faults.terms import Terms
 from sysid_node.faults.types import Fault
 
 Array = NDArray[np.float64]

@@ -15,16 +15,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults import blocks, monitor, servos
-from sysid_node.faults.held import Known
-from sysid_node.faults.servos import Servos
+from sysid_node.faults import monitor
+from sysid_node.faults.hypotheses import servo_check as servos
+from sysid_node.faults.hypotheses.servo_check import Servos
+from sysid_node.faults.model import blocks
+from sysid_node.faults.model.reference_model import Known
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.state import State
 from sysid_node.faults.types import ARRIVAL, SILENT, Fault
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.online import intake
-from sysid_node.online.intake import Complete, IntakeState
+from sysid_node.online.alignment import streaming as intake
+from sysid_node.online.alignment.streaming import Complete, IntakeState
 
 PERIOD = 0.1  # s between looks at what is to be said
 REPEATED = 1.0  # s after which the same is said again

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from rosbags.rosbag2 import Reader
 
-from sysid_node.flight.cdr import decode
-from sysid_node.flight.messages import type_store
+from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.cdr.decode import decode
 from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS
 
 #: Where commands are recorded (``docs/bags.md``), and their type: that of the positions.

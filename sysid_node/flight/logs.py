@@ -11,7 +11,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.align import flight_record
-from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.record import Array, FlightRecord

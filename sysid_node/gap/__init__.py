@@ -12,6 +12,6 @@ projection (``fit``) and judged by how well it predicts flight that it was not f
 where, ``next_flight`` what to fly.
 """
 
-from sysid_node.sim import xla
+from sysid_node.sim.compiled import xla
 
 xla.configure()

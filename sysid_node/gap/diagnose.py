@@ -8,24 +8,24 @@ from pathlib import Path
 from typing import Any
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap import localise
-from sysid_node.gap.admission import admitted, require_others
-from sysid_node.gap.air import gusts_of
-from sysid_node.gap.attribute import Attribution, attribute
-from sysid_node.gap.close import Gap
-from sysid_node.gap.confusion import Confusion, confusion_of
-from sysid_node.gap.evidence import Evidence, carried
-from sysid_node.gap.flights import RATE, Flight
-from sysid_node.gap.holdout import settled
-from sysid_node.gap.localise import Shape
-from sysid_node.gap.next_flight import advice
-from sysid_node.gap.nuisance import nuisances_of
-from sysid_node.gap.quiet import manoeuvre_of
-from sysid_node.gap.steps import Steps
-from sysid_node.gap.trials import Progress
-from sysid_node.gap.verdict import verdict_of
-from sysid_node.gap.view import View
-from sysid_node.gap.viewing import view_of
+from sysid_node.gap.estimation.checkpoint import Steps
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.predictive_density import Evidence, carried
+from sysid_node.gap.flightdata.gap_flight import RATE, Flight
+from sysid_node.gap.flightdata.manoeuvre_window import manoeuvre_of
+from sysid_node.gap.residuals.admissibility import admitted, require_others
+from sysid_node.gap.residuals.air_motion import gusts_of
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.selection.candidate_fitter import Progress
+from sysid_node.gap.selection.confusion import Confusion, confusion_of
+from sysid_node.gap.selection.forward_selection import Attribution, attribute
+from sysid_node.gap.validation.holdout import settled
+from sysid_node.gap.validation.spectral_error import Gap
+from sysid_node.gap.verdict import localisation
+from sysid_node.gap.verdict.decision import verdict_of
+from sysid_node.gap.verdict.localisation import Shape
+from sysid_node.gap.verdict.next_flight import advice
 from sysid_node.sim import Simulator
 
 
@@ -82,12 +82,12 @@ def diagnose(
     attribution, checked = settled(attribution, views, unseen, own)
     verdict = verdict_of(views, attribution, checked)
     progress(0.95, "short flights beside the flight, and what to fly next")
-    found = localise.where(attribution, [v.residual(simulator.neutral()) for v in views])
+    found = localisation.where(attribution, [v.residual(simulator.neutral()) for v in views])
     air = max(gusts_of(v, carried(attribution.corrected, v)) for v in (*views, *unseen))
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(
         aircraft, verdict, checked.gap, checked.flown, found, attribution,
-        localise.missing(attribution), checked.views, checked.base, checked.final, flight, bool(holdouts),
+        localisation.missing(attribution), checked.views, checked.base, checked.final, flight, bool(holdouts),
         confusion_of(attribution.base, attribution.trials), air,
     )  # fmt: skip

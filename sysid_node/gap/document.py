@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from sysid_node.gap.belief import Cause
-from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.errors import standard_errors, stated
-from sysid_node.gap.fit import Fit
-from sysid_node.gap.flown import WINDOW
-from sysid_node.gap.sizes import unbiased
-from sysid_node.gap.verdict import explained, named, structured, wanting
-from sysid_node.gap.view import CHANNELS, COEFFICIENTS
+from sysid_node.gap.estimation.fit import Fit
+from sysid_node.gap.instruments.liml import unbiased
+from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
+from sysid_node.gap.selection.causes import Cause
+from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.gap.validation.spectral_error import Gap
+from sysid_node.gap.validation.standard_errors import standard_errors, stated
+from sysid_node.gap.verdict.decision import explained, named, structured, wanting
 
 
 def document(found: Diagnosis) -> dict[str, Any]:

@@ -19,17 +19,19 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
-from sysid_node.online import information, reconstruction, regression, signals, transform
-from sysid_node.online.auxiliary import INSTRUMENTED, auxiliary_model
-from sysid_node.online.change import PIECE
-from sysid_node.online.experience import experiences
-from sysid_node.online.prior import beliefs
-from sysid_node.online.renewal import begin_segment, reach, renew
+from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.changes.detection import PIECE
+from sysid_node.online.changes.excited_segments import experiences
+from sysid_node.online.frequency import fourier_transform, regression_signals
+from sysid_node.online.frequency.regression_signals import NUISANCES, OUTPUTS, Layout
+from sysid_node.online.regression import information, least_squares
+from sysid_node.online.regression.derivative_index import table
+from sysid_node.online.regression.instruments import INSTRUMENTED, auxiliary_model
+from sysid_node.online.regression.mixed_estimation import beliefs
+from sysid_node.online.segment_update import begin_segment, reach, renew
 from sysid_node.online.settings import Settings
-from sysid_node.online.signals import NUISANCES, OUTPUTS, Layout
 from sysid_node.online.state import Model, State
 from sysid_node.online.status import vocabulary
-from sysid_node.online.table import table
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -43,16 +45,16 @@ SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorte
 
 def init(aircraft: Aircraft, settings: Settings) -> State:
     """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate."""
-    layout = signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
-    unformed = signals.unformed(aircraft)
+    layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
+    unformed = regression_signals.unformed(aircraft)
     structure = {c: rs for c, rs in aircraft.structure.items() if c not in unformed and set(rs) - {"0"}}
     if not structure:
         raise InputError(f"aircraft {aircraft.name!r}: derivatives: expected at least one besides offsets")
     memory = settings.forgetting_time or math.inf
     # lines are independent over one period of their spacing; windows and forgetting want several segments
     segment_time = min(1.0 / settings.frequencies[1], settings.window / 5.0 or math.inf, 2.0 * memory)
-    grid = transform.lines(*settings.frequencies)
-    plan = regression.plan(structure, layout)
+    grid = fourier_transform.lines(*settings.frequencies)
+    plan = least_squares.plan(structure, layout)
     model = Model(
         aircraft=aircraft,
         settings=settings,
@@ -62,15 +64,15 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         vocabulary=vocabulary(aircraft, plan),
         spectrum=information.spectrum(grid.omega, memory),
         lowest=_lowest(len(aircraft.controls)),
-        signals=signals.scalar_signals(aircraft),
-        momentum=signals.momentum_gain(aircraft),
+        signals=regression_signals.scalar_signals(aircraft),
+        momentum=regression_signals.momentum_gain(aircraft),
         believed=beliefs(aircraft, plan),
         auxiliary=auxiliary_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
     )
-    running = transform.start(grid, layout.transformed, memory, len(layout.instrumented))
-    nothing, flow = information.nothing(layout), reconstruction.init(aircraft)
+    running = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
+    nothing, flow = information.nothing(layout), flow_angle_filter.init(aircraft)
     return State(model, running, plan, nothing, flow, experiences=experiences(plan, layout))
 
 
@@ -87,7 +89,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     ``incomplete``. Where the first sample has no thrust it is taken as unknown, and as none, from then on; where it
     lacks a flow angle, that is reconstructed from then on.
     """
-    sample = reconstruction.complete(state.flow, time, sample, state.model.settings.max_gap)
+    sample = flow_angle_filter.complete(state.flow, time, sample, state.model.settings.max_gap)
     if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = first_counted(time, state.model.settings)
     if not time >= state.begin:
@@ -112,7 +114,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     state.step = time - previous[0]
     gain = state.model.momentum(previous[2], now[2])
     area, slant = over_interval(state.model.layout, state.step, previous[1], now[1], gain)
-    transform.add(state.transform, previous[0], time, area, slant)
+    fourier_transform.add(state.transform, previous[0], time, area, slant)
     state.samples += 1
     state.intervals += sample[INTERVAL]
     state.recent.append(now[1][None])

@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.auxiliary import Auxiliary
-from sysid_node.online.change import Watch
-from sysid_node.online.experience import Experience
-from sysid_node.online.information import Information, Spectrum
-from sysid_node.online.interval import Bend
-from sysid_node.online.reconstruction import Reconstruction
-from sysid_node.online.regression import Hold, Plan, Solution, Uncertainty
+from sysid_node.online.alignment.flow_angle_filter import Reconstruction
+from sysid_node.online.changes.detection import Watch
+from sysid_node.online.changes.excited_segments import Experience
+from sysid_node.online.frequency.fourier_transform import Transform
+from sysid_node.online.frequency.regression_signals import Layout, MomentumGain, ScalarSignals
+from sysid_node.online.regression.actuator_lag_test import Timing
+from sysid_node.online.regression.derivative_index import Table
+from sysid_node.online.regression.heteroskedasticity import Unevenness
+from sysid_node.online.regression.information import Information, Spectrum
+from sysid_node.online.regression.instruments import Auxiliary
+from sysid_node.online.regression.least_squares import Hold, Plan, Solution, Uncertainty
+from sysid_node.online.regression.weak_instruments import Bend
 from sysid_node.online.settings import Settings
-from sysid_node.online.signals import Layout, MomentumGain, ScalarSignals
 from sysid_node.online.status import Codes, Vocabulary
-from sysid_node.online.table import Table
-from sysid_node.online.timing import Timing
-from sysid_node.online.transform import Transform
-from sysid_node.online.unevenness import Unevenness
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.faults.record import Verdict
+from sysid_node.faults.recorded_flight import Verdict
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.types import Estimates
 

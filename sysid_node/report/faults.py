@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from sysid_node.faults.record import Episode, Verdict
+from sysid_node.faults.recorded_flight import Episode, Verdict
 from sysid_node.faults.types import Change, Fault
 
 

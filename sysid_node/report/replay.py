@@ -13,10 +13,10 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
-from sysid_node.faults.record import Verdict
+from sysid_node.faults.recorded_flight import Verdict
 from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.online.frequency.regression_signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.settings import Settings
-from sysid_node.online.signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.compare import changes
 from sysid_node.report.data import Response, RunResult, Spectra, prior_of

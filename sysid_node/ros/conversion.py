@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 from sysid_msgs.msg import ModelGap
 
 from sysid_node.online import types
-from sysid_node.online.model_gap import CoefficientGap
+from sysid_node.online.estimates.model_gap import CoefficientGap
 from sysid_node.online.types import Estimates
 
 NANOSECONDS = 1_000_000_000

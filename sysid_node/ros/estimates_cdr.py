@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.flight.cdr_layout import Definitions
-from sysid_node.flight.cdr_template import Template, Templates
+from sysid_node.flight.cdr.layout import Definitions
+from sysid_node.flight.cdr.template import Template, Templates
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES_TYPE
-from sysid_node.online.rows import DerivativeRows, FitRows
+from sysid_node.online.estimates.rows import DerivativeRows, FitRows
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 
 Array = NDArray[np.float64]

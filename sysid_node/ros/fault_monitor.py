@@ -13,7 +13,7 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.faults import watch as watching
-from sysid_node.faults.held import Known
+from sysid_node.faults.model.reference_model import Known
 from sysid_node.faults.settings import RANGES, Settings
 from sysid_node.faults.types import Fault
 from sysid_node.faults.watch import PERIOD, STALE_AFTER, Speech

@@ -27,9 +27,10 @@ from sysid_node.ros.monitor import Durations
 from sysid_node.ros.pace import Pace
 from sysid_node.ros.parameters import Parameter
 from sysid_node.ros.spin import run_program, serve
-from sysid_node.sim import Simulator, live, trim_flight
-from sysid_node.sim.dryden import INTENSITIES
-from sysid_node.sim.live import Air, Reading
+from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim.flying import live
+from sysid_node.sim.flying.live import Air, Reading
+from sysid_node.sim.signals.dryden import INTENSITIES
 
 PARAMETERS = (
     AIRCRAFT,

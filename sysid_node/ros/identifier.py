@@ -21,8 +21,8 @@ from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.cdr_layout import DamageError
-from sysid_node.flight.cdr_single import SingleReader
+from sysid_node.flight.cdr.layout import DamageError
+from sysid_node.flight.cdr.single import SingleReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import conversion, inputs
 from sysid_node.ros.declaring import declare, refusal, values_of

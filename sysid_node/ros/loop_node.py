@@ -15,8 +15,8 @@ from sensor_msgs.msg import JointState
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.cdr_layout import DamageError
-from sysid_node.flight.cdr_single import SingleReader
+from sysid_node.flight.cdr.layout import DamageError
+from sysid_node.flight.cdr.single import SingleReader
 from sysid_node.ros import conversion, inputs
 from sysid_node.ros.declaring import declare, values_of
 from sysid_node.ros.inputs import Fields, Numbers, Texts

@@ -10,7 +10,7 @@ from typing import Any
 from rosidl_parser.definition import AbstractNestedType, AbstractString, BasicType, NamespacedType
 from rosidl_parser.definition import Array as FixedArray
 
-from sysid_node.flight.cdr_layout import NUMBERS, Array, Kind, Part, String
+from sysid_node.flight.cdr.layout import NUMBERS, Array, Kind, Part, String
 
 #: IDL's names of what message definitions call otherwise.
 _IDL = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}

@@ -19,7 +19,7 @@ from rclpy.utilities import remove_ros_args
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
-from sysid_node.flight.bag import open_bag, reading
+from sysid_node.flight.bag.reader import open_bag, reading
 from sysid_node.ros.conversion import NANOSECONDS, stamp_message
 from sysid_node.ros.spin import run_program
 

@@ -21,7 +21,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.utilities import remove_ros_args
 from rosbags.rosbag2 import Writer
 
-from sysid_node.flight.bag_writer import STORAGES, add_topic, new_bag
+from sysid_node.flight.bag.writer import STORAGES, add_topic, new_bag
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE, INPUT_TOPICS
 from sysid_node.ros.spin import run_program, serve
 

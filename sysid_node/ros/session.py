@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flat
-from sysid_node.online import estimator, intake, schedule
-from sysid_node.online.estimates import estimate_of
-from sysid_node.online.model_gap import CoefficientGap, model_gap
-from sysid_node.online.present import Present, present
+from sysid_node.online import estimator
+from sysid_node.online.alignment import schedule, streaming
+from sysid_node.online.estimates.current_solution import Present, present
+from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
+from sysid_node.online.estimates.published import estimate_of
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 from sysid_node.ros.monitor import Durations
@@ -38,7 +39,7 @@ class Session:
     def reset(self) -> None:
         """Forget all messages and estimates."""
         self.state = estimator.init(self.aircraft, self.settings)
-        self.intake = intake.init(self.aircraft, self.settings.max_gap)
+        self.intake = streaming.init(self.aircraft, self.settings.max_gap)
         self.schedule = schedule.Schedule(self.publish_rate)
         self.samples = 0
         self._heard = time.monotonic()
@@ -59,7 +60,7 @@ class Session:
         assert last is not None
         current = present(self.state)
         estimates = estimate_of(self.state, current, last + silence)
-        return Due(intake.stamp_of(self.intake, last), estimates, current)
+        return Due(streaming.stamp_of(self.intake, last), estimates, current)
 
     def gap(self, due: Due) -> Sequence[CoefficientGap]:
         """How far the flight is from the aircraft file where estimates fell due, before anything else comes."""
@@ -71,21 +72,21 @@ class Session:
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message that cannot be read."""
-        intake.refuse(self.intake, topic, reason)
+        streaming.refuse(self.intake, topic, reason)
 
     def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due."""
-        return self._take(intake.on_imu(self.intake, stamp_ns, values))
+        return self._take(streaming.on_imu(self.intake, stamp_ns, values))
 
     def air_data(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an air data message: true airspeed (m/s), flow angles (rad), air density (kg/m^3)."""
-        return self._take(intake.on_air_data(self.intake, stamp_ns, values))
+        return self._take(streaming.on_air_data(self.intake, stamp_ns, values))
 
     def actuators(self, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> list[Due]:
         """Take joint positions: rad, throttle 0..1 or N."""
-        return self._take(intake.on_actuators(self.intake, stamp_ns, names, positions))
+        return self._take(streaming.on_actuators(self.intake, stamp_ns, names, positions))
 
-    def _take(self, samples: Iterable[intake.Complete]) -> list[Due]:
+    def _take(self, samples: Iterable[streaming.Complete]) -> list[Due]:
         results = []
         for moment, sample, wait in samples:
             start = time.perf_counter()

@@ -22,13 +22,13 @@ The page docs/effects.md describes every effect.
 Everything is SI, radians, body axes forward-right-down, float64.
 """
 
-from sysid_node.sim import xla
+from sysid_node.sim.compiled import xla
 
 xla.configure()
 
 from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter  # noqa: E402
-from sysid_node.sim.rollout import Flight, Inputs  # noqa: E402
+from sysid_node.sim.flying.rollout import Flight, Inputs  # noqa: E402
+from sysid_node.sim.flying.trim import Trim, trim_flight  # noqa: E402
 from sysid_node.sim.simulator import Simulator  # noqa: E402
-from sysid_node.sim.trim import Trim, trim_flight  # noqa: E402
 
 __all__ = ["EFFECTS", "STATIONS", "Effect", "Flight", "Inputs", "Parameter", "Simulator", "Trim", "trim_flight"]

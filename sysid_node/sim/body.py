@@ -14,7 +14,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import export
 
-from sysid_node.sim.layout import Scalar
+from sysid_node.sim.model.layout import Scalar
 
 #: The body's state: position (m, north-east-down), velocity relative to the steadily moving air (m/s, body axes),
 #: attitude quaternion body to earth (scalar first), angular rates (rad/s, body axes).

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.sim import parameters
-from sysid_node.sim.atmosphere import altitude_of
 from sysid_node.sim.body import STATES, quaternion
 from sysid_node.sim.effects import Parameter
-from sysid_node.sim.layout import OUTPUTS, Layout, Model, Scalar, layout_of, model_of
-from sysid_node.sim.rollout import Flight, Inputs, rollout
+from sysid_node.sim.flying.rollout import Flight, Inputs, rollout
+from sysid_node.sim.model import parameters
+from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar, layout_of, model_of
+from sysid_node.sim.signals.atmosphere import altitude_of
 from sysid_node.sim.stations.airflow import velocity_of
 
 Array = NDArray[np.float64]

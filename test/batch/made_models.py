@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from sysid_node.batch import rollout
-from sysid_node.batch.model import Manoeuvre, Model, Parameter, Scalars
+from sysid_node.batch.likelihood import rollout
+from sysid_node.batch.models.model import Manoeuvre, Model, Parameter, Scalars
 from sysid_node.flight.record import Array
 
 #: Short period of a small aircraft at 18 m/s, dimensional: alpha' = q + Za alpha + Zd de, q' = Ma alpha + Mq q + Md de.

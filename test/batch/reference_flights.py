@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
-from sysid_node.batch.manoeuvres import manoeuvre, with_forces_at_cg
-from sysid_node.batch.model import Manoeuvre, Model
 from sysid_node.batch.models.lateral_rates import lateral_rates
+from sysid_node.batch.models.manoeuvres import manoeuvre, with_forces_at_cg
+from sysid_node.batch.models.model import Manoeuvre, Model
 from sysid_node.batch.models.rigid_body import rigid_body
 from sysid_node.batch.models.short_period import short_period
-from sysid_node.batch.signals import differentiate, lowpass
+from sysid_node.batch.regression.filtering import differentiate, lowpass
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.record import Array, FlightRecord
 

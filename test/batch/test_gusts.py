@@ -14,9 +14,9 @@ from sysid_node.batch.settings import Settings
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.atmosphere import air_density
-from sysid_node.sim.layout import OUTPUTS
-from sysid_node.sim.sortie import Conditions, Sortie, fly_sortie
+from sysid_node.sim.flying.sortie import Conditions, Sortie, fly_sortie
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.signals.atmosphere import air_density
 
 RATE = 100.0
 TRUTH = {name: derivative.value for name, derivative in KESTREL.derivatives.items()}

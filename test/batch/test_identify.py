@@ -7,8 +7,8 @@ import pytest
 from made_flight import KESTREL, TRUTH, clean, flight, scores
 
 from sysid_node.batch.identify import METHODS, identify
-from sysid_node.batch.integrated import choose_model
-from sysid_node.batch.manoeuvres import segments
+from sysid_node.batch.methods.integrated_models import choose_model
+from sysid_node.batch.models.manoeuvres import segments
 from sysid_node.batch.settings import Settings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord

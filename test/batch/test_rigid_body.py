@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, MODEL, clean, trim
 
-from sysid_node.batch import rollout
-from sysid_node.batch.manoeuvres import manoeuvre, with_forces_at_cg
+from sysid_node.batch.likelihood import rollout
+from sysid_node.batch.models.manoeuvres import manoeuvre, with_forces_at_cg
 from sysid_node.batch.models.rigid_body import STATES, rigid_body
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.atmosphere import air_density
+from sysid_node.sim.signals.atmosphere import air_density
 
 
 def test_it_flies_as_the_simulator_does():

@@ -15,12 +15,14 @@ from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.cli.main import main
 from sysid_node.cli.replay import parse_settings, replay
 from sysid_node.errors import InputError
-from sysid_node.flight.bag import read_streams
-from sysid_node.flight.bag_writer import write_streams
-from sysid_node.flight.messages import type_store
+from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.streams import Arrival
-from sysid_node.online import estimates, estimator, intake
-from sysid_node.online.schedule import Schedule, due
+from sysid_node.online import estimator
+from sysid_node.online.alignment import streaming
+from sysid_node.online.alignment.schedule import Schedule, due
+from sysid_node.online.estimates import published
 from sysid_node.online.settings import Settings
 
 AIRCRAFT = made_aircraft()
@@ -51,19 +53,26 @@ def arguments(tmp_path, bag):
 def one_by_one(path, settings, rate):
     """The live node's loop: each message through the intake, each sample into the estimator."""
     streams = read_streams(path)
-    state, taken, schedule = estimator.init(AIRCRAFT, settings), intake.init(AIRCRAFT, settings.max_gap), Schedule(rate)
+    state, taken, schedule = (
+        estimator.init(AIRCRAFT, settings),
+        streaming.init(AIRCRAFT, settings.max_gap),
+        Schedule(rate),
+    )
     imu, air, joints = streams.imu, streams.air_data, streams.actuators
     calls = [
-        *((intake.on_imu, imu.arrival, i, (tuple(v),)) for i, v in enumerate(imu.values.tolist())),
-        *((intake.on_air_data, air.arrival, i, (tuple(v),)) for i, v in enumerate(air.values.tolist())),
-        *((intake.on_actuators, joints.arrival, i, (list(JOINTS), v)) for i, v in enumerate(joints.positions.tolist())),
+        *((streaming.on_imu, imu.arrival, i, (tuple(v),)) for i, v in enumerate(imu.values.tolist())),
+        *((streaming.on_air_data, air.arrival, i, (tuple(v),)) for i, v in enumerate(air.values.tolist())),
+        *(
+            (streaming.on_actuators, joints.arrival, i, (list(JOINTS), v))
+            for i, v in enumerate(joints.positions.tolist())
+        ),
     ]
     history = []
     for on_message, arrival, i, values in sorted(calls, key=lambda call: call[1].order[call[2]]):
         for time, sample, wait in on_message(taken, int(arrival.stamp_ns[i]), *values):
             estimator.update(state, time, sample)
             if due(schedule, time, wait):
-                history.append((intake.stamp_of(taken, time), estimates.estimate(state)))
+                history.append((streaming.stamp_of(taken, time), published.estimate(state)))
     return history
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
-from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.logs import load_flight
 from sysid_node.flight.truth import read_truth
 

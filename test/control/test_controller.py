@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from sysid_node.control import controller
 from sysid_node.control.settings import Settings
 from sysid_node.control.types import Belief, Sensed, SetPoints
-from sysid_node.sim import Simulator, live, trim_flight
+from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim.flying import live
 
 ANY = st.floats(allow_nan=True, allow_infinity=True, width=32)
 STATE = controller.init(AIRCRAFT, Settings())

@@ -10,8 +10,8 @@ from sysid_node.control.axis import level_flight
 from sysid_node.control.plant import Scales
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator, trim_flight
-from sysid_node.sim.chain import Chain, derivative, drive_of
-from sysid_node.sim.rollout import settled
+from sysid_node.sim.flying.rollout import settled
+from sysid_node.sim.model.chain import Chain, derivative, drive_of
 from sysid_node.sim.stations import actuator, propulsion
 
 AIRCRAFT = load_aircraft("cdrw")

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import monitor
-from sysid_node.faults.blocks import PERIOD, Block
+from sysid_node.faults.model.blocks import PERIOD, Block
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.state import State
 from sysid_node.faults.types import Fault
-from sysid_node.online.signals import OFFSET, OUTPUTS
+from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS
 
 Array = NDArray[np.float64]
 

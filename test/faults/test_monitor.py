@@ -7,9 +7,10 @@ import pytest
 from fault_flights import AIRCRAFT, Truth, fly, monitored
 
 from sysid_node.errors import InputError
-from sysid_node.faults import blocks, monitor
-from sysid_node.faults.blocks import PERIOD
-from sysid_node.faults.held import Known
+from sysid_node.faults import monitor
+from sysid_node.faults.model import blocks
+from sysid_node.faults.model.blocks import PERIOD
+from sysid_node.faults.model.reference_model import Known
 from sysid_node.faults.settings import Settings
 from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, VANE_STUCK
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from made_flights import made_streams
 
-from sysid_node.flight.bag_writer import add_topic, header, new_bag, write_streams
+from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.writer import add_topic, header, new_bag, write_streams
 from sysid_node.flight.commands import COMMANDS, COMMANDS_TYPE, JointMessage, read_commands
-from sysid_node.flight.messages import type_store
 
 TOLD = [
     JointMessage(2_000_000_000, 1_999_000_000, ("elevator", "rudder"), (0.1, -0.2)),

@@ -7,7 +7,7 @@ import pytest
 from made_flights import made_aircraft
 
 from sysid_node.errors import InputError
-from sysid_node.flight.bag_writer import write_streams
+from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.csv import read_csv, write_csv
 from sysid_node.flight.logs import load_flight, read_log, streams_of
 from sysid_node.flight.record import FlightRecord

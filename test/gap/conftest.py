@@ -8,9 +8,9 @@ from gap_flights import fly
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.flights import Flight
-from sysid_node.gap.view import View
-from sysid_node.gap.viewing import view_of
+from sysid_node.gap.flightdata.gap_flight import Flight
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import View
 from sysid_node.sim import Simulator
 
 Effects = Mapping[str, Mapping[str, float]]

@@ -7,10 +7,10 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
-from sysid_node.gap.flights import Flight, complete
+from sysid_node.gap.flightdata.gap_flight import Flight, complete
 from sysid_node.sim import Simulator
-from sysid_node.sim.recording import Recorder
-from sysid_node.sim.sortie import Conditions, fly_sortie
+from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.sortie import Conditions, fly_sortie
 
 RATE = 100.0
 STEPS = [

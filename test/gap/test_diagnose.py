@@ -11,9 +11,9 @@ from gap_flights import fly
 from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.holdout import Check
-from sysid_node.gap.localise import _regime
-from sysid_node.gap.verdict import _sampling, verdict_of
+from sysid_node.gap.validation.holdout import Check
+from sysid_node.gap.verdict.decision import _sampling, verdict_of
+from sysid_node.gap.verdict.localisation import _regime
 from sysid_node.report.gap import write_gap_report
 from sysid_node.report.sections.gap import candidates
 

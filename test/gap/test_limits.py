@@ -7,10 +7,10 @@ import pytest
 from gap_flights import fly
 from scipy.optimize import lsq_linear
 
-from sysid_node.gap.candidates import candidates_of
-from sysid_node.gap.fit import Fit, Projected, blank, bounded, linearised, polish, with_candidates
-from sysid_node.gap.nuisance import LIMIT, nuisances_of
-from sysid_node.gap.viewing import view_of
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.estimation.fit import Fit, Projected, blank, bounded, linearised, polish, with_candidates
+from sysid_node.gap.estimation.nuisances import LIMIT, nuisances_of
+from sysid_node.gap.residuals.build import view_of
 from sysid_node.sim import Simulator
 
 

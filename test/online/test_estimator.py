@@ -14,10 +14,11 @@ from plant import TRUTH, exact_flight, made_aircraft
 
 from sysid_node.aircraft.model import Derivative
 from sysid_node.errors import InputError
-from sysid_node.online import estimator, intake
-from sysid_node.online.estimates import estimate
-from sysid_node.online.model_gap import model_gap
-from sysid_node.online.present import present
+from sysid_node.online import estimator
+from sysid_node.online.alignment import streaming
+from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.model_gap import model_gap
+from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.state import State
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -102,7 +103,7 @@ def test_nothing_but_nonsense(samples: list[list[float]]) -> None:
 @hypothesis_settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_messages(data: st.DataObject) -> None:
     """Messages with any values and stamps through the intake, as the node and the replay feed them."""
-    door = intake.init(AIRCRAFT, 0.2)
+    door = streaming.init(AIRCRAFT, 0.2)
     state = estimator.init(AIRCRAFT, Settings(settle_time=0.0))
     stamps = (1_000_000_000 + np.round(TIME * 1e9)).astype(int).tolist()
     odd = dict(data.draw(st.lists(st.tuples(st.integers(0, len(TIME) - 1), st.integers(-(10**9), 10**18)), max_size=8)))
@@ -110,9 +111,9 @@ def test_any_messages(data: st.DataObject) -> None:
     names = tuple(AIRCRAFT.controls)
     for i, (regular, sample) in enumerate(zip(stamps, SAMPLES.tolist(), strict=True)):
         stamp, values = odd.get(i, regular), [wrong.get(i, sample[0]), *sample[1:]]
-        complete = intake.on_imu(door, stamp, tuple(values[:6]))
-        complete += intake.on_air_data(door, stamp, tuple(wrong.get(i, x) for x in values[6:10]))
-        complete += intake.on_actuators(door, stamp, (*names, "throttle"), [*values[12:], 0.2])
+        complete = streaming.on_imu(door, stamp, tuple(values[:6]))
+        complete += streaming.on_air_data(door, stamp, tuple(wrong.get(i, x) for x in values[6:10]))
+        complete += streaming.on_actuators(door, stamp, (*names, "throttle"), [*values[12:], 0.2])
         for time, aligned, _ in complete:
             estimator.update(state, time, aligned)
     assert_sound(state)

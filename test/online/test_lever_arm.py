@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Sensors
-from sysid_node.online.signals import array_signals, layout, scalar_signals
+from sysid_node.online.frequency.regression_signals import array_signals, layout, scalar_signals
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 ARM = np.array([0.55, 0.3, -0.2])  # m

@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 from plant import exact_flight, fly, made_aircraft, multisteps
 
-from sysid_node.online import estimator, regression, signals, status
-from sysid_node.online.estimates import estimate, estimate_of
-from sysid_node.online.judgement import SETTLING, STALE, judge
-from sysid_node.online.present import present
+from sysid_node.online import estimator, status
+from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.published import estimate, estimate_of
+from sysid_node.online.estimates.validity import SETTLING, STALE, judge
+from sysid_node.online.frequency import regression_signals
+from sysid_node.online.regression import least_squares
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.state import State
 from sysid_node.online.status import vocabulary
 
 AIRCRAFT = made_aircraft()
-PLAN = regression.plan(AIRCRAFT.structure, signals.layout(AIRCRAFT))
+PLAN = least_squares.plan(AIRCRAFT.structure, regression_signals.layout(AIRCRAFT))
 
 
 def flown(seconds: float, method: str = "iv_rft") -> State:

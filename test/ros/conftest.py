@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sysid_node.flight.bag_writer import write_streams
+from sysid_node.flight.bag.writer import write_streams
 
 if find_spec("rclpy") is None:
     collect_ignore_glob = ["test_*.py"]

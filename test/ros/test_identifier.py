@@ -13,14 +13,14 @@ from rcl_interfaces.srv import DescribeParameters, SetParameters
 from std_srvs.srv import Trigger
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.flight.bag import read_streams
-from sysid_node.flight.bag_writer import write_streams
+from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.streams import Streams
-from sysid_node.online.alignment import align_streams
-from sysid_node.online.run import run
-from sysid_node.online.schedule import due_times
+from sysid_node.online.alignment.schedule import due_times
+from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
+from sysid_node.online.whole_record import run
 from sysid_node.ros.conversion import estimates_from_message, stamp_ns
 
 

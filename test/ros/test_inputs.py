@@ -9,7 +9,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from sysid_msgs.msg import AirData
 
-from sysid_node.flight.cdr_single import SingleReader
+from sysid_node.flight.cdr.single import SingleReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import inputs
 from sysid_node.ros.conversion import axes_sign, stamp_message

@@ -14,7 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
-from sysid_node.flight.bag import read_streams
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.ros import conversion
 from sysid_node.ros.player import shift_stamp
 

@@ -8,10 +8,10 @@ from harness import START_NS, made_up_streams
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.streams import Streams
-from sysid_node.online.alignment import align_streams
-from sysid_node.online.run import run
-from sysid_node.online.schedule import due_times
+from sysid_node.online.alignment.schedule import due_times
+from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.settings import Settings
+from sysid_node.online.whole_record import run
 from sysid_node.ros.save import save_estimates
 from sysid_node.ros.session import Due, Session
 

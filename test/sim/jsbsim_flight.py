@@ -6,8 +6,8 @@ from pathlib import Path
 import jsbsim
 import numpy as np
 
-from sysid_node.sim.atmosphere import GRAVITY
 from sysid_node.sim.body import euler_angles
+from sysid_node.sim.signals.atmosphere import GRAVITY
 
 FOOT, RADIUS = 0.3048, 6371000.0
 

@@ -7,9 +7,9 @@ from plain import DERIVATIVES, three_axes
 from scipy.signal import lsim
 
 from sysid_node.sim import EFFECTS, STATIONS, trim_flight
-from sysid_node.sim.chain import Chain, derivative, drive_of
 from sysid_node.sim.effects import ground_effect, stall_separation
-from sysid_node.sim.rollout import settled
+from sysid_node.sim.flying.rollout import settled
+from sysid_node.sim.model.chain import Chain, derivative, drive_of
 from sysid_node.sim.stations import actuator
 
 SAMPLES = 301

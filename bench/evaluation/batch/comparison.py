@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 from evaluation.pages import table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch import recursive
 from sysid_node.batch.identify import identify, predicted_coefficients
-from sysid_node.batch.integrated import choose_model
-from sysid_node.batch.manoeuvres import manoeuvre
+from sysid_node.batch.methods import kalman_filters
+from sysid_node.batch.methods.integrated_models import choose_model
+from sysid_node.batch.models.manoeuvres import manoeuvre
+from sysid_node.batch.regression.filtering import averaged
+from sysid_node.batch.results.validation import figures
 from sysid_node.batch.settings import Settings
-from sysid_node.batch.signals import averaged
-from sysid_node.batch.validation import figures
 from sysid_node.flight.logs import load_flight
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.truth import read_truth
-from sysid_node.online.run import run
 from sysid_node.online.settings import Settings as OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
+from sysid_node.online.whole_record import run
 
 Array = NDArray[np.float64]
 BAGS = Path(__file__).resolve().parents[3] / "bags"
@@ -85,7 +85,7 @@ def by_online(method: str, flown: Case) -> Found:
     return {n: (d.value, d.lower, d.upper) for n, d in last.derivatives.items() if d.valid}
 
 
-def by_kalman(method: Callable[..., recursive.Track], flown: Case) -> Found:
+def by_kalman(method: Callable[..., kalman_filters.Track], flown: Case) -> Found:
     """A filter of state and parameters, told the aircraft file's noise, values and tolerances."""
     model, _ = choose_model(flown.aircraft, [flown.record], Settings())
     piece = manoeuvre(model, averaged(flown.record, 100.0))
@@ -114,9 +114,9 @@ METHODS: Mapping[str, Callable[[Case], Found]] = {
             "neural_gauss_newton",
         )
     },
-    "extended Kalman filter": partial(by_kalman, recursive.extended_kalman),
-    "iterated Kalman filter": partial(by_kalman, recursive.iterated_kalman),
-    "unscented Kalman filter": partial(by_kalman, recursive.unscented_kalman),
+    "extended Kalman filter": partial(by_kalman, kalman_filters.extended_kalman),
+    "iterated Kalman filter": partial(by_kalman, kalman_filters.iterated_kalman),
+    "unscented Kalman filter": partial(by_kalman, kalman_filters.unscented_kalman),
     "output error": partial(by_batch, "output_error"),
     "filter error": partial(by_batch, "filter_error"),
 }

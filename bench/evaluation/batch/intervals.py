@@ -20,15 +20,15 @@ from evaluation.judging import Verdict, judge
 from evaluation.pages import table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.batch.identify import identify
-from sysid_node.batch.integrated import Integrated
-from sysid_node.batch.result import Estimate
+from sysid_node.batch.methods.integrated_models import Integrated
+from sysid_node.batch.results.result import Estimate
 from sysid_node.batch.settings import Settings
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.atmosphere import air_density
-from sysid_node.sim.layout import OUTPUTS
-from sysid_node.sim.sortie import Conditions, Sortie, fly_sortie
+from sysid_node.sim.flying.sortie import Conditions, Sortie, fly_sortie
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.signals.atmosphere import air_density
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import numpy as np
 import reference_flights as published
 
 from evaluation.pages import table
-from sysid_node.batch.filter_error import filter_error
-from sysid_node.batch.output_error import output_error
-from sysid_node.batch.recursive import extended_kalman, unscented_kalman
-from sysid_node.batch.result import Estimate, Fit
+from sysid_node.batch.methods.filter_error import filter_error
+from sysid_node.batch.methods.kalman_filters import extended_kalman, unscented_kalman
+from sysid_node.batch.methods.output_error import output_error
+from sysid_node.batch.results.result import Estimate, Fit
 
 Reference = Mapping[str, tuple[float, float]]
 REPEAT = 5

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
-from sysid_node.online import information, regression, transform
-from sysid_node.online.information import Information, Spectrum
-from sysid_node.online.signals import OFFSET, Layout
-from sysid_node.online.transform import Lines
+from sysid_node.online.frequency import fourier_transform
+from sysid_node.online.frequency.fourier_transform import Lines
+from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.regression import information, least_squares
+from sysid_node.online.regression.information import Information, Spectrum
 
 Array = NDArray[np.float64]
 Frequencies = tuple[float, float, float]  # Hz: first, step, last
@@ -44,16 +45,16 @@ def regress(
     ``rates``: the left sides are the signals' rates of change. ``breaks`` (s): where the record begins anew.
     """
     layout = Layout(tuple(regressors))
-    plan = regression.plan(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
-    grid = transform.lines(*frequencies)
+    plan = least_squares.plan(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
+    grid = fourier_transform.lines(*frequencies)
     lines = information.spectrum(grid.omega, np.inf)
     total = information.nothing(layout)
     for part in _parts(time, breaks):
         columns = _columns(layout, time[part], {n: x[part] for n, x in regressors.items()})
         sides = np.array([x[part] for x in left.values()])
         total = total + _measure(time[part], columns, sides, rates, grid, lines)
-    solution = regression.solve(plan, total.grams.sum(axis=0))
-    spread = regression.uncertainty(plan, solution, total)
+    solution = least_squares.solve(plan, total.grams.sum(axis=0))
+    spread = least_squares.uncertainty(plan, solution, total)
     errors = np.sqrt(spread.covariance.diagonal(axis1=1, axis2=2))
     return {
         f"{equation}_{plan.regressors[i]}": Value(float(solution.theta[i, c]), float(errors[c, i]))
@@ -85,6 +86,6 @@ def _measure(time: Array, columns: Array, sides: Array, rates: bool, grid: Lines
     areas, slants = 0.5 * step * (columns[1:] + columns[:-1]), 0.5 * step**2 * np.diff(columns, axis=0)
     if rates:
         areas[:, : len(sides)] = np.diff(sides, axis=1).T
-    running = transform.start(grid, columns.shape[1])
-    transform.add_many(running, time[:-1], time[1:], areas, slants)
-    return information.measure(transform.current(running), None, lines, float(time[0]), float(time[-1]))
+    running = fourier_transform.start(grid, columns.shape[1])
+    fourier_transform.add_many(running, time[:-1], time[1:], areas, slants)
+    return information.measure(fourier_transform.current(running), None, lines, float(time[0]), float(time[-1]))

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
-from sysid_node.batch.model import Parameter, Scalars
+from sysid_node.batch.models.model import Parameter, Scalars
 
 Signals = Mapping[str, jax.Array]
 #: ``signals, theta -> coefficient -> value``.

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.model import Parameter
+from sysid_node.batch.models.model import Parameter
 
 Signals = Mapping[str, jax.Array]
 

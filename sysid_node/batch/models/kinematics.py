@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
-from sysid_node.batch.model import Model, Parameter, Scalars
+from sysid_node.batch.models.model import Model, Parameter, Scalars
 
 GRAVITY = 9.80665  # m/s^2
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.model import Model, Parameter, Scalars
+from sysid_node.batch.models.model import Model, Parameter, Scalars
 
 _REGRESSORS = ("p", "r", "da", "dr", "beta")
 _UNITS = {"L": "1/s", "N": "1/s", "Y": "m/s"}

@@ -15,10 +15,10 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.model import Model, Scalars
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 from sysid_node.batch.models.gusts import DRIVEN, air_relative, gust_parameters, gust_rates, gust_states
 from sysid_node.batch.models.kinematics import at_probe, attitude_rates, flow_rates
+from sysid_node.batch.models.model import Model, Scalars
 from sysid_node.errors import InputError
 
 #: States that may be integrated, each with the coefficient without which it cannot be; None: kinematics alone.

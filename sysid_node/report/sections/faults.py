@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from sysid_node.faults.record import Episode
+from sysid_node.faults.recorded_flight import Episode
 from sysid_node.faults.types import amount
 from sysid_node.report.data import RunResult
 from sysid_node.report.sections import Section

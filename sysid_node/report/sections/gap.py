@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.close import STAGES
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.gap.evidence import carried
-from sysid_node.gap.flown import READINGS, WINDOW, drawn, shows
-from sysid_node.gap.localise import REGIMES
-from sysid_node.gap.verdict import structured
-from sysid_node.gap.view import CHANNELS
+from sysid_node.gap.estimation.predictive_density import carried
+from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, drawn, shows
+from sysid_node.gap.validation.spectral_error import STAGES
+from sysid_node.gap.verdict.decision import structured
+from sysid_node.gap.verdict.localisation import REGIMES
 from sysid_node.report import figures
 from sysid_node.report.figures import BLUE, GREEN, INK, MUTED, PALE, PURPLE, VERMILION, Figure
 from sysid_node.report.sections.gap_words import WORDS, paragraph, percent, units_of
 from sysid_node.report.thin import thin_curve
 from sysid_node.report.words import NONE, REGRESSOR_WORDS, likely, number, symbol, with_interval, words_of
-from sysid_node.sim.layout import OUTPUTS
-from sysid_node.sim.prediction import COEFFICIENTS
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.model.prediction import COEFFICIENTS
 
 #: Flight that is drawn at most, s: where the simulator of the file is furthest off.
 _DRAWN = 24.0

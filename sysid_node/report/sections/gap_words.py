@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sysid_node.gap.close import Gap
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.gap.flown import WINDOW
+from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.report.words import COEFFICIENT_WORDS, REGRESSOR_WORDS, likely, number, with_interval, words_of
 from sysid_node.sim import EFFECTS
-from sysid_node.sim.layout import Layout
+from sysid_node.sim.model.layout import Layout
 
 #: What is compared, in words.
 WORDS = {

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sysid_node.sim.effects.base import Effect, per_control
-from sysid_node.sim.layout import Scalar, Values
-from sysid_node.sim.smooth import soft_dead_zone
+from sysid_node.sim.model.layout import Scalar, Values
+from sysid_node.sim.signals.smooth import soft_dead_zone
 
 EFFECT = Effect(
     name="actuator_backlash",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
-from sysid_node.sim.layout import Scalar, Values
-from sysid_node.sim.smooth import soft_clip
+from sysid_node.sim.model.layout import Scalar, Values
+from sysid_node.sim.signals.smooth import soft_clip
 
 EFFECT = Effect(
     name="actuator_rate_limit",

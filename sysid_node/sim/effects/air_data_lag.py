@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
-from sysid_node.sim.layout import Scalar, Values
+from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
     name="air_data_lag",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from sysid_node.sim.layout import Layout
+from sysid_node.sim.model.layout import Layout
 
 #: The chain, in the order in which a command becomes a message.
 STATIONS = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.sim.effects.base import Effect, Parameter
-from sysid_node.sim.layout import Layout
+from sysid_node.sim.model.layout import Layout
 
 
 def _parameters(layout: Layout) -> tuple[Parameter, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
-from sysid_node.sim.layout import Scalar, Values
+from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
     name="gust",

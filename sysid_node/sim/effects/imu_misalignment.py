@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sysid_node.sim.body import Vector
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
-from sysid_node.sim.layout import Values
+from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
     name="imu_misalignment",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
-from sysid_node.sim.layout import Scalar, Values
+from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
     name="motor_lag",

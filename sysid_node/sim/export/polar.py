@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.sim.layout import level_flight
+from sysid_node.sim.model.layout import level_flight
 
 
 class Polar(NamedTuple):

@@ -18,7 +18,7 @@ from sysid_node.sim.effects import (
     control_effectiveness_loss,
     stuck_surface,
 )
-from sysid_node.sim.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 
 
 class ActuatorState(NamedTuple):

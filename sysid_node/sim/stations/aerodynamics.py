@@ -18,7 +18,7 @@ from sysid_node.sim.effects import (
     stall_separation,
     unsteady_aerodynamics,
 )
-from sysid_node.sim.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.stations.airflow import Air
 
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from sysid_node.sim.body import Vector
 from sysid_node.sim.effects import gust, turbulence
-from sysid_node.sim.layout import Model, Scalar, Values
+from sysid_node.sim.model.layout import Model, Scalar, Values
 
 
 class Air(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from sysid_node.sim.layout import Scalar, Values
-from sysid_node.sim.timing import shift_cubic, shift_near_zero
+from sysid_node.sim.model.layout import Scalar, Values
+from sysid_node.sim.signals.time_shift import shift_cubic, shift_near_zero
 
 _IMU, _AIR = 9, 3  # columns of the outputs that the IMU's and the air data's messages carry
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.layout import Scalar, Values
-from sysid_node.sim.timing import shift_linear
+from sysid_node.sim.model.layout import Scalar, Values
+from sysid_node.sim.signals.time_shift import shift_linear
 
 
 def arrive(effects: dict[str, Values], commands: Scalar, step: Scalar) -> Scalar:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from sysid_node.sim.body import MassProperties, Vector, angular_acceleration
 from sysid_node.sim.effects import cg_shift, inertia_error, mass_error
-from sysid_node.sim.layout import Model, Values
+from sysid_node.sim.model.layout import Model, Values
 
 
 def properties(model: Model, effects: dict[str, Values]) -> MassProperties:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from sysid_node.sim.body import Vector
 from sysid_node.sim.effects import motor_lag, thrust_line_offset, thrust_scale, thrust_yaw
-from sysid_node.sim.layout import Model, Scalar, Values
+from sysid_node.sim.model.layout import Model, Scalar, Values
 
 
 def commanded(model: Model, thrust: Scalar) -> Scalar:

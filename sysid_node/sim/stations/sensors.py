@@ -15,9 +15,9 @@ from sysid_node.sim.effects import (
     vane_lever_arm,
     vane_scale,
 )
-from sysid_node.sim.layout import Model, Scalar, Values
+from sysid_node.sim.model.layout import Model, Scalar, Values
+from sysid_node.sim.signals.time_shift import slope
 from sysid_node.sim.stations.airflow import flow_angles
-from sysid_node.sim.timing import slope
 
 
 def imu_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.sim.effects import structural_mode
-from sysid_node.sim.layout import Scalar, Values
+from sysid_node.sim.model.layout import Scalar, Values
 
 
 def start(effects: dict[str, Values], load: Scalar) -> tuple[Scalar, Scalar]:

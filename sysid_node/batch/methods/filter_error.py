@@ -1,0 +1,235 @@
+"""Maximum likelihood by filter error: output error for a flight in turbulence.
+
+A Kalman filter follows the aircraft through the gusts, and the constants are those for which its one-step predictions
+are best. Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 5; Maine & Iliff, NASA RP-1168.
+
+The criterion is the determinant of the innovations' covariance, diagonal and found by relaxation (Jategaonkar, eq.
+5.12). The filter's gain comes from process and measurement noise, both estimated: that always gives a stable filter,
+where Jategaonkar's gain from the innovations' covariance needs a constraint. Only the ratio of the two noises shapes
+the gain; their common size follows from the innovations. With no process noise this is output error.
+
+Outputs must be measured independently: a pitch acceleration differentiated from the pitch rate predicts itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.batch.likelihood import kalman
+from sysid_node.batch.likelihood.covariance import assess
+from sysid_node.batch.likelihood.maximum_likelihood import Problem, Search, answer_with_own, maximise, whitened
+from sysid_node.batch.likelihood.unknowns import Priors, Unknowns
+from sysid_node.batch.models.model import Dynamics, Manoeuvre, Model, check_manoeuvres
+from sysid_node.batch.regression.jackknife import jackknife
+from sysid_node.batch.results.result import Answer, Fit
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+
+#: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
+_NOISE_RANGE = 1e3
+
+#: The noises' own small likelihood makes the last digits dear; a hundredth of a standard error is enough. A round that
+#: goes all the way to the best gain for the first, wrong, noise may end where the likelihood is highest only locally.
+FILTER_SEARCH = Search(tolerance=1e-2, early=3)
+
+#: 1-sigma of the logarithm of a noise about its start value: a factor of twenty either way is no surprise.
+_NOISE_PRIOR = 3.0
+
+
+def filter_error(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    *,
+    initial_states: Sequence[str] = (),
+    biases: Sequence[str] = (),
+    correlated: bool = False,
+    search: Search = FILTER_SEARCH,
+) -> Fit:
+    """Estimates the free parameters and the process noise from all manoeuvres together.
+
+    ``correlated``: whether what the outputs' innovations have in common counts; it should where a disturbance shows in
+    several outputs at once, as a gust does, and must not where one output is derived from another.
+    Each manoeuvre has the steady Kalman gain of its first sample's flight condition: cut a flight that changes speed
+    much. ``extras`` of the result holds the noises' standard deviations: ``process_<state>`` (unit of the state per
+    root second) and ``sensor_<output>``. Raises InputError as ``output_error`` does, and on outputs with gaps; a search
+    that does not converge is returned, and says so.
+    """
+    check_manoeuvres(model, manoeuvres)
+    problem = _FilterError(Unknowns.of(model, manoeuvres, initial_states, biases), correlated)
+    z, iterations, complaint = maximise(problem, search)
+    return assess("filter_error", problem, z, iterations, complaint, problem.noises(z))
+
+
+def predict_filter(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    values: Mapping[str, float],
+    noises: Mapping[str, float],
+    *,
+    initial_states: Sequence[str] = (),
+    biases: Sequence[str] = (),
+) -> list[Answer]:
+    """One-step predictions on other manoeuvres, parameters and noises (a fit's ``extras``) held.
+
+    Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
+    """
+    held = model.started_at(values)
+    check_manoeuvres(held, manoeuvres)
+    problem = _FilterError(Unknowns.of(held, manoeuvres, initial_states, biases))
+    logs = np.log([noises[name] for name in _noise_names(model)])
+    return answer_with_own(problem, np.concatenate([problem.unknowns.start(), logs]))
+
+
+class _FilterError(Problem):
+    """One-step predictions; z ends with the logarithms of process and measurement noise, 1 sigma."""
+
+    def __init__(self, unknowns: Unknowns, correlated: bool = False) -> None:
+        super().__init__(unknowns)
+        _check_complete(unknowns)
+        self._correlated = correlated
+        self._noise_start = _rough_noise(unknowns)
+
+    def start(self) -> Array:
+        return np.concatenate([self.unknowns.start(), self._noise_start])
+
+    def bounds(self) -> tuple[Array, Array]:
+        lower, upper = self.unknowns.bounds()
+        reach = np.log(_NOISE_RANGE)
+        return np.concatenate([lower, self._noise_start - reach]), np.concatenate([upper, self._noise_start + reach])
+
+    def answers(self, z: Array) -> list[Answer]:
+        return [
+            Answer(m.name, m.time, self.unknowns.model.outputs, m.outputs, np.asarray(_predict_jit(*self._of(i, z))))
+            for i, m in enumerate(self.unknowns.manoeuvres)
+        ]
+
+    def sensitivities(self, z: Array) -> list[Array]:
+        blocks = []
+        for i, manoeuvre in enumerate(self.unknowns.manoeuvres):
+            block = np.zeros((*manoeuvre.outputs.shape, z.size))
+            block[:, :, self._columns(i, z)] = np.asarray(_predict_jacobian(*self._of(i, z)))
+            blocks.append(block)
+        return blocks
+
+    def priors(self) -> Priors:
+        """Besides the parameters': noises of about the start values, so that one that does not matter stays put."""
+        index, mean, sigma = super().priors()
+        noises = self.unknowns.size + np.arange(self._noise_start.size)
+        vague = np.full(noises.size, _NOISE_PRIOR)
+        return np.r_[index, noises], np.r_[mean, self._noise_start], np.r_[sigma, vague]
+
+    def noise(self, z: Array) -> Array:
+        """Of the innovations; where they may be ``correlated``, their whole covariance, kept regular."""
+        independent = super().noise(z)
+        if not self._correlated:
+            return independent
+        errors = whitened(np.concatenate([answer.residuals for answer in self.answers(z)]), independent)
+        correlation = errors.T @ errors / len(errors)
+        return np.asarray(independent @ np.linalg.cholesky(correlation + 1e-10 * np.eye(len(correlation))))
+
+    def covariance(
+        self, information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
+    ) -> tuple[Array, float]:
+        """By the jackknife: a filter's sensitivities are made of the noise, too."""
+        return jackknife(information, sensitivities, residuals)
+
+    def noises(self, z: Array) -> dict[str, float]:
+        """Standard deviations of process and measurement noise, scaled so that the filter expects its innovations."""
+        model, manoeuvre = self.unknowns.model, self.unknowns.manoeuvres[0]
+        logs = z[self.unknowns.size :]
+        q = np.zeros(len(model.states))
+        q[list(_driven(model))], r = np.split(np.exp(2.0 * logs), [len(model.driven_states)])
+        theta, x0 = self.unknowns.theta(z), self.unknowns.initial_state(z, 0)
+        expected = kalman.innovation_variance(
+            model.dynamics, manoeuvre.step, manoeuvre.inputs[0], x0, theta, jnp.asarray(q), jnp.asarray(r)
+        )
+        scale = np.exp(np.mean(np.log(np.linalg.norm(self.noise(z), axis=1) / np.sqrt(np.asarray(expected)))))
+        return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
+
+    def _columns(self, index: int, z: Array) -> list[int]:
+        """Where in z the quantities stand that this manoeuvre depends on."""
+        own = self.unknowns.own(index)
+        noises = range(self.unknowns.size, z.size)
+        return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
+
+    def _of(self, index: int, z: Array) -> tuple[Dynamics, Chosen, Array, Array, Array, Array, Array, Array]:
+        u, m = self.unknowns, self.unknowns.manoeuvres[index]
+        chosen = (u.free, u.states, u.biases, _driven(u.model))
+        local = z[self._columns(index, z)]
+        return u.model.dynamics, chosen, m.time, m.inputs, m.outputs, m.initial_state, u.model.start, local
+
+
+Chosen = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+
+
+def _predict(
+    dynamics: Dynamics,
+    chosen: Chosen,
+    time: jax.Array,
+    inputs: jax.Array,
+    outputs: jax.Array,
+    x0: jax.Array,
+    theta: jax.Array,
+    local: jax.Array,
+) -> jax.Array:
+    """Predicted outputs (N, ny) for what of z concerns this manoeuvre: parameters, its own unknowns, log noises.
+
+    ``chosen``: indices of the free parameters, free initial states, biased outputs and driven states.
+    """
+    values, states, bias, log_q, log_r = jnp.split(local, np.cumsum([len(part) for part in chosen]))
+    theta = theta.at[jnp.array(chosen[0], dtype=int)].set(values)
+    x0 = x0.at[jnp.array(chosen[1], dtype=int)].set(states)
+    offset = jnp.zeros(outputs.shape[1]).at[jnp.array(chosen[2], dtype=int)].set(bias)
+    q = jnp.eye(x0.size)[:, np.array(chosen[3])] @ jnp.exp(2.0 * log_q)  # XLA does not survive this as a scatter
+    return kalman.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, jnp.exp(2.0 * log_r)) + offset
+
+
+_predict_jit = jax.jit(_predict, static_argnums=(0, 1))
+_predict_jacobian = jax.jit(jax.jacfwd(_predict, argnums=7), static_argnums=(0, 1))
+
+
+def _noise_names(model: Model) -> list[str]:
+    return [f"process_{name}" for name in model.driven_states] + [f"sensor_{name}" for name in model.outputs]
+
+
+def _check_complete(unknowns: Unknowns) -> None:
+    for m in unknowns.manoeuvres:
+        if m.every != 1:
+            raise InputError(f"{m.name}: filter error needs an output at every sample, not means over {m.every}")
+        gaps = np.argwhere(~np.isfinite(m.outputs))
+        if gaps.size:
+            raise InputError(
+                f"{m.name}: output {unknowns.model.outputs[gaps[0][1]]} has gaps, the first at "
+                f"{m.time[gaps[0][0]]:.2f} s; filter error needs every sample of an output: cut the flight there, "
+                "leave that output out, or use output_error"
+            )
+
+
+def _rough_noise(unknowns: Unknowns) -> Array:
+    """Logarithms of noise start values (nx + ny,) from how rough the measured signals are.
+
+    Second differences of white noise have six times its variance. A state of whose process noise nothing is known is
+    given one that moves it by as much as its sensor's noise from one sample to the next.
+    """
+    model, first = unknowns.model, unknowns.manoeuvres[0]
+    second = np.concatenate([np.diff(m.outputs, 2, axis=0) for m in unknowns.manoeuvres])
+    size = np.abs(first.outputs).max(axis=0)
+    sensor = np.maximum(np.sqrt(np.mean(second**2, axis=0) / 6.0), 1e-6 * (1.0 + size))
+
+    def process(state: str) -> float:
+        if model.driven is not None and model.driven[state]:
+            return model.driven[state]
+        start = first.initial_state[model.states.index(state)]
+        moves = sensor[model.outputs.index(state)] if state in model.outputs else 1e-3 * (1.0 + abs(start))
+        return float(moves / np.sqrt(first.step))
+
+    return np.asarray(np.log(np.concatenate([[process(state) for state in model.driven_states], sensor])))
+
+
+def _driven(model: Model) -> tuple[int, ...]:
+    """Indices of the states that process noise moves."""
+    return tuple(model.states.index(name) for name in model.driven_states)

@@ -1,0 +1,104 @@
+"""Maximum likelihood by output error: the constants with which the model's own flight is nearest to the measured one.
+
+Maine & Iliff, "Application of Parameter Estimation to Aircraft Stability and Control", NASA RP-1168 (1986), ch. 6;
+Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 4. The flight must be free of turbulence: what
+the wind does is taken for an answer to the controls, and the estimates are biased (``filter_error`` knows better).
+
+The noise covariance is diagonal and found by relaxation; the sensitivities are exact (JAX).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sysid_node.batch.likelihood import rollout
+from sysid_node.batch.likelihood.covariance import assess
+from sysid_node.batch.likelihood.maximum_likelihood import DEFAULT_SEARCH, Problem, Search, answer_with_own, maximise
+from sysid_node.batch.likelihood.unknowns import Unknowns
+from sysid_node.batch.models.model import Manoeuvre, Model, check_manoeuvres
+from sysid_node.batch.results.result import Answer, Fit
+from sysid_node.flight.record import Array
+
+
+def output_error(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    *,
+    initial_states: Sequence[str] = (),
+    biases: Sequence[str] = (),
+    search: Search = DEFAULT_SEARCH,
+) -> Fit:
+    """Estimates the free parameters of ``model`` from all manoeuvres together.
+
+    ``initial_states`` are estimated for each manoeuvre (the others stay as given), and so are ``biases``, constants
+    added to the outputs of these names. Raises InputError where the data do not fit the model, are too few, or the
+    model diverges from its start values; a search that does not converge is returned, and says so.
+    """
+    check_manoeuvres(model, manoeuvres)
+    problem = _OutputError(Unknowns.of(model, manoeuvres, initial_states, biases))
+    z, iterations, complaint = maximise(problem, search)
+    return assess("output_error", problem, z, iterations, complaint)
+
+
+def predict(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    values: Mapping[str, float],
+    *,
+    initial_states: Sequence[str] = (),
+    biases: Sequence[str] = (),
+) -> list[Answer]:
+    """The model's answers on other manoeuvres with the parameters held at ``values``.
+
+    Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
+    """
+    held = model.started_at(values)
+    check_manoeuvres(held, manoeuvres)
+    problem = _OutputError(Unknowns.of(held, manoeuvres, initial_states, biases))
+    return answer_with_own(problem, problem.start())
+
+
+class _OutputError(Problem):
+    """Open-loop rollouts."""
+
+    def __init__(self, unknowns: Unknowns) -> None:
+        super().__init__(unknowns)
+        self._measured = [np.isfinite(m.outputs) for m in unknowns.manoeuvres]
+
+    def start(self) -> Array:
+        return self.unknowns.start()
+
+    def bounds(self) -> tuple[Array, Array]:
+        return self.unknowns.bounds()
+
+    def answers(self, z: Array) -> list[Answer]:
+        u = self.unknowns
+        theta = u.theta(z)
+        return [
+            Answer(
+                m.name,
+                m.output_time,
+                u.model.outputs,
+                m.outputs,
+                rollout.outputs(u.model, m, theta, u.initial_state(z, i)) + u.bias(z, i),
+            )
+            for i, m in enumerate(u.manoeuvres)
+        ]
+
+    def sensitivities(self, z: Array) -> list[Array]:
+        u = self.unknowns
+        theta, free = u.theta(z), len(u.free)
+        blocks = []
+        for i, manoeuvre in enumerate(u.manoeuvres):
+            of_model = rollout.sensitivities(u.model, manoeuvre, theta, u.initial_state(z, i), u.free, u.states)
+            own = u.own(i).start
+            block = np.zeros((*manoeuvre.outputs.shape, u.size))
+            block[:, :, :free] = of_model[:, :, :free]
+            block[:, :, own : own + len(u.states)] = of_model[:, :, free:]
+            for k, output in enumerate(u.biases):
+                block[:, output, own + len(u.states) + k] = 1.0
+            block[~self._measured[i]] = 0.0
+            blocks.append(block)
+        return blocks

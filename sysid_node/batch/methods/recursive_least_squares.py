@@ -1,0 +1,91 @@
+"""Equation error sample by sample: recursive least squares, the oldest way to estimate in flight.
+
+Ljung & Soederstrom, "Theory and Practice of Recursive Identification" (1983), sec. 2.2; Klein & Morelli (2006), ch. 8.
+After the last sample it is least squares on all of them, unfiltered, so that noise on the regressors biases it. Its
+errors are its own: honest where the residual is white, which it hardly ever is. Here for comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS, collected, columns, structure_of
+from sysid_node.batch.regression.effective_length import freedom
+from sysid_node.batch.regression.equations import equations
+from sysid_node.batch.regression.linear_regression import Regression
+from sysid_node.batch.results.identifiability import Groups, status_of, undetermined
+from sysid_node.batch.results.result import Estimate, Fit, interval
+from sysid_node.flight.record import Array, FlightRecord
+
+#: Variance of the start values over the residual's: nothing is known.
+_VAGUE = 1e8
+
+#: ``(names, y (N,), X (N, p), step s) -> values (p,), covariance (p, p)``: one pass along the flights.
+Pass = Callable[[Sequence[str], Array, Array, float], tuple[Array, Array]]
+
+
+def recursive_least_squares(aircraft: Aircraft, records: Sequence[FlightRecord], forgetting: float = 1.0) -> Fit:
+    """The aircraft file's derivatives after one pass along all flights.
+
+    ``forgetting`` is the weight that a sample keeps from one to the next. Raises InputError as ``equation_error`` does.
+    """
+
+    def along(_: Sequence[str], y: Array, X: Array, __: float) -> tuple[Array, Array]:
+        return recursion(y, X, forgetting, lambda error: error)
+
+    return sequential_fit("recursive_least_squares", aircraft, records, along)
+
+
+def recursion(y: Array, X: Array, forgetting: float, shaped: Callable[[float], float]) -> tuple[Array, Array]:
+    """Values and covariance for a residual's variance of one; ``shaped`` makes the error that corrects of the error."""
+    values, P = np.zeros(X.shape[1]), _VAGUE * np.eye(X.shape[1])
+    for row, measured in zip(X, y, strict=True):
+        across = P @ row
+        gain = across / (forgetting + row @ across)
+        values = values + gain * shaped(float(measured - row @ values))
+        P = (P - np.outer(gain, across)) / forgetting
+        P = 0.5 * (P + P.T)
+    return values, P
+
+
+def sequential_fit(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], along: Pass) -> Fit:
+    """All coefficients, each in one pass along the flights one after the other.
+
+    Raises InputError where the flights are too short for one: faster than the aircraft moves there is only noise.
+    """
+    flights = [equations(aircraft, record) for record in records]
+    step = float(np.median(np.diff(flights[0].time)))
+    fits = {}
+    for coefficient, regressors in structure_of(aircraft, flights).items():
+        names = [f"{coefficient}_{name}" for name in regressors]
+        freedom(names, [flight.time for flight in flights], DEFAULT_LOWPASS)
+        Xs = [columns(flight, regressors) for flight in flights]
+        ys = [flight.coefficients[coefficient] for flight in flights]
+        values, covariance = along(names, np.concatenate(ys), np.concatenate(Xs), step)
+        fits[coefficient] = regression_of(names, values, covariance, ys, Xs)
+    return collected(method, fits, flights)
+
+
+def regression_of(
+    names: Sequence[str], values: Array, covariance: Array, ys: Sequence[Array], Xs: Sequence[Array]
+) -> Regression:
+    """The outcome of a pass; ``covariance`` (p, p) is for a residual's variance of one."""
+    modelled = [X @ values for X in Xs]
+    residual = np.concatenate([y - m for y, m in zip(ys, modelled, strict=True)])
+    noise = float(np.sqrt(np.mean(residual**2)))
+    lost = undetermined(np.asarray(sum(X.T @ X for X in Xs)), names)
+    errors = noise * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    freedom = float(residual.size - len(names))
+    estimates = {
+        name: _estimate(name, float(value), float(error), freedom, lost)
+        for name, value, error in zip(names, values, errors, strict=True)
+    }
+    return Regression(estimates, noise**2 * covariance, modelled, noise, lost)
+
+
+def _estimate(name: str, value: float, error: float, freedom: float, lost: Groups) -> Estimate:
+    status = status_of(name, lost)
+    return Estimate(name, value, error, *interval(value, error, freedom), status == "ok", status, error)

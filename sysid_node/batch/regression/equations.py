@@ -1,0 +1,238 @@
+"""Aerodynamic coefficients from what was measured, and the regressors that should explain them.
+
+Klein & Morelli, "Aircraft System Identification" (2006), eqs. 5.96 to 5.101: forces from the accelerometers, moments
+from differentiated rates with all products of rates and Ixz. Everything is first referred to the centre of gravity.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft, Vector3
+from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.batch.regression.filtering import differentiate
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array, FlightRecord
+
+_AXES = ("x", "y", "z")
+_ALWAYS = ("ax", "ay", "az", "p", "q", "r", "V")
+
+#: Share of the reference airspeed below which nothing flies: on the ground, coefficients would divide by nothing.
+_SLOWEST = 0.2
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Both sides of the six equations at each time of a flight.
+
+    ``coefficients`` CL CD CY Cl Cm Cn as far as they can be formed, besides CX and CZ (body axes); ``regressors`` by
+    the names of derivatives ("0", "alpha", "q", "de", ...); each (N,), finite. ``left_out`` samples lacked a value or
+    did not fly; ``noise`` holds the sensors' 1 sigma in those regressors that have one.
+    """
+
+    name: str
+    time: Array
+    coefficients: Mapping[str, Array]
+    regressors: Mapping[str, Array]
+    left_out: int = 0
+    remarks: tuple[str, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
+
+
+def equations(aircraft: Aircraft, record: FlightRecord) -> Equations:
+    """The equations of a flight. Raises InputError where a signal that the aircraft's model needs was never measured.
+
+    Where the aircraft has an engine and its thrust was not measured, drag cannot be told from thrust: CD is left out.
+    """
+    _check_measured(aircraft, record)
+    complete, left_out = _complete_samples(aircraft, record)
+    s = at_cg(aircraft, complete)
+    coefficients, remarks = _coefficients(aircraft, s)
+    regressors = _regressors(aircraft, s, coefficients["CL"])
+    if left_out:
+        remarks.append(
+            f"{record.name or 'flight'}: {left_out} of {len(record)} samples lack a value or are slower than "
+            f"{_SLOWEST * aircraft.reference.airspeed:.3g} m/s, and were left out"
+        )
+    noise = _noise(aircraft, float(s["V"].mean()))
+    return Equations(record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks), noise)
+
+
+def _noise(aircraft: Aircraft, airspeed: float) -> dict[str, float]:
+    """What the aircraft file's sensor noise makes of the regressors."""
+    b, cbar, known = aircraft.geometry.b, aircraft.geometry.cbar, aircraft.noise
+    noise = {name: known[name] for name in ("alpha", "beta") if name in known}
+    if "gyro" in known:
+        noise |= {name: known["gyro"] * length / (2.0 * airspeed) for name, length in (("p", b), ("q", cbar), ("r", b))}
+    return noise
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How one sensor's reading enters both sides of the equations, at each time: derivatives (N,) by name."""
+
+    coefficients: Mapping[str, Array]
+    regressors: Mapping[str, Array]
+
+
+#: Sensors that enter the equations not only through one additive term, and a small step of their reading (m/s, rad).
+_STEPS = {"V": 1e-4, "alpha": 1e-5, "beta": 1e-5}
+
+
+def sensor_slopes(aircraft: Aircraft, record: FlightRecord) -> dict[str, tuple[Array, Slope]]:
+    """The air data's readings (N,), and how the equations depend on each, at the times of ``equations``."""
+    s = _accelerated(_complete_samples(aircraft, record)[0])
+
+    def sides(name: str, step: float) -> tuple[dict[str, Array], dict[str, Array]]:
+        moved = _moved_to_cg(aircraft, {**s, name: s[name] + step})
+        coefficients, _ = _coefficients(aircraft, moved)
+        return coefficients, _regressors(aircraft, moved, coefficients["CL"])
+
+    found = {}
+    for name, step in _STEPS.items():
+        if name in s:
+            above, below = sides(name, step), sides(name, -step)
+            slopes = [{n: (a[n] - b[n]) / (2.0 * step) for n in a} for a, b in zip(above, below, strict=True)]
+            found[name] = s[name], Slope(*slopes)
+    return found
+
+
+def at_cg(aircraft: Aircraft, record: FlightRecord) -> dict[str, Array]:
+    """The record's signals with specific forces and air data moved to the CG, and angular accelerations ``pdot`` ..."""
+    return _moved_to_cg(aircraft, _accelerated(record))
+
+
+def _accelerated(record: FlightRecord) -> dict[str, Array]:
+    """The record's signals and angular accelerations ``pdot`` ..."""
+    rates = {f"{name}dot": differentiate(record.time, record[name]) for name in "pqr"}
+    return {name: values.copy() for name, values in record.columns.items()} | rates
+
+
+def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, Array]:
+    s = dict(signals)
+    rates = np.column_stack([s["p"], s["q"], s["r"]])
+    accelerations = np.column_stack([s["pdot"], s["qdot"], s["rdot"]])
+    force = np.column_stack([s["ax"], s["ay"], s["az"]]) - _lever(aircraft.sensors.imu, rates, accelerations)
+    s |= dict(zip(("ax", "ay", "az"), force.T, strict=True))
+    alpha, beta = (s.get(name, np.zeros_like(s["V"])) for name in ("alpha", "beta"))
+    velocity = s["V"][:, None] * np.column_stack(
+        [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
+    )
+    if any(aircraft.sensors.air_data):
+        velocity = velocity - np.cross(rates, np.array(aircraft.sensors.air_data))
+        s["V"] = np.linalg.norm(velocity, axis=1)
+        s["alpha"] = np.arctan2(velocity[:, 2], velocity[:, 0])
+        s["beta"] = np.arctan2(velocity[:, 1], np.hypot(velocity[:, 0], velocity[:, 2]))
+    return s
+
+
+def _lever(position: Vector3, rates: Array, accelerations: Array) -> Array:
+    """Acceleration (N, 3) of a point on the body relative to the CG."""
+    arm = np.array(position)
+    return np.asarray(np.cross(accelerations, arm) + np.cross(rates, np.cross(rates, arm)))
+
+
+def _needed(aircraft: Aircraft) -> list[str]:
+    """Columns without which the model cannot be formed."""
+    regressors = {name for names in aircraft.structure.values() for name in names}
+    longitudinal = {"CL", "CD"} & set(aircraft.structure)
+    angles = [name for name in ("alpha", "beta") if name in regressors or (name == "alpha" and longitudinal)]
+    return [*_ALWAYS, *angles, *(symbol for symbol in aircraft.control_symbols if symbol in regressors)]
+
+
+def _check_measured(aircraft: Aircraft, record: FlightRecord) -> None:
+    missing = [name for name in _needed(aircraft) if not record.measured(name)]
+    if missing:
+        raise InputError(
+            f"flight {record.name!r}: {', '.join(missing)} not measured, which the model of aircraft {aircraft.name} "
+            "needs; record them or take their derivatives out of the aircraft file"
+        )
+
+
+def _complete_samples(aircraft: Aircraft, record: FlightRecord) -> tuple[FlightRecord, int]:
+    """The samples in flight with every needed value, and how many others there were.
+
+    Density is the reference's if unknown.
+    """
+    optional = [name for name in ("alpha", "beta", "rho", "thrust") if record.measured(name)]
+    names = list(dict.fromkeys([*_needed(aircraft), *optional]))
+    slowest = _SLOWEST * aircraft.reference.airspeed
+    kept = np.all([np.isfinite(record[name]) for name in names], axis=0) & (record["V"] > slowest)
+    if kept.sum() < 10:
+        raise InputError(
+            f"flight {record.name!r}: only {int(kept.sum())} of {len(record)} samples hold all of {', '.join(names)} "
+            f"at more than {slowest:.3g} m/s; give a longer flight, or one in which the aircraft flies"
+        )
+    columns = {name: record[name][kept] for name in names}
+    columns.setdefault("rho", np.full(int(kept.sum()), aircraft.reference.air_density))
+    return FlightRecord(record.time[kept], columns, record.name, record.start_ns), int((~kept).sum())
+
+
+def _coefficients(aircraft: Aircraft, s: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
+    geometry, throttle, remarks = aircraft.geometry, aircraft.throttle, []
+    thrust = s.get("thrust", np.zeros_like(s["V"]))
+    inclination, arm = (throttle.inclination, throttle.arm) if throttle else (0.0, 0.0)
+    force = 0.5 * s["rho"] * s["V"] ** 2 * geometry.S
+    c = {
+        "CX": (aircraft.mass * s["ax"] - thrust * math.cos(inclination)) / force,
+        "CY": aircraft.mass * s["ay"] / force,
+        "CZ": (aircraft.mass * s["az"] + thrust * math.sin(inclination)) / force,
+    }
+    alpha = s.get("alpha", np.zeros_like(s["V"]))
+    c["CL"] = c["CX"] * np.sin(alpha) - c["CZ"] * np.cos(alpha)
+    if throttle is None or "thrust" in s:
+        c["CD"] = -c["CX"] * np.cos(alpha) - c["CZ"] * np.sin(alpha)
+    elif "CD" in aircraft.structure:
+        remarks.append("thrust was not measured: drag cannot be told from it, and CD is left out")
+    moments, unknown = _moments(aircraft, s, force, thrust * arm)
+    return c | moments, remarks + [f"{name} left out: {reason}" for name, reason in unknown.items()]
+
+
+def _moments(
+    aircraft: Aircraft, s: Mapping[str, Array], force: Array, thrust_moment: Array
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """Moment coefficients, and those that cannot be formed with the reason."""
+    i, p, q, r = aircraft.inertia, s["p"], s["q"], s["r"]
+    known = {name: 0.0 if math.isnan(getattr(i, name)) else getattr(i, name) for name in ("Ixx", "Iyy", "Izz", "Ixz")}
+    Ixx, Iyy, Izz, Ixz = known.values()
+    b, cbar = aircraft.geometry.b, aircraft.geometry.cbar
+    moments = {
+        "Cl": (Ixx * s["pdot"] - Ixz * (s["rdot"] + p * q) + (Izz - Iyy) * q * r) / (force * b),
+        "Cm": (Iyy * s["qdot"] + (Ixx - Izz) * p * r + Ixz * (p**2 - r**2) - thrust_moment) / (force * cbar),
+        "Cn": (Izz * s["rdot"] - Ixz * (s["pdot"] - q * r) + (Iyy - Ixx) * p * q) / (force * b),
+    }
+    own = {"Cl": i.Ixx, "Cm": i.Iyy, "Cn": i.Izz}
+    unknown = {
+        name: "its moment of inertia is not in the aircraft file"
+        for name, value in own.items()
+        if math.isnan(value) and name in aircraft.structure
+    }
+    return {name: value for name, value in moments.items() if not math.isnan(own[name])}, unknown
+
+
+def _regressors(aircraft: Aircraft, s: Mapping[str, Array], lift: Array) -> dict[str, Array]:
+    geometry = aircraft.geometry
+    half = 0.5 / s["V"]
+    regressors = {
+        "0": np.ones_like(half),
+        "p": s["p"] * geometry.b * half,
+        "q": s["q"] * geometry.cbar * half,
+        "r": s["r"] * geometry.b * half,
+        "V": s["V"] / aircraft.reference.airspeed,
+        "k": lift**2,
+    }
+    regressors |= {name: s[name] for name in ("alpha", "beta") if name in s}
+    return regressors | {symbol: s[symbol] for symbol in aircraft.control_symbols if symbol in s}
+
+
+def usable(aircraft: Aircraft, flights: list[Equations]) -> dict[str, tuple[str, ...]]:
+    """The aircraft's model as far as every flight can form it: regressors by coefficient."""
+    return {
+        name: aircraft.structure[name]
+        for name in COEFFICIENTS
+        if name in aircraft.structure and all(name in flight.coefficients for flight in flights)
+    }

@@ -1,0 +1,68 @@
+"""The model's terms: every derivative of the aircraft file, and an offset for every coefficient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.online.frequency import regression_signals
+from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+
+Array = NDArray[np.float64]
+
+#: Plausible sizes of regressors in flight: rad, and non-dimensional rates.
+_SIGNALS = {"alpha": 0.05, "beta": 0.05, "p": 0.04, "q": 0.01, "r": 0.02}
+_SURFACE = 0.05  # rad
+_LOOSE = (0.5, 0.05)  # of a derivative without a tolerance: this share of its value, or so much
+_OFFSET = 0.01  # what an offset that is not in the file may be
+
+LONGITUDINAL, LATERAL = ("CL", "CD", "Cm"), ("CY", "Cl", "Cn")
+RATES = ("p", "q", "r")
+
+
+@dataclass(frozen=True)
+class Terms:
+    """D terms of C = 6 coefficients."""
+
+    names: tuple[str, ...]
+    output: NDArray[np.intp]  # (D,) which coefficient
+    column: NDArray[np.intp]  # (D,) of the layout
+    values: Array  # (D,) the file's
+    tolerance: Array  # (D,) 1 sigma
+    signal: Array  # (D,) plausible size of the regressor
+
+    @cached_property
+    def regressors(self) -> tuple[str, ...]:
+        """(D,) of each term."""
+        return tuple(name.partition("_")[2] for name in self.names)
+
+    def of(self, regressor: str) -> NDArray[np.bool_]:
+        """(D,) which terms have this regressor."""
+        return np.array([name == regressor for name in self.regressors])
+
+    def offset_of(self, output: int) -> int:
+        """The term that is the offset of a coefficient."""
+        return int(np.flatnonzero((self.output == output) & (self.column == OFFSET))[0])
+
+
+def terms(aircraft: Aircraft, layout: Layout) -> Terms:
+    """Of the coefficients whose equations can be formed."""
+    unformed = regression_signals.unformed(aircraft)
+    known = {c: regressors for c, regressors in aircraft.structure.items() if c not in unformed}
+    names = [f"{c}_{r}" for c, regressors in known.items() for r in dict.fromkeys((*regressors, "0"))]
+    rows = []
+    for name in names:
+        c, _, r = name.partition("_")
+        derivative = aircraft.derivatives.get(name)
+        value = derivative.value if derivative else 0.0
+        loose = max(_LOOSE[0] * abs(value), _LOOSE[1]) if r != "0" else _OFFSET
+        tolerance = (derivative.tolerance if derivative else None) or loose
+        signal = 1.0 if r == "0" else _SIGNALS.get(r, _SURFACE)
+        rows.append((COEFFICIENTS.index(c), layout.column(r), value, tolerance, signal))
+    output, column, *numbers = (np.array(x) for x in zip(*rows, strict=True))
+    return Terms(tuple(names), output, column, *numbers)

@@ -1,0 +1,160 @@
+"""A recorded flight through the fault monitor: what the live node would have said of it, and when.
+
+Messages are taken in the order in which they were recorded, and the recorder's clock tells what was silent. The
+identifier's estimates are heard as soon as the sample that they are stamped with has been taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.faults import watch as watching
+from sysid_node.faults.model.reference_model import Known
+from sysid_node.faults.settings import Settings
+from sysid_node.faults.types import FORCES, Fault
+from sysid_node.faults.watch import PERIOD, STALE_AFTER, Speech, Watch
+from sysid_node.flight.commands import JointMessage
+from sysid_node.flight.record import Array
+from sysid_node.flight.streams import Stream, Streams
+
+_SECOND = 1e9  # ns
+
+
+class Heard(NamedTuple):
+    """What the identifier said of the sample with a header stamp."""
+
+    stamp_ns: int
+    known: Mapping[str, Known]
+
+
+class Said(NamedTuple):
+    """What was said after the sample with a header stamp, at a time (s since the first IMU message)."""
+
+    stamp_ns: int
+    time: float
+    faults: tuple[Fault, ...]
+
+
+class Episode(NamedTuple):
+    """A fault as it was last described, and the time (s) from which on it was no longer there; None: to the end."""
+
+    fault: Fault
+    until: float | None
+
+    @property
+    def text(self) -> str:
+        """In one line."""
+        end = "to the end" if self.until is None else f"until {self.until:.1f} s"
+        return f"{self.fault.text}; since {self.fault.since:.1f} s, found at {self.fault.found:.1f} s, {end}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Of a flight: seconds that were judged, all that was said, and each fault in the order in which it was found."""
+
+    judged: float
+    said: Sequence[Said] = ()
+    episodes: Sequence[Episode] = ()
+
+    @property
+    def sentences(self) -> list[str]:
+        """Each fault in one line; without one, for how long there was something to judge."""
+        if self.episodes:
+            return [episode.text for episode in self.episodes]
+        if not self.judged:
+            return ["no faults were looked for: the flight is too short to learn what sound flight is like"]
+        return [f"nothing that failed was found in the {self.judged:.0f} s that were judged"]
+
+
+def judge(
+    aircraft: Aircraft,
+    settings: Settings,
+    streams: Streams,
+    commands: Sequence[JointMessage] = (),
+    estimates: Iterable[Heard] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Verdict:
+    """Let the monitor hear a recording; ``commands`` in log order, ``progress`` hears the share that is done."""
+    watch, speech = watching.init(aircraft, settings, STALE_AFTER), Speech()
+    said: list[Said] = []
+    heard = iter(estimates)
+    coming = next(heard, None)
+    messages = _messages(streams, commands)
+    begin, end = messages[0].log_ns, messages[-1].log_ns
+    looks = 0
+    for message in messages:
+        now = (message.log_ns - begin) / _SECOND
+        while (looks + 1) * PERIOD < now:
+            looks += 1
+            faults = watching.wrong(watch, looks * PERIOD)
+            if speech.due(faults, looks * PERIOD):
+                said.append(Said(watch.stamp_ns, watch.now, tuple(faults)))
+        message.take(watch, now)
+        while coming is not None and coming.stamp_ns <= watch.stamp_ns:
+            watching.on_estimates(watch, coming.known)
+            coming = next(heard, None)
+        if progress is not None:
+            progress((message.log_ns - begin) / max(end - begin, 1))
+    return Verdict(watch.judged, said, episodes(said))
+
+
+def episodes(said: Sequence[Said]) -> list[Episode]:
+    """The faults among all that was said, each once."""
+    found: dict[tuple[str, float, str], Episode] = {}
+    there: set[tuple[str, float, str]] = set()
+    for moment in said:
+        now = {_key(fault): fault for fault in moment.faults}
+        for key in there - now.keys():
+            found[key] = found[key]._replace(until=moment.time)
+        found |= {key: Episode(fault, None) for key, fault in now.items()}
+        there = set(now)
+    return sorted(found.values(), key=lambda episode: episode.fault.found)
+
+
+def _key(fault: Fault) -> tuple[str, float, str]:
+    """What stays the same of a fault: the name of one that only forces speak of may change."""
+    return fault.source, fault.found, "" if fault.source == FORCES else fault.part
+
+
+class _Message(NamedTuple):
+    """A recorded message, its place among those recorded at the same time, and how it is taken."""
+
+    log_ns: int
+    order: int
+    take: Callable[[Watch, float], None]
+
+
+def _messages(streams: Streams, commands: Sequence[JointMessage]) -> list[_Message]:
+    """All messages in the order in which they were recorded; of the same moment, commands come last."""
+    names = streams.actuators.names
+
+    def on_actuators(watch: Watch, now: float, stamp_ns: int, positions: tuple[float, ...]) -> None:
+        watching.on_actuators(watch, now, stamp_ns, names, positions)
+
+    def on_command(command: JointMessage, watch: Watch, _: float) -> None:
+        watching.on_command(watch, command.stamp_ns, command.names, command.positions)
+
+    found = [
+        *_of_stream(streams.imu, streams.imu.values, watching.on_imu),
+        *_of_stream(streams.air_data, streams.air_data.values, watching.on_air_data),
+        *_of_stream(streams.actuators, streams.actuators.positions, on_actuators),
+    ]
+    found += [_Message(one.log_ns, len(found), partial(on_command, one)) for one in commands]
+    return sorted(found, key=lambda message: message[:2])
+
+
+def _of_stream(
+    stream: Stream, values: Array, take: Callable[[Watch, float, int, tuple[float, ...]], None]
+) -> list[_Message]:
+    def taken(stamp_ns: int, row: tuple[float, ...], watch: Watch, now: float) -> None:
+        take(watch, now, stamp_ns, row)
+
+    arrival = stream.arrival
+    columns = (arrival.log_ns.tolist(), arrival.order.tolist(), arrival.stamp_ns.tolist(), map(tuple, values.tolist()))
+    return [
+        _Message(log_ns, order, partial(taken, stamp, row)) for log_ns, order, stamp, row in zip(*columns, strict=True)
+    ]

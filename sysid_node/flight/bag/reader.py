@@ -1,0 +1,174 @@
+"""Bags to streams: rosbag2 recordings (sqlite3 and mcap), read through rosbags without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
+
+from sysid_node.errors import InputError
+from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.raw_messages import Messages, read_messages
+from sysid_node.flight.cdr.decode import Fields, decode
+from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
+from sysid_node.flight.record import Array
+from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Stamps, Streams
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
+
+#: Above this variance (rad^2) an IMU's heading counts as not measured.
+HEADING_UNKNOWN = 1.0e3
+
+
+def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu") -> Streams:
+    """The three input topics of a bag: a folder with metadata.yaml, or an .mcap or .db3 file alone.
+
+    ``topics`` as of ``topic_names``; ``frame`` is that of the bag's IMU messages. Raises InputError (one line: what
+    is wrong with which file or topic, and what to do) where the bag is missing, empty, cut short or damaged, or lacks
+    a topic.
+    """
+    path, topics = Path(path), topics or topic_names()
+    said = f"bag {path.name}"
+    with open_bag(path) as reader, reading(path):
+        raw = _read_messages(reader, topics, said)
+        return Streams(
+            _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA]), _joint_stream(raw[ACTUATORS]), said
+        )
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Reader]:
+    """A bag, open for reading. Raises InputError where it is missing, empty or damaged; see ``reading``."""
+    with ExitStack() as stack:
+        with reading(path):
+            reader = stack.enter_context(Reader(path))
+            if not reader.message_count:
+                raise InputError(f"bag {path.name}: holds no messages; record imu/data, air_data and actuators")
+        yield reader
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turns what goes wrong in reading a bag into an InputError: one line with a remedy."""
+    said = f"bag {path.name}"
+    try:
+        yield
+    except InputError:
+        raise
+    except FileNotFoundError as error:
+        raise InputError(f"{said}: {_not_found(path)}") from error
+    except Exception as error:  # a damaged file makes its parsers fail in any way there is
+        raise InputError(f"{said}: cannot be read: {_one_line(error)}; {_remedy(path)}") from error
+
+
+def _not_found(path: Path) -> str:
+    if not path.exists():
+        return f"does not exist in {path.resolve().parent}; give a rosbag2 folder, .mcap or .db3 file"
+    files = sorted(file.name for file in path.iterdir() if file.suffix in {".mcap", ".db3"})
+    if files:
+        return f"no metadata.yaml (a recording that was cut short?); run: ros2 bag reindex {path}, or give {files[0]}"
+    return f"no bag: neither metadata.yaml nor an .mcap or .db3 file in {path}"
+
+
+def _remedy(path: Path) -> str:
+    mcap = path.suffix == ".mcap" or (path.is_dir() and any(path.glob("*.mcap")))
+    repair = "mcap recover FILE.mcap -o NEW.mcap" if mcap else "sqlite3 FILE.db3 .recover | sqlite3 NEW.db3"
+    return f"give a rosbag2 folder, .mcap or .db3 file; if this one was cut short, try: {repair}"
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _read_messages(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, Messages]:
+    """The bytes of all messages of the input topics."""
+    messages = read_messages(reader, _choose(reader, topics, said))
+    for topic, some in messages.items():
+        if not some.data:
+            raise InputError(f"{said}: no messages on {topics[topic]}; record that topic too")
+    return messages
+
+
+def _choose(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, list[Connection]]:
+    """The connections of each input topic. Raises InputError where one is missing or of another type."""
+    there = {name: {c.msgtype for c in info.connections} for name, info in reader.topics.items()}
+    for topic, name in topics.items():
+        wanted = INPUT_TOPICS[topic]
+        if name not in there:
+            present = ", ".join(f"{other} ({'/'.join(sorted(types))})" for other, types in there.items())
+            alike = [other for other, types in there.items() if wanted in types and other not in topics.values()]
+            example = f"--topic {topic}:={alike[0] if alike else '/its/name'}"
+            raise InputError(f"{said}: no topic {name} ({wanted}); it has {present}; if it is one of these: {example}")
+        if there[name] != {wanted}:
+            raise InputError(f"{said}: topic {name} is {'/'.join(sorted(there[name]))}, expected {wanted}")
+        known = type_store().hash_rihs01(wanted)
+        if any(c.topic == name and c.digest not in {"", known} for c in reader.connections):
+            raise InputError(f"{said}: topic {name} was recorded with another definition of {wanted}; use that version")
+    return {topic: [c for c in reader.connections if c.topic == name] for topic, name in topics.items()}
+
+
+def _arrival(raw: Messages, stamp_ns: Stamps) -> Arrival:
+    return Arrival(stamp_ns, raw.log_ns, raw.order)
+
+
+def _stamps(fields: Fields) -> Stamps:
+    """Header stamps, ns."""
+    seconds = fields.numbers("header.stamp.sec").astype(np.int64)
+    nanoseconds: Stamps = seconds * 1_000_000_000 + fields.numbers("header.stamp.nanosec")
+    return nanoseconds
+
+
+def _columns(fields: Fields, *paths: str) -> Array:
+    """Numbers at several paths, side by side (n, len(paths))."""
+    return np.column_stack([fields.numbers(path) for path in paths]).astype(np.float64, copy=False)
+
+
+def _imu_stream(raw: Messages, frame: BodyFrame) -> ImuStream:
+    count = len(raw.data)
+    stamps, values, attitude = np.empty(count, np.int64), np.empty((count, 6)), np.empty((count, 3))
+    frame_id = ""
+    for at, fields in decode(type_store(), INPUT_TOPICS[IMU], raw.data):
+        stamps[at] = _stamps(fields)
+        force = _columns(fields, *(f"linear_acceleration.{axis}" for axis in "xyz"))
+        rates = _columns(fields, *(f"angular_velocity.{axis}" for axis in "xyz"))
+        values[at] = np.column_stack([turn_vectors(force, frame), turn_vectors(rates, frame)])
+        attitude[at] = _attitude(fields, frame)
+        frame_id = fields.strings("header.frame_id")[0]
+    return ImuStream(_arrival(raw, stamps), values, attitude, frame_id)
+
+
+def _attitude(fields: Fields, frame: BodyFrame) -> Array:
+    """Euler angles; NaN where the message says (sensor_msgs/Imu) or shows that there is no orientation."""
+    euler = euler_from_quaternion(_columns(fields, *(f"orientation.{axis}" for axis in "xyzw")), frame)
+    covariance = fields.numbers("orientation_covariance")
+    euler[covariance[:, 0] == -1.0] = np.nan
+    euler[covariance[:, 8] > HEADING_UNKNOWN, 2] = np.nan
+    return euler
+
+
+def _air_data_stream(raw: Messages) -> AirDataStream:
+    stamps, values = np.empty(len(raw.data), np.int64), np.empty((len(raw.data), 4))
+    for at, fields in decode(type_store(), INPUT_TOPICS[AIR_DATA], raw.data):
+        stamps[at] = _stamps(fields)
+        values[at] = _columns(fields, "true_airspeed", "angle_of_attack", "sideslip", "air_density")
+    return AirDataStream(_arrival(raw, stamps), values)
+
+
+def _joint_stream(raw: Messages) -> JointStream:
+    stamps = np.empty(len(raw.data), np.int64)
+    parts: list[tuple[NDArray[np.intp], Sequence[str], NDArray[Any]]] = []
+    for at, fields in decode(type_store(), INPUT_TOPICS[ACTUATORS], raw.data):
+        stamps[at] = _stamps(fields)
+        parts.append((at, fields.strings("name"), fields.numbers("position")))
+    names = tuple(dict.fromkeys(name for _, some, _ in parts for name in some))
+    positions = np.full((len(raw.data), len(names)), np.nan)
+    for at, some, values in parts:
+        # Of a name given twice the first counts; a name without a position stays NaN.
+        for i in reversed(range(min(len(some), values.shape[1]))):
+            positions[at, names.index(some[i])] = values[:, i]
+    return JointStream(_arrival(raw, stamps), names, positions)

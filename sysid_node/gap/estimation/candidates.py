@@ -1,0 +1,175 @@
+"""Candidates: every effect of the chain with the values from which its fit may start.
+
+An effect with a corner, a state or an onset shows nothing at its neutral value, or at the wrong onset; so it starts
+from several plausible values, and the best start is polished.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.nuisances import WIDENED
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.sim import EFFECTS, Simulator
+
+#: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
+UNSEEN = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
+
+#: Effects of instruments that a flight without vanes has not, or shows by its airspeed alone; and the IMU's lateness,
+#: as all but the airspeed comes from it then: what it does, the commands' does (``belief``).
+_OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"})
+
+#: Effects of thrust, which on a flight without one is only what is left of the forward force.
+_OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")
+
+#: Parameters that only shape an effect and stay as they are: the data of one flight seldom determine them.
+_HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
+
+#: Candidates one control each, because each has an onset of its own.
+PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
+
+#: Effects of one time, whose fingerprint turns with its size.
+TIMES = frozenset(
+    {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
+)
+
+#: Of these, the ones by which the response comes later than the commands: each is a rival of the others, always.
+BETWEEN = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
+
+#: Of these, stamps: no message is stamped before what it tells of. Early ones would let the three clocks stand for one
+#: another: commands and air data that are late by themselves would be an early IMU and air data less late.
+_STAMPS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
+
+#: Onsets that are tried, as shares of the flight.
+_ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
+
+#: Least share of its movement that a stuck surface has lost.
+_JAMMED = 0.95
+
+#: A mode that rings more slowly than any airframe's would pass for whatever a gust does.
+_RINGING, _STIFFEST = ("structural_mode", "frequency"), 3.0
+
+#: How much larger than its plausible scale a parameter may well be (1 sigma of its prior).
+GENEROUS = 3.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect to blame: entries of the parameter vector that are fitted, and where their fit may start."""
+
+    effect: str
+    label: str  # the effect, and the control where it is one control's
+    indices: tuple[int, ...]  # none where only nuisances' priors widen
+    starts: tuple[tuple[float, ...], ...]
+    widened: tuple[int, ...] = ()  # of these entries
+
+    @property
+    def entries(self) -> tuple[int, ...]:
+        """All entries that it moves."""
+        return (*self.indices, *self.widened)
+
+    @property
+    def station(self) -> str:
+        """Where in the chain it sits."""
+        return EFFECTS[self.effect].station
+
+
+def candidates_of(simulator: Simulator, views: Sequence[View]) -> list[Candidate]:
+    """All effects that these flights could show."""
+    found: list[Candidate] = []
+    length = max(view.windows.starts[-1] + view.windows.length for view in views)
+    unseen = UNSEEN | (_OF_VANES if any(view.flight.inferred for view in views) else frozenset())
+    unseen |= frozenset() if all(view.flight.metered for view in views) else _OF_THRUST
+    for effect in EFFECTS:
+        if effect in unseen:
+            continue
+        if effect == WIDENED:
+            found += _per_coefficient(simulator)
+        elif effect in PER_CONTROL:
+            found += _per_control(simulator, effect, length)
+        else:
+            found.append(_whole(simulator, views, effect))
+    return found
+
+
+def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
+    """Lowest and highest values of these entries."""
+    table = [simulator.parameters[i] for i in indices]
+    # A surface half stuck is one that has lost half its effect: only a jam is called one.
+    jams = [e == "stuck_surface" and p.switch for e, p in table]
+    lower = [_JAMMED if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
+    lower = [_STIFFEST if (e, p.name) == _RINGING else low for low, (e, p) in zip(lower, table, strict=True)]
+    lower = [0.0 if e in _STAMPS else low for low, (e, _) in zip(lower, table, strict=True)]
+    return np.array(lower), np.array([p.upper for _, p in table])
+
+
+def prior(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
+    """Centre and 1-sigma of the prior of these entries; an onset may be at any time."""
+    parameters = [simulator.parameters[i][1] for i in indices]
+    sigma = [100.0 if p.name == "onset" else GENEROUS * simulator.scales[i]
+             for i, p in zip(indices, parameters, strict=True)]  # fmt: skip
+    return np.array([p.neutral for p in parameters]), np.array(sigma)
+
+
+def _whole(simulator: Simulator, views: Sequence[View], effect: str) -> Candidate:
+    """An effect with all its free parameters together."""
+    table = [(i, p) for i, (e, p) in enumerate(simulator.parameters)
+             if e == effect and f"{e}.{p.name}" not in _HELD]  # fmt: skip
+    shaped = dict(_shapes(simulator, views, effect))
+    values = [
+        shaped.get(p.name, (float(np.clip(p.neutral + 0.3 * simulator.scales[i], p.lower, p.upper)),)) for i, p in table
+    ]
+    return Candidate(effect, effect, tuple(i for i, _ in table), tuple(product(*values)))
+
+
+def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Start values of parameters whose fingerprint depends on them."""
+    if effect == "stall_separation":
+        highest = max(float(view.record["alpha"].max()) for view in views)
+        yield "alpha_star", tuple(np.clip([highest - 0.06, highest - 0.01, highest + 0.05], 0.06, 0.9).tolist())
+        yield "depth", (0.8,)
+        yield from (("a1", (20.0,)), ("CD_X", (0.1,)), ("Cm_X", (-0.05,)))
+    if effect == "actuator_rate_limit":
+        speed = max(float(np.abs(np.diff(v.commands[:, :-1], axis=0)).max()) * v.simulator.rate
+                    for v in views)  # fmt: skip
+        yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
+    if effect == "actuator_backlash":
+        # mostly one control has it; a start that gives it to all of them looks worse than none
+        yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
+    if effect in TIMES:
+        name = "delay" if effect.endswith("delay") else "time_constant"
+        yield name, (0.02, 0.07, 0.2)
+    if effect == "structural_mode":
+        yield "frequency", (3.5, 5.0, 9.0)
+    if effect == "ground_effect":
+        yield "height", (0.5, 3.0)
+
+
+def _per_coefficient(simulator: Simulator) -> list[Candidate]:
+    """Derivatives beyond their tolerances, one coefficient's at a time: all at once would pass for almost anything."""
+    by_coefficient: dict[str, list[int]] = {}
+    for i, (effect, parameter) in enumerate(simulator.parameters):
+        known = simulator.aircraft.derivatives.get(parameter.name)
+        if effect == WIDENED and known is not None and known.tolerance:
+            by_coefficient.setdefault(parameter.name.partition("_")[0], []).append(i)
+    return [Candidate(WIDENED, f"{WIDENED} of {c}", (), ((),), tuple(own)) for c, own in by_coefficient.items()]
+
+
+def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:
+    """One candidate for each control, with an onset before or during the flight."""
+    names, found = simulator.names, []
+    onsets = (-10.0, *(share * length for share in _ONSETS))
+    for control in simulator.layout.controls:
+        own = [f"{effect}.{control}"]
+        values: list[tuple[float, ...]] = [(0.2,)]
+        if effect == "stuck_surface":
+            own.append(f"{effect}.{control}_position")
+            values = [(1.0,), (0.0,)]
+        indices = (*(names.index(n) for n in own), names.index(f"{effect}.onset"))
+        found.append(Candidate(effect, f"{effect} of {control}", indices, tuple(product(*values, onsets))))
+    return found

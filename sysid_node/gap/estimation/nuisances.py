@@ -1,0 +1,116 @@
+"""What is always allowed for: the derivatives' errors within their tolerances, biases, and clocks within one sample.
+
+Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value, cut off at three sigmas (a
+clock's: at one sample). The cut is what makes a tolerance a tolerance: data that know a derivative to a thousandth
+would overrule any prior, and a shifted centre of gravity would pass as a Cm_alpha ten sigmas out. Derivatives and
+clocks are shared by all flights; biases are each flight's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+from sysid_node.gap.residuals.residual_model import View
+
+#: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a prior so much wider.
+WIDENED, WIDER = "derivative_error", 5.0
+
+#: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
+LIMIT = 3.0
+
+#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. A late
+#: IMU is late against both others, and all three together against nothing: it is measured against the air data, and
+#: the commands' clock stays as it is, for a servo's own lag must not pass for lateness.
+CLOCKS = {
+    "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
+    "air_data_delay": ("air_data_delay", "imu_delay"),
+}
+
+#: Share of the airspeed from which on the air's motion counts.
+_GUSTY = 0.005
+
+#: Mean error of a flow angle that no vane measured, 1 sigma, rad: it is the aircraft file's.
+_INFERRED = 0.01
+
+#: Noise of the aircraft file that a bias may be as large as.
+_BIASES = {
+    **{f"imu_bias.{n}": "accel" for n in ("ax", "ay", "az")},
+    **{f"imu_bias.{n}": "gyro" for n in "pqr"},
+    "vane_bias.alpha": "alpha",
+    "vane_bias.beta": "beta",
+}
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Indices into the parameter vector, 1-sigma of each, the most each may be, and which the flights share."""
+
+    indices: tuple[int, ...]
+    sigma: Array
+    limit: Array
+    shared: NDArray[np.bool_]
+    widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
+
+    def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
+        """Those that do not belong to these effects; the priors of some are widened."""
+        gone = {e for e in effects if e != WIDENED}
+        gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
+        keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
+        wide = np.where(np.isin(self.indices, widened), WIDER, 1.0)
+        indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
+        more = self.widened + float(np.log(wide[keep]).sum())
+        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
+
+
+def nuisances_of(aircraft: Aircraft, view: View, others: Sequence[View] = ()) -> Nuisances:
+    """Of one of an aircraft's flights: the same ones for all that are looked at together, by its own rates.
+
+    Raises InputError where the aircraft's file has no tolerances.
+    """
+    every = (view, *others)
+    tolerances = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
+    if not tolerances:
+        raise InputError(
+            f"aircraft {aircraft.name!r}: no derivative has a tolerance, so what is a gap cannot be told from an "
+            "honest error; give derivatives a tolerance (1 sigma) in the aircraft file"
+        )
+    lateral = any(v.flight.lateral for v in every)
+    sigma = {
+        f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
+    }
+    sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
+    sigma |= {f"vane_bias.{angle}": _INFERRED for angle in view.flight.inferred}
+    if any(gusty(v) for v in every):
+        sigma |= _turning_air(aircraft)
+    limit = {name: LIMIT * s for name, s in sigma.items()}
+    for clock, rate in zip(CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
+        sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
+    names = view.simulator.names
+    shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *CLOCKS)) for name in sigma])
+    numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
+    return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
+
+
+def gusty(view: View) -> bool:
+    """Whether the air moves across the flight path by enough to count."""
+    return bool(view.gusts >= _GUSTY * view.record["V"].mean())
+
+
+def _turning_air(aircraft: Aircraft) -> dict[str, float]:
+    """In gusts: the air that rises also turns, which works like a derivative with the rate of alpha, up to -C_q.
+
+    The pitching gust of a wing as long as the gusts are short: q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2).
+    """
+    damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
+    return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}
+
+
+_LATERAL = frozenset({"CY", "Cl", "Cn"})
+_SIDEWAYS = frozenset({"ay", "p", "r", "beta"})

@@ -1,0 +1,68 @@
+"""Which flights can be diagnosed at all; what is wrong with the others, in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid_node.errors import InputError
+from sysid_node.flight.record import Array
+from sysid_node.gap.flightdata.gap_flight import Flight
+from sysid_node.gap.residuals.residual_model import View
+
+#: Travel below which no surface counts as moved, rad.
+_TRAVEL = 0.004
+
+#: Ratio of measured to expected mean lift beyond which a flight is another aircraft's, unless a vane that is off by so
+#: much (rad) would account for it.
+_LIFT, _VANE = 2.5, 0.1
+
+#: Mean angle of attack from which lift that is missing may be stalled, rad.
+_STALLING = 0.15
+
+
+def require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
+    """Raises InputError where a held-out flight is one of those that are fitted."""
+    for held in holdouts:
+        for flight in flights:
+            a, b = held.record, flight.record
+            same = a.start_ns == b.start_ns and len(a) == len(b) and np.array_equal(a["az"], b["az"])
+            if same or held.source == flight.source:
+                raise InputError(
+                    f"--holdout {held.source}: is the same flight as {flight.source}; hold out a flight that is not "
+                    "fitted, or leave --holdout away to check on parts of the flight"
+                )
+
+
+def admitted(view: View) -> View:
+    """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
+    commands = view.commands[:, :-1]
+    travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
+    if (travel < _TRAVEL).all():
+        raise InputError(
+            f"{view.flight.source}: no control surface moves by more than {travel.max():.2g} rad; fly a manoeuvre "
+            "(sysid excite designs one)"
+        )
+    lift, expected = view.series[:, 0].mean(), view.predicted_series(view.simulator.neutral())[:, 0].mean()
+    slope = view.simulator.aircraft.derivatives.get("CL_alpha")
+    by_a_vane = slope is not None and abs(lift - expected) < _VANE * slope.value and not view.flight.inferred
+    stalled = lift < expected and not view.flight.inferred and view.record["alpha"].mean() > _STALLING
+    if not (1.0 / _LIFT < lift / expected < _LIFT or by_a_vane or stalled):
+        raise InputError(
+            f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
+            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "
+            f"another aircraft's flight{_or_imu(view)}?"
+        )
+    return view
+
+
+def _or_imu(view: View) -> str:
+    """What else may be wrong where flow angles are inferred."""
+    return ", or an IMU far off, from which its flow angles are inferred" if view.flight.inferred else ""
+
+
+def excitation(view: View) -> Array:
+    """Power over the sensors' noise, by coefficient that was measured."""
+    power = (np.abs(view.measured[:, 1:]) ** 2).mean(axis=0).sum(axis=0)
+    return np.asarray((power / view.noise[1:].sum(axis=0))[view.axes])

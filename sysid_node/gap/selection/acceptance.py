@@ -1,0 +1,135 @@
+"""Which effects are accepted: what predicts better beyond doubt, and closes a share of the gap that matters.
+
+Significant is not enough: a clock's odd millisecond is real, and trifling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.candidates import TIMES
+from sysid_node.gap.estimation.fit import Fit, Projected, with_candidates
+from sysid_node.gap.estimation.nuisances import gusty
+from sysid_node.gap.estimation.predictive_density import Evidence, probabilities
+from sysid_node.gap.instruments.bayes_factor import advantage
+from sysid_node.gap.instruments.overidentification import structure_of
+from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
+from sysid_node.gap.residuals.windowed_spectra import power_of
+from sysid_node.gap.selection.candidate_fitter import Trial
+from sysid_node.sim import EFFECTS
+
+#: Probability, against doing without, from which an effect is accepted.
+_SURE = 0.95
+
+#: The same in nats.
+_SURELY = float(np.log(_SURE / (1.0 - _SURE)))
+
+#: What an effect must make up for having been picked from so many, in nats.
+_MANY = float(np.log(len(EFFECTS)))
+
+#: Share of the power left over that an effect must take away on the axis where it does most, and share of what
+#: derivatives and biases leave there that comes back without it: a fifth of the gap's size.
+MATERIAL, MATERIAL_OF_ALL = 0.25, 0.04
+
+#: Error, as a share of the motion, that nobody would look for.
+NOTICED = 0.05
+
+#: Error, as a share of the motion, whose end matters however much weather is left.
+_PLAIN = 0.2
+
+
+def likelier(trial: Trial, other: Trial) -> bool:
+    """Whether a trial predicts better than another, beyond doubt."""
+    return bool(probabilities([trial.evidence.scores, other.evidence.scores])[0] > _SURE)
+
+
+def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
+    """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter.
+
+    Also of what the commands foretell, having been picked from so many: gusts can fake the rest, and where the model is
+    not exact every manoeuvre repeats the last one's error.
+    """
+    if _trifling(trial) or not likelier(trial, without):
+        return False
+    matters = _matters_in_gusts(without, trial) if _in_gusts(trial) else _matters(without, trial)
+    if not np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)):
+        return False
+    return advantage(trial.fit, without.fit) > _SURELY + _MANY
+
+
+def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+    """Channels (12,) on which a trial takes enough of the remainder away."""
+    left, motion = power_left(without.evidence), _motion(trial)
+    gone = left - power_left(trial.evidence)
+    return np.asarray(((gone > MATERIAL * left) & (gone > NOTICED**2 * motion)) | (gone > _PLAIN**2 * motion))
+
+
+def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+    """The same, of forces and moments by what of the remainder is structure: the rest is weather."""
+    before, after = structure_of(without.fit, trial.fit), structure_of(trial.fit)
+    scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
+    gone = before.coherent - after.coherent
+    structured = (gone > MATERIAL * before.coherent) & (gone * scale > NOTICED**2 * _motion(trial))
+    forces = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
+    return np.where(forces, structured | _shifts(without, trial), _matters(without, trial))
+
+
+def _shifts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+    """Channels (12,) on which a trial takes enough of what is off on average away: gusts average out."""
+    left, now = (_power_of_means(t.evidence) for t in (without, trial))
+    return np.asarray((left - now > MATERIAL * left) & (left - now > NOTICED**2 * _motion(trial)))
+
+
+def _power_of_means(evidence: Evidence) -> Array:
+    """Power (12,) of the flights' means of what is left, as ``spectra.power_of`` counts it."""
+    return np.asarray(sum(0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in evidence.residuals))
+
+
+def _motion(trial: Trial) -> Array:
+    """Power (12,) of what was measured, about the windows' means."""
+    return np.asarray(sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views))
+
+
+def _in_gusts(trial: Trial) -> bool:
+    return any(gusty(view) for view in trial.fit.views)
+
+
+def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
+    """Power (12,) that comes back when what a trial has more than another is taken away, the others as they are.
+
+    As a share of what nuisances alone leave, which do their best. The others would bend to hold what is gone: a lag
+    twice as long for an engine half as strong. Where the others alone grow without end, so does what comes back.
+    """
+    kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
+    lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
+    try:
+        points = Projected(lacking).points(lacking.values)
+    except np.linalg.LinAlgError:
+        return np.full(len(CHANNELS), np.inf)
+    back, now, whole = (_powers(trial.fit, some) for some in (points, trial.fit.points, base.fit.points))
+    return np.asarray(np.max((back - now) / np.maximum(whole, 1e-300), axis=0))
+
+
+def _powers(fit: Fit, points: Sequence[Array]) -> Array:
+    """Power (2, 12) that parameters leave of the flights, and without the means, beside which all else may be small."""
+    residuals = [view.residual(point) for view, point in zip(fit.views, points, strict=True)]
+    swinging = [np.concatenate([0.0 * r[:, :1], r[:, 1:]], axis=1) for r in residuals]
+    return np.array([sum(power_of(r) for r in some) for some in (residuals, swinging)])
+
+
+def _trifling(trial: Trial) -> bool:
+    """Whether what was added is a time within one sample of the slowest topic: a matter of sampling."""
+    if trial.added is None or trial.added.effect not in TIMES:
+        return False
+    slowest = min(min(v.flight.actuator_rate, v.flight.air_rate) for v in trial.fit.views)
+    return bool(abs(trial.fit.points[0][trial.added.indices[0]]) < 1.0 / slowest)
+
+
+def power_left(evidence: Evidence) -> Array:
+    """Power (12,) of what is left on flight not fitted."""
+    return np.asarray(sum(power_of(r) for r in evidence.residuals))

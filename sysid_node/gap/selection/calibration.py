@@ -1,0 +1,82 @@
+"""How far a cause can be believed: what speaks for it, and how often as much has spoken for what was there.
+
+Evidence says how much better one model of the list predicts than another. Where the truth is none of them, the least
+wrong one wins by as many nats as there are data, and no number of these is a probability (Bernardo & Smith (1994),
+Bayesian Theory, sect. 6.1: the M-open case). So a cause whose law is refuted by what it leaves is not believed at all,
+and for the others the nats are made a probability by a logistic regression over causes whose truth was known (Platt
+(1999), Advances in Large Margin Classifiers). ``bench/gap_credence.py`` learns its weights from the withheld
+effects that earlier versions were judged by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid_node.gap.estimation.nuisances import WIDENED
+from sysid_node.gap.selection.misspecification import Adequacy
+
+#: Effects that work through the file's own derivatives, as other values of these: together they bend to much that is
+#: something else.
+PLIABLE = frozenset({WIDENED, "inertia_error", "mass_error", "cg_shift"})
+
+#: Weights of a constant, of the logarithm of the nats, and of pliability (bench/gap_credence.py).
+WEIGHTS = (-4.02, 1.18, -1.12)
+
+#: Amplitude of what goes with a cause and is left, as a share of what it does, from which its law is refuted.
+REFUTED = 0.3
+
+#: Probability below which a cause is not named.
+LIKELY = 0.5
+
+#: Standard deviations above chance from which what is left goes with a cause.
+_DEVIATIONS = 4.5
+
+#: Share of all that a cause does from which what it does to one channel counts.
+_COUNTS = 0.1
+
+
+@dataclass(frozen=True)
+class Grounds:
+    """What speaks for a cause and against it."""
+
+    foretold: float  # nats by which it accounts better for what the commands foretell, the other causes given
+    misfit: float  # of what it does, what is left that goes with it: amplitude, on the channels where any is left
+    pliable: bool  # as what works through the file's own derivatives is
+
+    @classmethod
+    def of(cls, effect: str, foretold: float, adequacy: Adequacy) -> Grounds:
+        """From the effect, the nats, and what it leaves."""
+        seen = (adequacy.done > _COUNTS * adequacy.done.sum()) & (adequacy.deviations > _DEVIATIONS)
+        misfit = np.sqrt(adequacy.left[seen].sum() / adequacy.done[seen].sum()) if seen.any() else 0.0
+        return cls(foretold, float(misfit), effect in PLIABLE)
+
+    @property
+    def regressors(self) -> tuple[float, float, float]:
+        """What the weights belong to."""
+        return 1.0, float(np.log(max(self.foretold, 1.0))), float(self.pliable)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether what is left goes with the cause by too much: then the law is another, however many the nats."""
+        return self.misfit > REFUTED
+
+    @property
+    def credence(self) -> float:
+        """Probability that the cause, or a rival named with it, is there."""
+        return 0.0 if self.refuted else self._by_nats
+
+    @property
+    def wanting(self) -> bool:
+        """Whether it would be believed but for its law: then something is there, but not this."""
+        return self.refuted and self._by_nats >= LIKELY
+
+    @property
+    def _by_nats(self) -> float:
+        return 1.0 / (1.0 + float(np.exp(-np.dot(WEIGHTS, self.regressors))))
+
+
+def prior(effect: str) -> float:
+    """Odds of an effect before any flight, beside those that are not pliable."""
+    return float(np.exp(WEIGHTS[2])) if effect in PLIABLE else 1.0

@@ -1,0 +1,198 @@
+"""Sets of candidates fitted: a first look at each upon what is known so far, the likeliest to the end."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+
+from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate, bounds
+from sysid_node.gap.estimation.checkpoint import Steps
+from sysid_node.gap.estimation.fit import Fit, Projected, with_candidates
+from sysid_node.gap.estimation.nuisances import Nuisances
+from sysid_node.gap.estimation.predictive_density import Evidence, judged
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.selection.onset import sought
+
+#: Of these, as many of one effect: it may act on several controls or coefficients.
+_SHAPES = 2
+
+Progress = Callable[[float, str], None]
+
+#: Deviance that a candidate leaves at a first look, and the values from which its fit starts.
+Look = tuple[float, Candidate, tuple[float, ...]]
+
+_Work = TypeVar("_Work")
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A set of candidates fitted, and its evidence; ``added`` is what it has more than what it was tried upon."""
+
+    fit: Fit
+    evidence: Evidence
+    added: Candidate | None = None
+
+
+@dataclass(frozen=True)
+class Trier:
+    """Fits sets of candidates, the nuisances always along."""
+
+    nuisances: Nuisances
+    steps: Steps
+    unseen: Sequence[View] = ()  # flights held out, and what is allowed for in each
+    own: Sequence[Nuisances] = ()
+    known: dict[frozenset[str], Trial] = field(default_factory=dict)  # by the labels of the set
+    seen: dict[frozenset[str], dict[str, Look]] = field(default_factory=dict)  # upon such a set, by label
+
+    def trial(self, fit: Fit, candidates: Sequence[Candidate], look: Look | None = None) -> Trial:
+        """A set of candidates fitted from where another fit stands; what is added to the set starts at its look."""
+        _, added, start = look or (0.0, None, ())
+        wanted = [*candidates, *([added] if added else [])]
+        labels = frozenset(c.label for c in wanted)
+        if labels not in self.known:
+            done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
+            if added is not None and (moved := sought(done, added)) is not done:
+                done = self.steps.polished(moved)
+            self.known[labels] = Trial(done, judged(done, self.unseen, self.own))
+        return replace(self.known[labels], added=added)
+
+    def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
+        """A first look at each, the best first: what it takes away where the nuisances can do no more."""
+        seen = self.seen.setdefault(frozenset(c.label for c in current.fit.candidates), {})
+        fresh = [c for c in candidates if c.label not in seen]
+
+        def work() -> dict[str, list[float]]:
+            problem = Projected(current.fit)
+            looks = _spread(
+                lambda candidate: _first_look_or_none(current.fit, problem, candidate),
+                fresh,
+                lambda s: progress(0.5 * s, "a first look at every effect"),
+            )
+            return {candidate.label: [cost, *start] for cost, candidate, start in looks}
+
+        if fresh:
+            table = self.steps.table(current.fit, [c.label for c in fresh], work)
+            seen.update({c.label: (table[c.label][0], c, tuple(table[c.label][1:])) for c in fresh if c.label in table})
+        return sorted((seen[c.label] for c in candidates if c.label in seen), key=lambda look: look[0])
+
+    def looks_upon(
+        self, frontier: Sequence[Trial], candidates: Sequence[Candidate], progress: Progress
+    ) -> list[tuple[Trial, Look]]:
+        """First looks at each upon each of several explanations, the best first; every set of effects once."""
+        found: list[tuple[Trial, Look]] = []
+        for i, current in enumerate(frontier):
+            rest = [c for c in candidates if c.effect not in current.fit.effects]
+            part = lambda share, text, i=i: progress((i + share) / len(frontier), text)  # noqa: E731
+            found += [(current, look) for look in self.looks(current, rest, part)]
+        best: dict[frozenset[str], tuple[Trial, Look]] = {}
+        for current, look in sorted(found, key=lambda pair: pair[1][0]):
+            labels = frozenset({look[1].label, *(c.label for c in current.fit.candidates)})
+            best.setdefault(labels, (current, look))
+        return list(best.values())
+
+    def upon(self, current: Trial, look: Look) -> Trial | None:
+        """A candidate added to an explanation; None where no numbers come of it.
+
+        Where slopes grow without end a set predicts nothing, and is no explanation.
+        """
+        try:
+            with _endless():
+                return self.trial(current.fit, current.fit.candidates, look)
+        except np.linalg.LinAlgError:
+            return None
+
+    def beside(self, chosen: Trial, rival: Candidate) -> Trial | None:
+        """A rival added to what was chosen; None where no numbers come of it."""
+        (look,) = self.looks(chosen, [rival], lambda s, t: None)
+        return self.upon(chosen, look)
+
+    def finish(self, looks: Sequence[tuple[Trial, Look]], progress: Progress) -> list[tuple[Trial, Trial]]:
+        """What was looked at, fitted to the end, after what it was looked at upon; the most probable first."""
+        trials = _spread(
+            lambda pair: (pair[0], self.upon(*pair)),
+            looks,
+            lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
+        )
+        done = [(current, trial) for current, trial in trials if trial is not None]
+        return sorted(done, key=lambda pair: -pair[1].evidence.total)
+
+
+def likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Trial, Look]]:
+    """The best looks upon each explanation; one effect in many shapes leaves room for others."""
+    seen: Counter[tuple[int, str]] = Counter()
+    kept = []
+    for current, look in looks:
+        effect = look[1].effect
+        if seen[id(current), ""] < most and seen[id(current), effect] < _SHAPES:
+            seen.update([(id(current), ""), (id(current), effect)])
+            kept.append((current, look))
+    return kept
+
+
+def narrowed(candidates: Sequence[Candidate], looks: Sequence[Look]) -> list[Candidate]:
+    """The candidates with one start each where it is the onset that they differ in: looking at all again costs most."""
+    best = {candidate.label: start for _, candidate, start in reversed(looks)}
+    return [
+        replace(c, starts=(best[c.label],)) if c.effect in PER_CONTROL and c.label in best else c for c in candidates
+    ]
+
+
+def _endless() -> np.errstate:
+    """Of predictions without end the result tells: NumPy need not warn of them."""
+    return np.errstate(over="ignore", invalid="ignore")
+
+
+def _spread(
+    work: Callable[[_Work], _Result], over: Sequence[_Work], progress: Callable[[float], None]
+) -> list[_Result]:
+    """The work on each, in their order; on one thread more than there are processors, for each waits for XLA."""
+    done = []
+
+    def quietly(item: _Work) -> _Result:
+        with _endless():
+            return work(item)
+
+    with ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:
+        for result in pool.map(quietly, over):
+            done.append(result)
+            progress(len(done) / len(over))
+    return done
+
+
+def _first_look_or_none(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
+    """The first look; infinitely much is left where no numbers come of it."""
+    try:
+        return _first_look(fit, problem, candidate)
+    except np.linalg.LinAlgError:
+        return np.inf, candidate, candidate.starts[0]
+
+
+def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
+    """What is left after one Gauss-Newton step from the best start, of the candidate and of all that is known so far.
+
+    What is known so far must be let move along: alone it has bent to hold the other's share, and would hide it.
+    """
+    if not candidate.indices:
+        widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
+        problem = Projected(widened)
+        return problem.deviance(problem.residual(widened.values)), candidate, ()
+    low, high = bounds(fit.views[0].simulator, (*fit.indices, *candidate.indices))
+    best: Look = (np.inf, candidate, candidate.starts[0])
+    look = problem.looking(candidate)
+    for start in candidate.starts:
+        values = np.concatenate([fit.values, start])
+        rows = look.ahead(values)
+        step = np.linalg.lstsq(look.jacobian(values), -rows, rcond=None)[0]
+        stepped = np.clip(values + step, low, high)
+        for there, left in ((values, rows), (stepped, look.residual(stepped))):
+            deviance = look.deviance(left)
+            if deviance < best[0]:
+                best = (deviance, candidate, tuple(there[fit.values.size :].tolist()))
+    return best

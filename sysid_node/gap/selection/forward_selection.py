@@ -1,0 +1,130 @@
+"""Which effects: candidates tried one upon another, accepted by how well they predict flight not fitted.
+
+Forward selection up to three effects, each of which must predict better beyond doubt and close a share of the gap that
+matters (``acceptance``); then each stands against its rivals (``rivals``), and against what is known of causes with
+such grounds (``belief``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from sysid_node.gap.estimation.candidates import BETWEEN, candidates_of
+from sysid_node.gap.estimation.checkpoint import Steps
+from sysid_node.gap.estimation.fit import Fit, blank, linearised
+from sysid_node.gap.estimation.nuisances import Nuisances
+from sysid_node.gap.estimation.predictive_density import probabilities
+from sysid_node.gap.instruments.liml import unbiased
+from sysid_node.gap.instruments.overidentification import Structure, structure_left, structure_of
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.selection.acceptance import accepted, likelier
+from sysid_node.gap.selection.candidate_fitter import Progress, Trial, Trier, likeliest, narrowed
+from sysid_node.gap.selection.causes import Cause, believed
+
+#: For the first, second and third effect: explanations that it is tried upon (the best single one need not belong to
+#: the best pair), and candidates that are fitted to the end upon each after a first look at all.
+_STAGES = ((1, 6), (3, 4), (2, 3))
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """The explanation, what it was built on, and what is left."""
+
+    base: Trial  # nuisances only
+    chosen: Trial
+    corrected: Fit  # chosen, its unknowns as gusts do not bias them
+    before: Structure  # of what the nuisances leave
+    left: Structure  # of what the chosen effects leave
+    causes: tuple[Cause, ...]
+    doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
+    table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
+    trials: tuple[Trial, ...] = field(default=())  # of the first stage
+    unseen: tuple[View, ...] = ()  # flights held out, and what is allowed for in each
+    own: tuple[Nuisances, ...] = ()
+    beside: Fit | None = None  # what the sizes are from, where the corrected fit has the file's derivatives
+
+    @property
+    def filed(self) -> bool:
+        """Whether derivatives are the file's, beside causes."""
+        return self.beside is not None
+
+    @property
+    def sized(self) -> Fit:
+        """The fit that sizes and their errors are from."""
+        return self.beside or self.corrected
+
+    def as_filed(self) -> Attribution:
+        """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
+        neutral = tuple(view.simulator.neutral() for view in self.base.fit.views)
+        return replace(self, corrected=linearised(replace(self.base.fit, points=neutral)))
+
+    def beside_the_file(self) -> Attribution:
+        """The causes beside the file's own derivatives: where those that were fitted predict worse."""
+        fit, neutral = self.corrected, self.corrected.views[0].simulator.neutral()
+        own, points = [*fit.indices, *fit.widened], tuple(neutral.copy() for _ in fit.points)
+        for point, found in zip(points, fit.points, strict=True):
+            point[own] = found[own]
+        moved = replace(linearised(replace(fit, points=points)), information=fit.information)
+        return replace(self, corrected=moved, beside=fit)
+
+    def by_least_squares(self) -> Attribution:
+        """Sizes as least squares has them: where those without bias predict nothing."""
+        return replace(self, corrected=self.chosen.fit, beside=None)
+
+    def without_the_weakest(self) -> Attribution:
+        """Without the cause that is the least probable."""
+        weakest = min(self.causes, key=lambda cause: cause.probability)
+        fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
+        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None,
+                       left=structure_left(fit, self.unseen, self.own), causes=causes)  # fmt: skip
+
+    def without_causes(self) -> Attribution:
+        """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
+        corrected = unbiased(self.base.fit)
+        return replace(self, chosen=self.base, corrected=corrected, beside=None,
+                       left=structure_left(self.base.fit, self.unseen, self.own), causes=())  # fmt: skip
+
+
+def attribute(
+    views: Sequence[View],
+    nuisances: Nuisances,
+    progress: Progress,
+    steps: Steps | None = None,
+    unseen: Sequence[View] = (),
+    own: Sequence[Nuisances] = (),
+) -> Attribution:
+    """Fits everything that has to be, and chooses; flights held out, with ``own`` nuisances, have a say but no fit."""
+    candidates, trier = candidates_of(views[0].simulator, views), Trier(nuisances, steps or Steps(), unseen, own)
+    progress(0.0, "derivatives within their tolerances")
+    base = trier.trial(blank(views, nuisances), [])
+    chosen, stages, frontier = base, [], [base]
+    for count, (width, most) in enumerate(_STAGES):
+        looks = trier.looks_upon(frontier[:width], candidates, _share_of(progress, count))
+        tried = trier.finish(likeliest(looks, most), _share_of(progress, count))
+        candidates = narrowed(candidates, [look for _, look in looks])
+        stages.append([trial for _, trial in tried])
+        better = [t for upon, t in tried if likelier(t, chosen) and accepted(base, upon, t)]
+        if not better:
+            break
+        chosen, frontier = better[0], better
+    progress(0.8, "whether another effect would do as well")
+    late = [candidate for candidate in candidates if candidate.effect in BETWEEN]
+    chosen, causes, doubted = believed(trier, base, chosen, stages, late)
+    before, left = structure_of(base.fit, chosen.fit), structure_left(chosen.fit, unseen, own)
+    ranked, corrected = _ranked(base, stages[0]), unbiased(chosen.fit)
+    found = Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
+    return replace(found, unseen=tuple(unseen), own=tuple(own))
+
+
+def _share_of(progress: Progress, count: int) -> Progress:
+    """Progress of one of the stages as that of all."""
+    return lambda share, text: progress((count + share) / (len(_STAGES) + 1.0), text)
+
+
+def _ranked(base: Trial, trials: Sequence[Trial]) -> tuple[tuple[str, float], ...]:
+    """Every effect that was fitted to the end as the only one, with its probability; none among them."""
+    scores = [*(t.evidence.scores for t in trials), base.evidence.scores]
+    shares = probabilities(scores)
+    labels = [*(t.added.label for t in trials if t.added), "none"]
+    return tuple(sorted(zip(labels, shares.tolist(), strict=True), key=lambda pair: -pair[1]))

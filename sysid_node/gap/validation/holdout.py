@@ -1,0 +1,134 @@
+"""What flight not fitted says of an explanation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sysid_node.gap.estimation.nuisances import Nuisances
+from sysid_node.gap.estimation.predictive_density import Evidence, groups_of, held_out
+from sysid_node.gap.instruments.liml import unbiased
+from sysid_node.gap.instruments.overidentification import Structure
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.selection.forward_selection import Attribution
+from sysid_node.gap.validation import spectral_error
+from sysid_node.gap.validation.kfold import parted
+from sysid_node.gap.validation.simulation_error import flown, foreseen
+from sysid_node.gap.validation.spectral_error import Gap
+
+
+@dataclass(frozen=True)
+class Check:
+    """Evidence of the derivatives alone and of the whole explanation, and the gap, on ``views``."""
+
+    views: tuple[View, ...]
+    base: Evidence
+    final: Evidence
+    gap: Gap  # of forces, moments and kinematics by frequency
+    foreseen: bool = False  # whether weather and sensors' noise are all of it
+
+    @cached_property
+    def flown(self) -> Gap | None:
+        """The gap of short flights."""
+        return flown(self.base, self.final)
+
+    @property
+    def gaps(self) -> list[Gap]:
+        """By either measure."""
+        return [self.gap, *([self.flown] if self.flown else [])]
+
+    def as_filed(self, left: Structure) -> Check:
+        """The same of the aircraft file as it is."""
+        before = tuple(v.residual(v.simulator.neutral()) for v in self.views)
+        filed = tuple((v.simulator.neutral(),) * len(groups_of(v)) for v in self.views)
+        base = replace(self.base, residuals=before, points=filed)
+        return replace(self, base=base, final=base, gap=spectral_error.gap_of(self.views, before, base, base, left))
+
+
+def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> Check:
+    """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
+    if unseen:
+        base, final = (held_out(f, unseen, own) for f in (unbiased(attribution.base.fit), attribution.corrected))
+    else:
+        base = parted(attribution.base.evidence, unbiased(attribution.base.fit))
+        final = parted(attribution.chosen.evidence, attribution.corrected, filed=attribution.filed)
+    views = base.views
+    before = [v.residual(v.simulator.neutral()) for v in views]
+    return Check(views, base, final, spectral_error.gap_of(views, before, base, final, attribution.left))
+
+
+def settled(
+    attribution: Attribution, views: Sequence[View], unseen: Sequence[View], own: Sequence[Nuisances]
+) -> tuple[Attribution, Check]:
+    """What flight not fitted leaves of an explanation.
+
+    Nothing is blamed where weather and noise are all of the gap, nor what by neither measure predicts flight better
+    than the derivatives within their tolerances, or by one of them no better than the file; and derivatives that do
+    worse than the file leave the file as it is. (In gusts derivatives that these have biased seem the better by
+    frequency.)
+    """
+    with ThreadPoolExecutor(1) as pool:
+        weather = pool.submit(foreseen, [*views, *unseen])
+        attribution, checked = _standing(attribution, unseen, own)
+    if weather.result():
+        attribution = attribution.without_causes().as_filed()
+        return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
+    if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
+        attribution = attribution.as_filed()
+        checked = checked.as_filed(attribution.left)
+    return attribution, checked
+
+
+def _standing(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
+    """What of an explanation stands, and what flight not fitted says of it.
+
+    The first that predicts better: all causes; the same with sizes as least squares has them; without the least
+    probable one; none. Each is also held beside the file's own derivatives, and passed over where its predictions of
+    flight not fitted are no numbers.
+    """
+    for explanation in _explanations(attribution):
+        try:
+            found = explanation, check(explanation, unseen, own)
+        except np.linalg.LinAlgError:
+            continue
+        if any(g.tolerances > g.before for g in found[1].gaps):
+            found = _beside_the_file(*found, unseen, own)
+        if _better(found[1]):
+            return found
+    bare = attribution.without_causes()
+    return bare, check(bare, unseen, own)
+
+
+def _explanations(attribution: Attribution) -> Iterator[Attribution]:
+    """An explanation, then what could stand in its stead."""
+    if attribution.causes:
+        yield attribution
+        if attribution.corrected is not attribution.chosen.fit:
+            yield attribution.by_least_squares()
+    if len(attribution.causes) > 1:
+        yield attribution.without_the_weakest()
+
+
+def _better(checked: Check) -> bool:
+    """Whether causes predict better than the derivatives by one of the measures, and than the file by both."""
+    return any(g.after < g.tolerances for g in checked.gaps) and all(g.after < g.before for g in checked.gaps)
+
+
+def _beside_the_file(
+    attribution: Attribution, checked: Check, unseen: Sequence[View], own: Sequence[Nuisances]
+) -> tuple[Attribution, Check]:
+    """The causes beside the file's own derivatives, where these do better than the derivatives that were fitted."""
+    explanation = attribution.beside_the_file()
+    try:
+        found = check(explanation, unseen, own)
+    except np.linalg.LinAlgError:
+        return attribution, checked
+    if not found.gaps[-1].after < checked.gaps[-1].after:
+        return attribution, checked
+    before, filed = [v.residual(v.simulator.neutral()) for v in found.views], found.as_filed(attribution.left)
+    gap = spectral_error.gap_of(found.views, before, filed.base, found.final, attribution.left)
+    return explanation, replace(found, base=replace(filed.base, scores=found.base.scores), gap=gap)

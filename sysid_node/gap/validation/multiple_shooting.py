@@ -1,0 +1,163 @@
+"""The simulator flown beside a flight, begun anew every few samples in the state that was measured.
+
+Short flights show the dynamics before drift hides them. Each begins with the velocity, attitude and rates that the
+instruments read there (through the zero-phase low-pass of ``flights``, the sensors' effects undone); actuators, motor,
+flow separation and the structure keep what they remember of the commands and of the flight before. The air in between
+is taken from the flight, too: it moves by what the air data show beyond the inertial instruments, integrated from the
+start of the short flight. So gusts, and the noise of the vanes with them, are an input of the simulator and not its
+error, and what a flow angle is off by is the simulator's own motion.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.residuals.flight_path_reconstruction import Motion, Sample, rates_of_change, undone
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.sim import body as rigid
+from sysid_node.sim.body import Vector
+from sysid_node.sim.flying.rollout import Carry, Pilot, advance, begin
+from sysid_node.sim.model.chain import Chain
+from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.signals.atmosphere import altitude_of
+from sysid_node.sim.signals.time_shift import shift_cubic
+from sysid_node.sim.stations import command
+
+
+class Course(NamedTuple):
+    """A flight to be flown beside, N samples at a constant rate."""
+
+    motion: Motion
+    commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
+    altitude: Scalar  # (N,) m, at which the standard air has the density that was measured
+    moving: Scalar  # (N, 3) velocity of the air that the air data do not show, m/s, and that the simulator is told of
+    turning: Scalar  # (N, 3) rotation of the air that the simulator is told of, rad/s
+    begins: Scalar  # (N,) whether a short flight begins here
+
+
+_ANGLES = tuple(OUTPUTS.index(name) for name in ("phi", "psi"))
+
+
+class _Start(NamedTuple):
+    """What a short flight may begin with, at every sample."""
+
+    begins: Scalar
+    body: Scalar  # (13,)
+    truth: Scalar  # (3,) flow at the probe one sample before
+    probe: Scalar  # (3,) what the lagged probe held then
+
+
+class Beside(NamedTuple):
+    """The simulator beside a flight, N samples, all at the time of the motion: readings, columns ``layout.OUTPUTS``.
+
+    Where the parameters say that messages are late, the measured readings are moved.
+    """
+
+    simulated: Scalar  # (N, 12)
+    measured: Scalar  # (N, 12)
+    air: Scalar  # (N, 3) velocity of the air along body axes since the short flight began, m/s
+
+
+@partial(jax.jit, static_argnums=0)
+def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Beside:
+    """The simulator of parameters (P,) beside a flight; pure."""
+    chain = Chain.of(layout, model, theta, step, course.altitude[0])
+    samples = undone(chain, course.motion)
+    arriving = command.arrive(chain.effects, course.commands, step)
+    air = _air(samples, course.begins, step)
+    gusts = jnp.concatenate([air + course.moving, course.turning], axis=1)
+    starts = _starts(samples, course)
+    first, _ = begin(chain, starts.body[0], arriving[0], gusts[0], ())
+    coming = (starts, gusts, _next(arriving), _next(gusts), step * jnp.arange(1, len(arriving) + 1))
+    _, (readings, *_) = jax.lax.scan(lambda carry, new: _advance(chain, carry, *new), first, coming)
+    return Beside(readings, _measured(chain, course.motion), air)
+
+
+def _advance(
+    chain: Chain, carry: Carry, start: _Start, gusts: Scalar, command_: Scalar, next_gusts: Scalar, time: Scalar
+) -> tuple[Carry, tuple[Scalar, ...]]:
+    """Begins anew where a short flight does, reads the instruments, and flies on to ``time``."""
+
+    def fresh(new: Scalar, old: Scalar) -> Scalar:
+        return jnp.where(start.begins, new, old)
+
+    carry = carry._replace(
+        x=fresh(carry.x.at[:13].set(start.body), carry.x),
+        drive=carry.drive._replace(gusts=fresh(gusts, carry.drive.gusts)),
+        truth=fresh(start.truth, carry.truth),
+        probe=fresh(start.probe, carry.probe),
+    )
+    follow: Pilot = lambda state, outputs, planned: (planned, planned, state)  # noqa: E731
+    return advance(chain, follow, carry, command_, next_gusts, time, jnp.zeros(12))
+
+
+def _starts(samples: Sample, course: Course) -> _Start:
+    """The measured state at every sample."""
+    place = jnp.zeros_like(course.altitude)
+    columns = (place, place, -course.altitude, *samples.velocity, *rigid.quaternion(*samples.attitude), *samples.rates)
+    return _Start(course.begins, jnp.stack(columns, 1), _previous(samples.flow), _previous(samples.probe))
+
+
+def _air(samples: Sample, begins: Scalar, step: Scalar) -> Scalar:
+    """Velocity of the air (N, 3) along body axes since the short flight began, m/s: what the integral of specific
+    force is ahead of the velocity that the air data show."""  # fmt: skip
+    shown = jnp.stack(samples.velocity, 1)
+
+    def integrate(held: Scalar, new: tuple[Sample, Sample, Scalar]) -> tuple[Scalar, Scalar]:
+        before, now, anew = new
+        k1, _ = rates_of_change(Vector(*held), before.attitude, before.force, before.rates)
+        k2, _ = rates_of_change(Vector(*held).plus(k1.times(step)), now.attitude, now.force, now.rates)
+        ahead = held + 0.5 * step * jnp.stack(k1.plus(k2))
+        moved = jnp.where(anew, jnp.stack(now.velocity), ahead)
+        return moved, moved
+
+    pairs = (jax.tree.map(_previous, samples), samples, begins)
+    _, inertial = jax.lax.scan(integrate, shown[0], pairs)
+    return jnp.asarray(inertial - shown)
+
+
+def _measured(chain: Chain, motion: Motion) -> Scalar:
+    """Readings (N, 12) as recorded, moved to when the parameters say that they were taken."""
+    late = [chain.effects[name]["delay"] / chain.step for name in ("imu_delay", "air_data_delay")]
+    inertial = shift_cubic(jnp.concatenate([motion.force, motion.rates, motion.attitude], axis=1), -late[0])
+    return jnp.concatenate([inertial, shift_cubic(motion.air, -late[1])], axis=1)
+
+
+def _next(series: Scalar) -> Scalar:
+    return jnp.concatenate([series[1:], series[-1:]])
+
+
+def _previous(series: Scalar) -> Scalar:
+    return jnp.concatenate([series[:1], series[:-1]])
+
+
+def course_of(view: View, size: int) -> Course:
+    """A view's flight, begun anew every ``size`` samples; padded as the view's signals are."""
+    given = view.given
+    altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
+    begins = jnp.arange(altitude.size) % size == 0
+    still = jnp.zeros((altitude.size, 3))
+    assert given.motion is not None  # short flights are of flights with attitude (``flown``)
+    return Course(given.motion, given.signals.commands, altitude, still, still, begins)
+
+
+def beside(view: View, theta: Array, course: Course) -> tuple[Array, Array, Array]:
+    """Simulated (N, 12), measured (N, 12) and the air's motion (N, 3), as ``Beside`` has them, for parameters (P,)."""
+    s, samples = view.simulator, len(view.record)
+    flown = fly(s.layout, s.model, jnp.asarray(theta), course, jnp.asarray(s.step))
+    simulated, measured, air = (np.asarray(series)[:samples] for series in flown)
+    return simulated, measured, air
+
+
+def off(view: View, theta: Array, course: Course) -> Array:
+    """Measured minus simulated (N, 12); angles within half a turn."""
+    simulated, measured, _ = beside(view, theta, course)
+    error: Array = measured - simulated
+    error[:, _ANGLES] = (error[:, _ANGLES] + np.pi) % (2.0 * np.pi) - np.pi
+    return error

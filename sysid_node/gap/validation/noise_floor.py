@@ -1,0 +1,98 @@
+"""What a simulator with nothing wrong would be off by: the noise floor of short flights.
+
+The simulator flies the flight itself, short flight by short flight, with the flight's commands, in air that moves as
+the air data show and turns as turbulence of that strength does (``sim.dryden``), and the sensors' noise is added to
+what it reads. Flown beside this record, the same simulator is off by what no model could avoid: noise in the readings,
+in the states that short flights begin with and in the motion of the air, and the air's rotation that no vane shows.
+Without vanes the air's motion across the flight path is not shown either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.flightdata.gap_flight import thinned
+from sysid_node.gap.residuals.build import noisier
+from sysid_node.gap.residuals.flight_path_reconstruction import Motion
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.validation.multiple_shooting import Course, beside, off
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.signals.dryden import Dryden
+
+#: Flights of the simulator itself.
+_REALISATIONS = 6
+
+#: Height over ground that the air's rotation is taken for, m: it matters little.
+_HEIGHT = 100.0
+
+#: Clocks of what ``side_by_side`` gives at the time of the motion anyway.
+_CLOCKS = ("imu_delay.delay", "air_data_delay.delay")
+
+
+def unavoidable(view: View, theta: Array, course: Course, seed: int = 0) -> Iterator[tuple[Array, Array]]:
+    """Errors (N, 12) of a few flights of parameters (P,), and the sensors' noise (N, 12) that was added."""
+    random, prompt = np.random.default_rng(seed), theta.copy()
+    prompt[[view.simulator.names.index(name) for name in _CLOCKS]] = 0.0
+    _, _, shown = beside(view, theta, course)
+    for _ in range(_REALISATIONS):
+        again = thinned(noisier(view, random), view.simulator.rate)
+        added = {n: values - view.record[n] for n, values in again.columns.items()}
+        noise = np.column_stack([added.get(name, np.zeros(len(view.record))) for name in OUTPUTS])
+        moving, turning = _hidden_air(view, course, shown, noise, random)
+        own, _, _ = beside(view, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning)))
+        yield off(view, prompt, _recorded(view, course, own - _unseen(view, moving) + noise, added)), noise
+
+
+def _hidden_air(
+    view: View, course: Course, shown: Array, noise: Array, random: np.random.Generator
+) -> tuple[Array, Array]:
+    """Velocity (m/s) and rotation (rad/s) of the air, (N, 3) each along body axes, that the air data do not show.
+
+    Turbulence (``sim.dryden``) as strong as the air data show that there is, (N, 3) m/s. What counts is motion within a
+    short flight: slower air does not turn. The air data's noise moves no air.
+    """
+    model, speed = Dryden.at(_HEIGHT, view.simulator.aircraft.geometry.b), float(view.record["V"].mean())
+    gusts = model.realisation(course.altitude.size, view.simulator.rate, speed, random)
+    begins = np.asarray(course.begins)
+    origin = np.maximum.accumulate(np.where(begins, np.arange(begins.size), 0))
+    seen = slice(0, 1) if view.flight.inferred else slice(1, 3)
+    usual = _power((gusts - gusts[origin])[:, seen])
+    read = noise[:, [OUTPUTS.index(name) for name in ("V", "beta", "alpha")]] * [1.0, speed, speed]
+    moved = max(_power(shown[:, seen]) - _power((read - read[origin[: len(read)]])[:, seen]), 0.0)
+    gusts *= np.sqrt(moved / usual)
+    across = [float(name in view.flight.inferred) for name in ("V", "beta", "alpha")]
+    return gusts[:, :3] * across, gusts[:, 3:]
+
+
+def _unseen(view: View, moving: Array) -> Array:
+    """What air that moves so (N, 3) does to readings (N, 12) of the flow angles, and what no vane reads."""
+    angles = np.zeros((len(view.record), len(OUTPUTS)))
+    angles[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]] = -moving[: len(angles), 1:] / view.record["V"][:, None]
+    return angles
+
+
+def _power(velocity: Array) -> float:
+    return float((velocity**2).sum(axis=1).mean())
+
+
+def _recorded(view: View, course: Course, readings: Array, noise: dict[str, Array]) -> Course:
+    """Readings (N, 12) as the instruments would have recorded them, with the commands as noisy as the flight's."""
+    turning = _rates_of_change(readings[:, 3:6], np.asarray(course.begins), view.simulator.step)
+    symbols = [*view.simulator.layout.symbols, *(["thrust"] if view.simulator.aircraft.throttle else [])]
+    commands = np.asarray(course.commands).copy()
+    commands[: len(readings), : len(symbols)] += np.column_stack([noise[s] for s in symbols])
+    short = course.altitude.size - len(readings)
+    parts = [*np.split(readings, (3, 6, 9), axis=1), turning]
+    force, rates, attitude, air, turned = (jnp.pad(jnp.asarray(p), ((0, short), (0, 0)), mode="edge") for p in parts)
+    return course._replace(motion=Motion(force, rates, turned, air, attitude), commands=jnp.asarray(commands))
+
+
+def _rates_of_change(rates: Array, begins: Array, step: float) -> Array:
+    """d/dt (N, 3) of rates (N, 3) that jump where short flights begin."""
+    starts = np.flatnonzero(begins[: len(rates)])
+    pieces = [p for p in np.split(rates, starts[1:]) if len(p)]
+    return np.concatenate([np.gradient(p, step, axis=0) if len(p) > 1 else np.zeros_like(p) for p in pieces])

@@ -1,0 +1,192 @@
+"""How far off the simulator is when it is flown beside the flight, and how far that shrinks: errors of short flights.
+
+Error of a reading: root mean square of simulated minus measured, over the root mean square of the measured motion about
+its mean in each short flight. Overall: the root mean square over the readings that moved. The noise floor is what a
+simulator with nothing wrong would leave (``unavoidable``). Intervals: block bootstrap over the short flights (Kuensch
+(1989), Annals of Statistics 17(3)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.predictive_density import Evidence, groups_of
+from sysid_node.gap.flightdata import thrust
+from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.validation.multiple_shooting import Course, beside, course_of, off
+from sysid_node.gap.validation.noise_floor import unavoidable
+from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
+from sysid_node.sim.model.layout import OUTPUTS
+
+#: Length of a short flight, s: a short period or two of a small aircraft, over before drift counts.
+WINDOW = 2.0
+
+#: Readings that are compared: heading only repeats the yaw rate.
+READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
+
+_COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
+
+#: What a flight without lateral measurements shows.
+_LONGITUDINAL = frozenset({"ax", "az", "q", "theta", "V", "alpha"})
+
+#: A reading counts where it moved by so many times the power of its noise.
+_MOVED = 4.0
+
+#: How much larger than foreseen an error may be by chance: the scatter of half a minute of turbulence is a quarter.
+BY_CHANCE = 1.5
+
+#: Bootstrap draws, and short flights in a row that are drawn together.
+_DRAWS, _BLOCK = 2000, 2
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A flight and the simulator beside it, N samples: readings (N, 12), columns ``layout.OUTPUTS``."""
+
+    time: Array  # s
+    measured: Array
+    before: Array
+    after: Array
+    begins: NDArray[np.bool_]
+
+
+def flown(base: Evidence, final: Evidence) -> Gap | None:
+    """The gap on the flights of some evidence.
+
+    None without attitude, where no flight is long enough, or where the simulator departs within a short flight.
+    """
+    found = zip(final.views, base.points, final.points, strict=True)
+    tables = [_table(*parts) for parts in found if shows(parts[0])]
+    if not tables or not all(np.isfinite(table).all() for table in tables):
+        return None
+    motion, noise, *errors = np.concatenate(tables, axis=1)
+    lateral = all(view.flight.lateral for view in final.views)
+    unread = {angle for view in final.views for angle in view.flight.inferred}
+    unread |= thrust.READINGS if any(not view.flight.metered for view in final.views) else set()
+    counted = np.array([(lateral or name in _LONGITUDINAL) and name not in unread for name in READINGS])
+    counted &= motion.mean(axis=0) > _MOVED * noise.mean(axis=0)
+    if not counted.any():
+        return None
+    return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
+
+
+def foreseen(views: Sequence[View]) -> bool:
+    """Whether the file's own simulator, in such air and with such sensors, would be off as far in every reading.
+
+    Then there is nothing to blame, however well an effect would mimic the weather.
+    """
+    tables = [_table(v, *[[v.simulator.neutral()] * len(groups_of(v))] * 2) for v in views if shows(v)]
+    if not tables or not all(np.isfinite(table).all() for table in tables):
+        return False
+    _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
+    return bool((before <= BY_CHANCE**2 * np.mean(floors, axis=0)).all())
+
+
+def shows(view: View) -> bool:
+    """Whether a flight can be flown beside: its attitude was measured, and it is long enough."""
+    return motion_of(view.record) is not None and len(view.record) >= _size(view)
+
+
+def drawn(view: View, points: Sequence[Array]) -> Drawn:
+    """A flight with the file's simulator and the corrected one beside it; ``points`` by group of windows."""
+    course, neutral = course_of(view, _size(view)), view.simulator.neutral()
+    _, measured, _ = beside(view, neutral, course)
+    before, after = (measured - e for e in (off(view, neutral, course), _errors(view, points, course)))
+    return Drawn(view.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
+
+
+def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
+    """Of motion (S, R) and errors (3 + K, S, R), mean squares by short flight and reading.
+
+    The last K are what as many flights of the simulator itself leave. What noise leaves of this flight is one more like
+    them, no one knows which: so each draw takes one.
+    """
+    whole = _shares(motion, np.concatenate([errors[:3], errors[3:].mean(axis=0, keepdims=True)]))
+    random = np.random.default_rng(0)
+    overall, draws = _overall(whole), list[Array]()
+    centred = np.append(np.ones(3), _floored(overall)[3] / overall[3])  # draws scatter about what is stated
+    for windows in _blocks(len(motion), random):
+        taken = errors[[0, 1, 2, int(random.integers(3, len(errors)))]]
+        draws.append(_floored(centred * _overall(_shares(motion[windows], taken[:, windows]))))
+    own = {name: dict(zip(STAGES, _floored(whole[:, r]).tolist(), strict=True)) for r, name in enumerate(names)}
+    return gap_from(_floored(overall), np.array(draws), own)
+
+
+def _floored(errors: Array) -> Array:
+    """Errors (4,): what is left cannot be less than the floor, so the floor cannot be more."""
+    return np.append(errors[:3], errors.min())
+
+
+def _shares(motion: Array, errors: Array) -> Array:
+    """Errors (4, R) as shares of the motion."""
+    return np.asarray(np.sqrt(errors.mean(axis=1) / motion.mean(axis=0)))
+
+
+def _overall(shares: Array) -> Array:
+    return np.asarray(np.sqrt((shares**2).mean(axis=-1)))
+
+
+def _blocks(count: int, random: np.random.Generator) -> NDArray[np.intp]:
+    """Draws (D, count) of short flights, a few in a row together; the last are followed by the first."""
+    size = min(_BLOCK, count)
+    starts = random.integers(count, size=(_DRAWS, -(-count // size)))
+    return np.asarray((starts[..., None] + np.arange(size)).reshape(_DRAWS, -1)[:, :count] % count)
+
+
+def _table(view: View, base: Sequence[Array], final: Sequence[Array]) -> Array:
+    """Mean squares (5 + K, S, R) by short flight.
+
+    Of the motion, of the sensors' noise, of the errors of the file, of the derivatives within their tolerances and with
+    the causes, and of what is left of each of K flights of the simulator itself.
+    """
+    course, neutral = course_of(view, _size(view)), view.simulator.neutral()
+    measured = _cut(view, beside(view, neutral, course)[1])
+    errors = [_squares(view, _errors(view, points, course)) for points in ([neutral] * len(base), base, final)]
+    floors, noise = zip(*unavoidable(view, final[len(final) // 2], course), strict=True)
+    motion = ((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
+    sensors = np.mean([_squares(view, each) for each in noise], axis=0)
+    return np.stack([motion, sensors, *errors, *(_squares(view, floor) for floor in floors)])
+
+
+def _errors(view: View, points: Sequence[Array], course: Course) -> Array:
+    """Measured minus simulated (N, 12), each short flight with the parameters that it was not fitted to."""
+    size, windows = _size(view), view.windows
+    edges = [windows.slices[group[0]].start + windows.size / 4 for group in groups_of(view)][1:]
+    middles = np.arange(len(view.record)) // size * size + size // 2
+    owner = np.searchsorted(np.array(edges), middles, side="right")
+    error = np.empty((len(view.record), len(OUTPUTS)))
+    for mine, theta in _distinct(points):
+        chosen = np.isin(owner, mine)
+        error[chosen] = off(view, theta, course)[chosen]
+    return error
+
+
+def _distinct(points: Sequence[Array]) -> list[tuple[list[int], Array]]:
+    """Points that differ, each with the places where it stands."""
+    places: dict[bytes, list[int]] = {}
+    for place, point in enumerate(points):
+        places.setdefault(np.ascontiguousarray(point).tobytes(), []).append(place)
+    return [(own, points[own[0]]) for own in places.values()]
+
+
+def _size(view: View) -> int:
+    """Samples of a short flight."""
+    return round(WINDOW * view.simulator.rate)
+
+
+def _cut(view: View, series: Array) -> Array:
+    """A series (N, 12) by short flight (S, samples, R)."""
+    size = _size(view)
+    count = len(series) // size
+    return np.asarray(series[: count * size, _COLUMNS].reshape(count, size, len(_COLUMNS)))
+
+
+def _squares(view: View, series: Array) -> Array:
+    """Mean squares (S, R) of a series (N, 12) by short flight."""
+    return np.asarray((_cut(view, series) ** 2).mean(axis=1))

@@ -1,0 +1,109 @@
+"""How far the gap shrinks: the simulator's error on flight not fitted, before and after, beside what noise leaves.
+
+The error of a channel is the root of its residual's power, up to 4 Hz, over the power of its motion about the mean, in
+windows of ``spectra.LENGTH`` seconds; all channels that were moved count alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.predictive_density import Evidence, groups_of
+from sysid_node.gap.instruments.overidentification import Structure
+from sysid_node.gap.residuals.residual_model import CHANNELS, View
+from sysid_node.gap.residuals.windowed_spectra import Complex, power_of
+
+#: A channel counts where its own power is so many times the sensors' noise.
+_MOVED = 4.0
+
+_DRAWS = 2000
+
+
+#: The errors of a gap, in order.
+STAGES = ("before", "tolerances", "after", "noise_floor")
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Root-mean-square errors as shares of what was measured, overall and by channel, with 95 % intervals."""
+
+    before: float
+    tolerances: float  # with derivatives and biases fitted within their tolerances, no effect
+    after: float
+    noise_floor: float
+    shrink_percent: float
+    ci95: Interval  # of the shrinkage
+    per_channel: dict[str, dict[str, float]]
+    intervals: dict[str, Interval]  # of the four errors, by name
+
+
+def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, after: Evidence, left: Structure) -> Gap:
+    """The gap on flights not fitted, from their residuals (W, L, 12) as the file has it, then as fitted."""
+    groups = [(i, group) for i, view in enumerate(views) for group in groups_of(view)]
+    measured = np.array([(np.abs(views[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
+    noise = np.array([len(g) * (views[i].noise.sum(axis=0) - 0.5 * views[i].noise[0]) for i, g in groups])
+    stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
+    counted = views[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
+
+    def errors(weight: Array, share: Array) -> Array:
+        """Overall errors (4,) at weights (G,) of the groups, where such a share (12,) of the remainder is structure."""
+        floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - share)), np.minimum(stages[0], stages[1]))
+        table = np.stack([*stages, floor])  # (4, groups, 12)
+        shares = (table * weight[:, None]).sum(axis=1) / np.maximum((measured * weight[:, None]).sum(axis=0), 1e-300)
+        return np.asarray(np.sqrt(shares[:, counted].mean(axis=1))) if counted.any() else np.zeros(4)
+
+    all_equal, structured = np.ones(len(groups)), np.clip(left.share, 0.0, 1.0)
+    overall = errors(all_equal, structured)
+    drawn = _bootstrap(errors, left, len(groups))
+    floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - structured)), np.minimum(stages[0], stages[1]))
+    table = np.stack([*stages, floor])
+    own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
+    channels = {c: dict(zip(STAGES, own[:, k].tolist(), strict=True)) for k, c in enumerate(CHANNELS) if counted[k]}
+    return gap_from(overall, drawn, channels)
+
+
+def gap_from(overall: Array, drawn: Array, channels: dict[str, dict[str, float]]) -> Gap:
+    """Of the errors (4,), draws (D, 4) of these, and those of each channel."""
+    values = dict(zip(STAGES, overall.tolist(), strict=True))
+    intervals = {name: interval(drawn[:, k]) for k, name in enumerate(STAGES)}
+    shrink = float(shrinkage(overall))
+    return Gap(**values, shrink_percent=shrink, ci95=interval(shrinkage(drawn)), per_channel=channels,
+               intervals=intervals)  # fmt: skip
+
+
+def interval(drawn: Array) -> Interval:
+    """95 % of draws (D,)."""
+    low, high = np.percentile(drawn, [2.5, 97.5]).tolist()
+    return low, high
+
+
+def _bootstrap(errors: Callable[[Array, Array], Array], left: Structure, groups: int) -> Array:
+    """Errors (D, 4) in bootstraps of the groups, the structure left as uncertain as chance makes it."""
+    random = np.random.default_rng(0)
+    draws = random.multinomial(groups, np.ones(groups) / groups, _DRAWS)
+    shares = left.beyond + random.standard_normal((_DRAWS, left.chance.size)) * left.chance
+    shares = np.clip(shares / np.maximum(left.total, 1e-300), 0.0, 1.0)
+    return np.array([errors(d.astype(float), share) for d, share in zip(draws, shares, strict=True)])
+
+
+def shrinkage(errors: Array) -> Array:
+    """Percent (...,) of what could be closed that is, of errors (..., 4).
+
+    Nothing could where the gap is not above the floor.
+    """
+    before, _, after, floor = np.moveaxis(errors, -1, 0)
+    room = before - floor
+    open_ = room > 1e-9 * floor
+    return np.asarray(np.where(open_, 100.0 * ((before - after) / np.where(open_, room, 1.0)), 0.0))
+
+
+def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:
+    """Power (G, 12) by group."""
+    return np.array([power_of(amplitudes[i][g]) for i, g in groups])

@@ -1,0 +1,41 @@
+"""Standard errors that take neither the remainder's word for being noise, nor the model for the aircraft.
+
+White in its own spectrum, the remainder would make the inverse of the information the covariance. What the model lacks
+repeats itself from window to window instead; so what groups of windows alone would change is summed, and its scatter
+from group to group is taken where it is more (White (1982), Econometrica 50(1); by clusters: Liang & Zeger (1986),
+Biometrika 73(1)).
+
+What an aircraft has beside the effects of the list moves a size alike in every window, and no scatter shows it. So a
+size is off by a share of itself, too, which is learned from plants of another make (``bench/gap_sizes.py``; a
+discrepancy of the model: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63(3)).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.fit import Fit, onsets
+from sysid_node.gap.estimation.predictive_density import groups_of
+from sysid_node.gap.instruments.liml import responses
+from sysid_node.gap.selection.onset import uncertainty
+
+#: Share of itself by which a size is off beyond chance, 1 sigma.
+DISCREPANCY = 0.03
+
+
+def stated(name: str, value: float, error: float) -> list[float]:
+    """A parameter's value and its standard error by chance and by the model together; a moment in time is no size."""
+    return [value, error if name == "onset" else float(np.hypot(error, DISCREPANCY * value))]
+
+
+def standard_errors(fit: Fit) -> Array:
+    """Of all unknowns (unknowns,) by chance alone, of a fit as ``sizes.unbiased`` leaves it."""
+    steps = np.array([part[group].sum(axis=0) for view, part in zip(fit.views, responses(fit), strict=True)
+                      for group in groups_of(view)])  # fmt: skip
+    steps = steps - steps.mean(axis=0)
+    scatter = (steps**2).sum(axis=0) * len(steps) / max(len(steps) - 1, 1)
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), scatter))
+    for place in onsets(fit):
+        errors[place] = uncertainty(fit, place)
+    return np.asarray(errors)

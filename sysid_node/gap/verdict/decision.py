@@ -1,0 +1,144 @@
+"""The verdict: from what was accepted, what is left over, and what flight not fitted says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.fit import Fit
+from sysid_node.gap.estimation.nuisances import CLOCKS
+from sysid_node.gap.estimation.predictive_density import Evidence
+from sysid_node.gap.instruments.excitation import purposeful
+from sysid_node.gap.instruments.overidentification import CHANCE
+from sysid_node.gap.residuals.admissibility import excitation
+from sysid_node.gap.residuals.residual_model import CHANNELS, View
+from sysid_node.gap.residuals.windowed_spectra import power_of
+from sysid_node.gap.selection.acceptance import NOTICED, power_left
+from sysid_node.gap.selection.causes import Cause
+from sysid_node.gap.selection.forward_selection import Attribution
+from sysid_node.gap.validation.holdout import Check
+from sysid_node.gap.validation.simulation_error import BY_CHANCE
+
+#: Probability from which an effect counts as told apart from its rivals.
+_TOLD_APART = 0.8
+
+#: Standard deviations above chance from which what is left on some axis is structure, of twelve axes.
+_DEVIATIONS = 4.5
+
+#: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
+_EXPLAINED = 0.8
+
+#: Percentage of what could be closed, below which what was found surely falls short of it.
+_ALL_BUT = 90.0
+
+#: Error beyond the noise, as a share of the motion, that derivatives within their tolerances may not leave.
+_LEFT = 0.1
+
+#: A rival with this probability is named.
+_NAMED = 0.03
+
+#: Power over the sensors' noise below which a flight tells nothing.
+_TELLING = 6.0
+
+
+def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) -> str:
+    """One of gap.json's five words."""
+    if max(excitation(view).max() for view in views) < _TELLING:
+        return "unsupported"
+    if check.foreseen or not any(purposeful(view) for view in views):
+        return "no_gap" if check.foreseen else "unsupported"
+    if not attribution.causes:
+        return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
+    if short(check) or check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
+        return "unknown_effect"
+    if unexplained(attribution) or wanting(attribution):
+        return "unknown_effect"
+    return "explained" if all(cause.share >= _TOLD_APART for cause in attribution.causes) else "ambiguous"
+
+
+def structured(attribution: Attribution) -> bool:
+    """Whether what is left holds structure that matters."""
+    return bool(_structured(attribution).any())
+
+
+def wanting(attribution: Attribution) -> bool:
+    """Whether something is there that the likeliest effect accounts for by most, but not by its own law.
+
+    Not where another took its place: that is what is there.
+    """
+    return any(cause.grounds.wanting and not cause.made_way for cause in attribution.doubted)
+
+
+def far_off(check: Check) -> bool:
+    """Whether the simulator is further off than chance, noise and weather make it, with nothing found to blame.
+
+    However much of the gap the derivatives close, where surely a tenth of the motion is left beyond the noise.
+    """
+    gap = check.flown
+    surely = gap is not None and gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > _LEFT**2
+    return surely or short(check)
+
+
+def short(check: Check) -> bool:
+    """Whether what was found surely falls short of what could be closed, by more than chance leaves."""
+    gap = check.flown
+    return gap is not None and gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT
+
+
+def unexplained(attribution: Attribution) -> bool:
+    """Whether on some channel structure that matters is left, and more of it than all causes take away there."""
+    more = _structure_left(attribution) > sum(cause.taken for cause in attribution.causes) / _motion(
+        attribution.chosen.evidence
+    )
+    return bool(np.any(_structured(attribution) & more))
+
+
+def _structured(attribution: Attribution) -> NDArray[np.bool_]:
+    """Channels (12,) on which structure that matters is left."""
+    power, noticed = _structure_left(attribution), NOTICED**2 + _sampling(attribution.chosen.fit)
+    return np.asarray((attribution.left.deviations > _DEVIATIONS) & (power > noticed))
+
+
+def explained(attribution: Attribution) -> float:
+    """Share that the effects take away of what lies above the tolerances and is not noise, all channels together."""
+    motion = _motion(attribution.chosen.evidence)
+    gone = (power_left(attribution.base.evidence) - power_left(attribution.chosen.evidence)) / motion
+    taken = max(float(gone.sum()), 0.0)
+    whole = taken + float(_structure_left(attribution).sum())
+    return taken / whole if whole > 0.0 else 1.0
+
+
+def _structure_left(attribution: Attribution) -> Array:
+    """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
+    left, evidence = attribution.left, attribution.chosen.evidence
+    share = np.where(left.deviations > CHANCE, left.share, 0.0)
+    return np.asarray(share * power_left(evidence) / _motion(evidence))
+
+
+def _sampling(fit: Fit) -> Array:
+    """Power (12,) that stamps leave which are off by chance within a sample, as shares of the motion.
+
+    A step in a command falls anywhere between two messages, each time elsewhere: no clock's error is it, and coherent
+    with the commands it is.
+    """
+    left, motion = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
+    for view, point in zip(fit.views, fit.points, strict=True):
+        rates = np.array([view.flight.actuator_rate, view.flight.air_rate])
+        slopes = view.slopes(point, [view.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
+        left += sum(power_of(slopes[..., i]) / (12.0 * rate**2) for i, rate in enumerate(rates))
+        motion += (np.abs(view.measured[:, 1:]) ** 2).sum(axis=(0, 1))
+    return left / np.maximum(motion, 1e-300)
+
+
+def _motion(evidence: Evidence) -> Array:
+    """Power (12,) of what was measured, about the windows' means."""
+    power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.views)
+    return np.asarray(np.maximum(power, 1e-300))
+
+
+def named(cause: Cause) -> list[str]:
+    """Effects that are named beside a cause."""
+    return [effect for effect, p in cause.alternatives if p > _NAMED]

@@ -1,0 +1,189 @@
+"""What to fly next: of a handful of manoeuvres, the one that parts most what this flight confuses.
+
+Each is flown by the simulator as it was corrected, in still air. The separation of a cause from a rival is what stays
+of the cause's response, in standard deviations of the sensors' noise, when the rival, the derivatives within their
+tolerances and the biases have mimicked it as well as they can (the distance between two models that is left to an
+experiment: Atkinson & Fedorov (1975), Biometrika 62(1), linearised).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.errors import InputError
+from sysid_node.excite.manoeuvre import THROTTLE
+from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.gap.estimation.candidates import Candidate, prior
+from sysid_node.gap.estimation.fit import Fit, real_rows, weights
+from sysid_node.gap.flightdata.gap_flight import thinned
+from sysid_node.gap.residuals.build import view_like
+from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.selection.candidate_fitter import Trial
+from sysid_node.gap.selection.causes import Cause
+from sysid_node.gap.selection.forward_selection import Attribution
+from sysid_node.gap.verdict.decision import named
+from sysid_node.sim import Simulator
+from sysid_node.sim.flying.sortie import Conditions, fly_sortie
+from sysid_node.sim.signals.atmosphere import air_density
+
+#: Amplitude of the proposed deflections, as a share of each surface's limit, unless the words say otherwise.
+_USUAL = 0.2
+
+#: Words, shape, width or length (s), share of the usual amplitude, whether the throttle is stepped too.
+_PROPOSALS = (
+    ("3-2-1-1 on each surface in turn", "3211", 0.3, 1.0, False),
+    ("quick 3-2-1-1 on each surface in turn, 0.12 s the shortest step", "3211", 0.12, 1.2, False),
+    ("slow 3-2-1-1 on each surface in turn, 0.8 s the shortest step", "3211", 0.8, 0.7, False),
+    ("3-2-1-1 on each surface in turn at twice the usual deflection", "3211", 0.3, 2.0, False),
+    ("3-2-1-1 on each surface in turn at half the usual deflection", "3211", 0.3, 0.5, False),
+    ("3-2-1-1 on each surface in turn while the throttle is stepped up and down", "3211", 0.3, 1.0, True),
+)
+
+#: Separation, in standard deviations, from which a flight tells two effects apart.
+_PARTED = 3.0
+
+#: What to fly where no pair of effects is in doubt.
+_LARGER = "3-2-1-1 on each surface in turn, larger and at two airspeeds, in still air"
+
+#: Amplitude of the throttle's steps, of full throttle.
+_THROTTLE_STEP = 0.25
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A manoeuvre in words, and the least separation (sigmas) of any pair; that of the flight that was flown."""
+
+    words: str
+    separation: float
+    flown: float
+
+
+def advice(verdict: str, attribution: Attribution) -> str:
+    """What to fly, by what is in doubt."""
+    if verdict == "no_gap":
+        return ""
+    pairs = [(cause.candidate, rival.fit) for cause in attribution.causes for rival in _confused(cause)]
+    if not pairs:
+        return "" if verdict == "explained" else _LARGER
+    best = propose(attribution.chosen.fit, pairs)
+    if best is None:
+        return _LARGER
+    if best.separation < _PARTED:
+        return (
+            f"no manoeuvre parts {_listed(attribution)} (at most {best.separation:.2g} standard deviations): what they "
+            "do in flight is the same; measure on the ground"
+        )
+    if best.separation <= best.flown:
+        return (
+            f"the same again, longer and in still air: no other manoeuvre parts {_listed(attribution)} better than "
+            f"those flown ({best.flown:.3g} standard deviations of the sensors' noise)"
+        )
+    return (
+        f"{best.words}, in still air: parts {_listed(attribution)} by {best.separation:.3g} standard deviations or "
+        f"more, the manoeuvres flown by {best.flown:.3g}"
+    )
+
+
+def _listed(attribution: Attribution) -> str:
+    """The causes in doubt and what is named beside them."""
+    doubtful = [cause for cause in attribution.causes if named(cause)]
+    return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause))))
+
+
+def _confused(cause: Cause) -> list[Trial]:
+    """The best trial of each effect that is named beside a cause."""
+    best: dict[str, Trial] = {}
+    for trial in cause.rivals:
+        if trial.added is not None and trial.added.effect in named(cause):
+            best.setdefault(trial.added.effect, trial)
+    return list(best.values())
+
+
+def propose(fit: Fit, pairs: Sequence[tuple[Candidate, Fit]]) -> Proposal | None:
+    """The best of the proposals for pairs of a cause and the fit of its rival; None where none can be flown."""
+    view = fit.views[0]
+    flown = min(_separation(view, fit.points[0], *pair, fit) for pair in pairs)
+    found: list[Proposal] = []
+    for words, shape, width, share, throttle in _PROPOSALS:
+        try:
+            planned = _flown(view, fit, _specs(view, shape, width, share, throttle))
+        except InputError:
+            continue  # beyond a limit, or it diverges: not a flight to propose
+        found.append(Proposal(words, min(_separation(planned, fit.points[0], *p, fit) for p in pairs), flown))
+    return max(found, key=lambda proposal: proposal.separation, default=None)
+
+
+def _specs(view: View, shape: str, width: float, share: float, throttle: bool) -> list[str]:
+    """The manoeuvre as ``sysid excite`` takes it: surfaces in turn, every twelve seconds again."""
+    aircraft, duration = view.simulator.aircraft, view.record.duration
+    surfaces = list(aircraft.controls)
+    every = 4.0 * len(surfaces)
+    specs = []
+    for i, surface in enumerate(surfaces):
+        start = 1.0 + 4.0 * i
+        repeat = max(1, int((duration - start - 7.0 * width) // every) + 1)
+        amplitude = share * _USUAL * (aircraft.controls[surface].limit or 0.3)
+        specs.append(f"{shape}:{surface}:amplitude={amplitude:.4g}:width={width:g}:start={start:g}:every={every:g}:"
+                     f"repeat={repeat}")  # fmt: skip
+    if throttle and aircraft.throttle:
+        specs.append(f"doublet:throttle:amplitude={_THROTTLE_STEP}:width=3:start=2:every=10:"
+                     f"repeat={max(1, int((duration - 8.0) // 10.0) + 1)}")  # fmt: skip
+    return specs
+
+
+def _flown(view: View, fit: Fit, specs: list[str]) -> View:
+    """The manoeuvre as the corrected simulator flies it in still air, seen as the flight was. Raises InputError."""
+    simulator, record = view.simulator, view.record
+    plan = parse_manoeuvre(specs, simulator.aircraft, simulator.rate, record.duration)
+    deflections = np.zeros((len(record), len(simulator.commands)))
+    deflections[:, :-1] = plan.surfaces()[: len(record)]
+    throttle = simulator.aircraft.throttle
+    if THROTTLE in plan.deflections and throttle is not None:
+        deflections[:, -1] = (throttle.max_thrust or 1.0) * plan.deflections[THROTTLE][: len(record)]
+    sortie = fly_sortie(simulator, deflections, Conditions(_effects(simulator, fit.points[0]), noise=0.0))
+    outputs = np.asarray(sortie.flight.outputs)
+    columns = {name: outputs[:, i] for i, name in enumerate(simulator.outputs)}
+    columns |= {name: np.asarray(sortie.flight.commands)[:, i] for i, name in enumerate(_symbols(simulator))}
+    columns["rho"] = np.asarray(air_density(-jnp.asarray(sortie.flight.states)[:, 2]))
+    flight = replace(view.flight, record=FlightRecord(record.time, columns), imu_rate=simulator.rate, source="")
+    return view_like(view, thinned(flight, simulator.rate))
+
+
+def _symbols(simulator: Simulator) -> tuple[str, ...]:
+    return (*simulator.layout.symbols, "thrust")
+
+
+def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
+    """The effects of a parameter vector that do something, but the sensors' biases."""
+    neutral, found = simulator.neutral(), dict[str, dict[str, float]]()
+    acting = {e for i, (e, p) in enumerate(simulator.parameters) if p.switch and point[i] != neutral[i]}
+    for i, (effect, parameter) in enumerate(simulator.parameters):
+        if effect in acting:
+            found.setdefault(effect, {})[parameter.name] = float(np.clip(point[i], parameter.lower, parameter.upper))
+    return found
+
+
+def _separation(view: View, point: Array, cause: Candidate, rival: Fit, fit: Fit) -> float:
+    """Of a cause's response from the nearest that its rival and the nuisances can do, in standard deviations."""
+    neutral = view.simulator.neutral()
+    own = list(cause.entries)
+    without, instead = point.copy(), point.copy()
+    without[own] = neutral[own]
+    instead[own] = neutral[own]
+    added = [i for i in rival.indices if i not in fit.indices]
+    instead[added] = rival.points[0][added]
+    weight = weights(view.windows, np.where(view.axes, view.noise, 1.0))
+    response = real_rows(view.predicted(point) - view.predicted(instead), weight).ravel()
+    moving = [*added, *(i for i in fit.nuisances.indices if i not in own)]
+    slopes = real_rows(view.slopes(instead, moving), weight).reshape(response.size, -1)
+    known = dict(zip(fit.nuisances.indices, fit.nuisances.sigma, strict=True))
+    sigma = np.array([*prior(view.simulator, added)[1], *(known[i] for i in moving[len(added) :])])
+    matrix = np.vstack([slopes, np.diag(1.0 / sigma)])
+    target = np.concatenate([response, np.zeros(sigma.size)])
+    best = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    return float(np.linalg.norm(target - matrix @ best))

@@ -1,0 +1,87 @@
+"""What well-excited flight has said: finished segments in which the controls moved most.
+
+In quiet flight the surfaces only answer the motion that gusts make, and an autopilot's answers are correlated with the
+gusts: estimates from long quiet flight are biased, and the next manoeuvre contradicts them though nothing has changed
+(Soderstrom & Stoica, "System Identification", 1989, ch. 10, on feedback without external excitation). An aircraft has
+changed only if it contradicts its own earlier manoeuvres, too.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online.changes.score_test import Reference
+from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.regression import least_squares
+from sysid_node.online.regression.information import Information
+from sysid_node.online.regression.least_squares import Plan
+
+Array = NDArray[np.float64]
+
+COMPARABLE = 0.3  # share of the largest energy of a control from which a segment counts
+KEPT = 12  # segments remembered
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One finished segment."""
+
+    end: float  # s
+    energy: Array  # of each control
+    said: Information
+
+
+@dataclass
+class Experience:
+    """Of one block of equations: the last segments in which any of its controls moved much."""
+
+    controls: NDArray[np.intp]  # columns of the block's controls
+    segments: deque[Segment] = field(default_factory=lambda: deque(maxlen=KEPT))
+
+    def peaks(self) -> Array:
+        """(m,) the largest energy of each control in a segment."""
+        return np.asarray(np.max([np.zeros(self.controls.size), *(s.energy for s in self.segments)], axis=0))
+
+    def within_reach(self, energy: Array) -> bool:
+        """Whether a control moved much, beside how much it ever did."""
+        return bool((energy > COMPARABLE * self.peaks()).any())
+
+    def beyond(self, energy: Array) -> bool:
+        """Whether a control moved much more than it ever did."""
+        return bool((COMPARABLE * energy > self.peaks()).any())
+
+
+def experiences(plan: Plan, layout: Layout) -> list[Experience]:
+    """None as yet, for each block of the plan."""
+    blocks = (plan.columns[plan.group == block] for block in range(int(plan.group.max()) + 1))
+    moved = np.arange(layout.width)[layout.deflections]
+    return [Experience(columns[np.isin(columns, moved)]) for columns in blocks]
+
+
+def learn(known: Sequence[Experience], said: Information, end: float) -> None:
+    """Remember a segment that ended at ``end`` (s) where its controls moved much."""
+    energies = said.grams.sum(axis=0).diagonal()
+    for experience in known:
+        energy = energies[experience.controls]
+        if experience.within_reach(energy):
+            experience.segments.append(Segment(end, energy, said))
+
+
+def recall(experience: Experience, full: Plan, since: float, before: float) -> Reference | None:
+    """The estimates by the well-excited segments that ended in ``since``..``before`` (s); None where there are none."""
+    chosen = [s for s in experience.segments if since < s.end <= before + 1e-6 and experience.within_reach(s.energy)]
+    if not chosen:
+        return None
+    said = chosen[0].said
+    for segment in chosen[1:]:
+        said = said + segment.said
+    gram = said.grams.sum(axis=0)
+    hold = least_squares.hold(full, least_squares.solve(full, gram), said)
+    plan = least_squares.trusting(full, hold.strength)
+    solution = least_squares.solve(plan, gram)
+    return Reference(chosen[-1].end, plan, solution, least_squares.uncertainty(plan, solution, said))

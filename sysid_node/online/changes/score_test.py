@@ -1,0 +1,146 @@
+"""How strongly a stretch of flight contradicts the estimates from before it.
+
+With the earlier estimates theta the residual r = y - A theta of the stretch's lines is noise, and while nothing has
+changed the score Z'r has zero mean and the covariance S Z'KZ + G C G' (Z: the instruments, or the regressors A
+themselves, whichever the estimates were solved with; C: the estimates' covariance; G = Z'A; S K: the noise's). So
+
+    F = (Z'r)' [S Z'KZ + G C G']^-1 (Z'r) / p
+
+is Fisher's F with p and the residual density's degrees of freedom. It needs no strong instruments: where they are weak,
+C is large (the test of Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). Instruments from the deflections
+hold nothing of the gusts, so gusts are no contradiction. Over stretches shorter than the period of the line spacing
+Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no derivatives explain of the stretch
+itself: air that has become rougher is no contradiction either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
+from scipy.special import fdtrc
+
+from sysid_node.online.regression.information import Spectrum
+from sysid_node.online.regression.least_squares import TINY, Plan, Solution, Uncertainty
+
+Array = NDArray[np.float64]
+
+LEAST = 0.1  # share of a stretch's energy that at least counts as the noise's, however many unknowns it has
+RIDGE = 1e-9  # share by which what did not move is set apart
+NUISANCES = 3  # lines that offset, constant and drift take up
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The estimates as they stood at one time (s), and by which equations."""
+
+    time: float
+    plan: Plan
+    solution: Solution
+    uncertainty: Uncertainty
+
+    @classmethod
+    def stacked(cls, some: Sequence[Reference]) -> Reference:
+        """Estimates by the same equations with an axis in front."""
+        solution = Solution(*_columns([one.solution for one in some]))
+        return cls(some[0].time, some[0].plan, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
+
+
+def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
+    """Each field of the rows, with an axis in front."""
+    return (np.array([getattr(row, field.name) for row in rows]) for field in fields(rows[0]))
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Of C coefficients over one stretch, or over each of several (...)."""
+
+    statistic: Array  # (..., C) F
+    count: Array  # (C,) derivatives, its first degrees of freedom
+    freedom: Array  # (..., C) its second
+    unexplained: Array  # (..., C) density that no derivatives explain, over the usual one
+    share: Array  # (..., C) of the motion's energy that no derivatives explain
+
+    def chance(self, margin: Array | float) -> Array:
+        """(..., C) probability of a statistic so large, ``margin`` times over, where nothing has changed."""
+        return np.asarray(fdtrc(self.count, np.maximum(self.freedom, 1.0), self.statistic / margin))
+
+    def each(self) -> Iterator[Contradiction]:
+        """Those of the several stretches, one by one."""
+        freedom = np.broadcast_to(self.freedom, self.statistic.shape)
+        for some in zip(self.statistic, freedom, self.unexplained, self.share, strict=True):
+            yield Contradiction(some[0], self.count, *some[1:])
+
+
+def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, duration: Any) -> Contradiction:
+    """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
+    plan, known = reference.plan, reference.uncertainty
+    density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
+    gram = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
+    regressed = gram.take(plan.columns, axis=-1)
+    left_over = gram.take(plan.outputs, axis=-1) - regressed @ reference.solution.theta
+    count = plan.mine.sum(axis=0)
+    rest = _unexplained(plan, reference, regressed, left_over)
+    energy = 0.5 * lines.shape[-2] * np.asarray(duration)[..., None]
+    density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
+    excess = density / np.maximum(known.density, TINY)
+    Z = lines.take(plan.instruments, axis=-1)[..., None, :, :]
+    of_each = _band_of_each(tuple(band.stop for band in spectrum.bands))
+    noise = (Z.swapaxes(-1, -2) * known.bands.take(of_each, axis=-1)[..., None, :]) @ Z
+    noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
+    G = (regressed.take(plan.instruments, axis=-2) * plan.same)[..., None, :, :]
+    spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
+    score = (left_over.take(plan.instruments, axis=-2) * plan.mine).swapaxes(-1, -2)
+    motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(plan.outputs, axis=-1), TINY)
+    return Contradiction(_normalised(plan, spread, score) / count, count, known.freedom, excess, rest / motion)
+
+
+def _unexplained(plan: Plan, reference: Reference, regressed: Array, left_over: Array) -> Array:
+    """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
+    misfit: Array = left_over.take(plan.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
+    score = left_over.take(plan.columns, axis=-2) * plan.mine
+    normal = regressed.take(plan.columns, axis=-2) * plan.same
+    normal += plan.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
+    solved = np.empty_like(score)
+    for one, right, found in zip(_each(normal), _each(score), _each(solved), strict=True):
+        found[:] = dposv(one, right)[1]
+    misfit -= (score * (reference.solution.theta + solved)).sum(axis=-2)
+    return misfit
+
+
+def _each(matrices: Array) -> Array:
+    """(N, ., .) of (..., ., .), where they lie."""
+    return matrices.reshape(-1, *matrices.shape[-2:])
+
+
+@cache
+def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
+    """(2F,) the band of each line's real part, then of each line's imaginary part; ``ends`` are the bands'."""
+    return np.tile(np.searchsorted(ends, np.arange(ends[-1]), side="right"), 2)
+
+
+def _normalised(plan: Plan, spread: Array, score: Array) -> Array:
+    """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong."""
+    mine = plan.mine.T
+    variance = spread.diagonal(axis1=-2, axis2=-1) * mine
+    weight = np.where(variance > 0.0, 1.0 / np.sqrt(np.maximum(variance, TINY**2)), 0.0)
+    correlation = spread * weight[..., None] * weight[..., None, :]
+    correlation += plan.unit * (RIDGE + (weight == 0.0))[..., None]
+    scaled = score * weight
+    return np.asarray((scaled * np.linalg.solve(correlation, scaled[..., None])[..., 0]).sum(axis=-1))
+
+
+def disagreement(one: Reference, other: Reference) -> Array:
+    """(C,) the chance that the estimates of two stretches differ as much, were they independent and both unbiased."""
+    plan = one.plan
+    difference = ((one.solution.theta - other.solution.theta) * plan.mine).T
+    count = plan.mine.sum(axis=0)
+    spread = one.uncertainty.covariance + other.uncertainty.covariance
+    freedom = np.minimum(one.uncertainty.freedom, other.uncertainty.freedom)
+    return np.asarray(fdtrc(count, np.maximum(freedom, 1.0), _normalised(plan, spread, difference) / count))

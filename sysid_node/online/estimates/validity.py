@@ -1,0 +1,148 @@
+"""Whether an estimate is to be believed, and what speaks against it.
+
+What changes with renewals only is weighed once for all samples until the next (``grounds``); what changes with every
+sample is decided for all estimates of all moments (...) at once (``judge``), as numbers (see ``status``).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online import status
+from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.estimates.current_solution import Present
+from sysid_node.online.regression import least_squares
+from sysid_node.online.regression.least_squares import student_95
+from sysid_node.online.state import Grounds, Renewed, State
+from sysid_node.online.status import Codes
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+ENOUGH_FREEDOM = 5.0  # degrees of freedom under which an interval is not trusted
+HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apart at all
+COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
+STALE = 0.5  # s without a new sample
+SETTLING = 1.0  # s after an abrupt change in which "changed" is said
+POOR = 0.7  # share of a coefficient's motion left unexplained beyond which no estimate of it is valid
+NARROWEST = 1e-12  # share of an estimate under which its standard error is rounding
+BURIED = 3.0  # times its sensor's noise energy that a regressor must move
+
+
+def grounds_of(state: State, renewed: Renewed) -> Grounds:
+    """What the judgement of all estimates rests on until the next renewal; weighed once."""
+    renewed.grounds = renewed.grounds or _weigh(state, renewed)
+    return renewed.grounds
+
+
+def _weigh(state: State, renewed: Renewed) -> Grounds:
+    """See ``grounds_of``."""
+    table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
+    c = table.coefficient
+    start, _, stop = state.model.settings.frequencies
+    # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
+    held = np.where(plan.mine > 0.0, renewed.hold.strength[:, None], np.inf).min(axis=0)
+    against, squares = _against(state, renewed), student_95(freedom)[c] ** 2
+    cautions = np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])
+    caution, longest = np.maximum(cautions, 1.0), renewed.bend.longest(squares)
+    stds, samples = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density), round(renewed.total.samples)
+    return Grounds(
+        sound=(held >= least_squares.STRONG)[c] & (against == status.OK),
+        against=against,
+        squares=squares,
+        longest=longest,
+        allowed=np.minimum(table.allowed**2 / caution, longest),
+        relative=table.relative**2 / caution if table.relative.any() else None,
+        floor=np.maximum(BURIED * renewed.total.bias.take(plan.energy), least_squares.TINY),
+        fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
+    )
+
+
+def _against(state: State, renewed: Renewed) -> Codes:
+    """(D,) what speaks against each whatever the present says; what is found later counts more."""
+    table, words = state.model.table, state.model.vocabulary
+    c = table.coefficient
+    against = np.zeros(c.size, np.uint8)
+    spoilt = renewed.timing.spoilt[table.unknown, c] & ~table.offset
+    against[spoilt] = [words.code(f"{renewed.timing.blamed[i]} not on time") for i in c[spoilt].tolist()]
+    against[(renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
+    if not state.thrust_known:
+        against[table.needs_thrust] = status.THRUST
+    if state.flow.active:
+        structure, at = state.model.aircraft.structure, state.piece_start
+        for i, name in enumerate(table.names):
+            flaw = flow_angle_filter.flaw(state.flow, at, name, structure[name.partition("_")[0]])
+            against[i] = words.code(flaw) if flaw else against[i]
+    against[renewed.doubted[c]] = status.CONTRADICTED
+    against[renewed.lost[c]] = status.OUTSIDE
+    return against
+
+
+def judge(state: State, renewed: Renewed, current: Present, now: Any) -> Codes:
+    """(..., D) statuses of the estimates ``current``, ``now`` (...) s."""
+    table, plan, grounds = state.model.table, state.plan, grounds_of(state, renewed)
+    gram = current.gram
+    motion = gram.reshape(*gram.shape[:-2], -1).take(plan.energy, axis=-1)
+    inflation = current.size * motion
+    buried = motion < grounds.floor
+    hidden = buried | (inflation > HOPELESS)
+    poor = _poor(current)
+    good = _narrow(grounds, current) & grounds.sound
+    if np.count_nonzero(hidden):
+        good &= ~(hidden.take(table.unknown, axis=-1) & ~table.offset) & ~_lost_with(state, hidden)
+    if np.count_nonzero(poor):
+        good &= ~poor.take(table.coefficient, axis=-1)
+    codes = np.zeros(good.shape, np.uint8)
+    if np.count_nonzero(good) < good.size:
+        reasons = _reasons(state, grounds, current, inflation, buried, poor)
+        np.copyto(codes, reasons, where=~good)
+    changed, stale = current.time - state.changed_at < SETTLING, now - current.time > STALE
+    if (changed | stale) is not False:  # one moment's is a plain bool
+        codes[changed] = status.CHANGED
+        codes[stale] = status.STALE
+    return codes
+
+
+def _narrow(grounds: Grounds, current: Present) -> Flags:
+    """(..., D) whether standard errors are small enough, and no rounding; and intervals have an end."""
+    squares, allowed = current.values * current.values, grounds.allowed
+    if grounds.relative is not None:
+        allowed = np.maximum(allowed, np.minimum(grounds.relative * squares, grounds.longest))
+    narrow: Flags = current.variances <= allowed
+    squares *= NARROWEST**2
+    narrow &= current.variances > squares
+    return narrow
+
+
+def _poor(current: Present) -> Flags:
+    """(..., C) whether the model leaves most of a coefficient's motion unexplained: its interval means nothing then."""
+    residual, motion = current.solution.residual, current.solution.motion
+    poor: Flags = residual > POOR * np.maximum(motion, least_squares.TINY)
+    return poor
+
+
+def _lost_with(state: State, hidden: Flags) -> Flags:
+    """(..., D) offsets that hold what a hidden slope (..., P) of their coefficient does."""
+    table = state.model.table
+    return np.asarray(((hidden @ state.plan.mine) > 0.0).take(table.coefficient, axis=-1) & table.offset)
+
+
+def _reasons(state: State, grounds: Grounds, current: Present, inflation: Array, buried: Flags, poor: Flags) -> Codes:
+    """(..., D) what speaks against each.
+
+    ``inflation`` (..., P) of its unknown's variance, a regressor ``buried`` (..., P) in noise, a ``poor`` (..., C) fit.
+    """
+    table, slope = state.model.table, ~state.model.table.offset
+    # what is found later counts more
+    reasons = np.where(poor.take(table.coefficient, axis=-1), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
+    collinear = (inflation.take(table.unknown, axis=-1) > COLLINEAR) & slope
+    if collinear.any():
+        rivals = least_squares.rivals(state.plan, current.solution).take(table.unknown, axis=-1)
+        reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
+    reasons[buried.take(table.unknown, axis=-1) & slope] = status.NOT_EXCITED
+    np.copyto(reasons, grounds.against, where=grounds.against != status.OK)
+    reasons[~current.solution.usable] = status.NOT_EXCITED
+    return reasons

@@ -1,0 +1,87 @@
+"""Whether the surfaces' deflections arrive on time, and what it does to the estimates if they do not.
+
+Commands stand for positions on most small aircraft: the surfaces follow late. A lag tau turns C_delta delta into
+C_delta (delta - tau d delta / dt), to first order, and biases all derivatives of the equation, most of all the damping,
+while the residual hardly shows it. So each equation is solved a second time with the control's rate as a further
+regressor: its coefficient is -C_delta tau (the same device finds time skews in Jategaonkar, "Flight Vehicle System
+Identification", 2nd ed., 2015, sec. 10.5). What moves by this more than its interval allows is not to be believed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.regression.least_squares import Plan, Solution, Uncertainty
+
+Array = NDArray[np.float64]
+
+SURE = 4.0  # standard errors by which a lag must differ from none
+MOVED = 1.5  # standard errors that an estimate may move when the lag is allowed for
+TRIFLE = 0.02  # share of its size that an estimate may move in any case
+
+
+class Lag(NamedTuple):
+    """How late a control's deflections are felt, s; negative where they are felt before they are measured."""
+
+    control: str  # symbol
+    delay: float
+    standard_error: float
+
+
+class Timing(NamedTuple):
+    """The surest lag of each control, and the estimates that it spoils."""
+
+    lags: tuple[Lag, ...]
+    spoilt: NDArray[np.bool_]  # (P, C)
+    blamed: dict[int, str]  # coefficient -> control
+
+
+def examine(plan: Plan, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array) -> Timing:
+    """Solve every equation again with the rate of each of its controls; ``gram`` (W, W) is that of ``solution``."""
+    spoilt = np.zeros(plan.mine.shape, dtype=bool)
+    blamed: dict[int, str] = {}
+    best: dict[str, Lag] = {}
+    for c in np.flatnonzero(spread.density > 0.0).tolist():
+        mine = plan.unknowns(c)
+        errors = np.sqrt(np.maximum(spread.covariance[c].diagonal()[mine], 0.0))
+        for symbol in layout.timed:
+            places = [k for k, i in enumerate(mine.tolist()) if plan.regressors[i] == symbol]
+            if not places:
+                continue
+            lag, moved = _with_rate(plan, layout, solution, spread, gram, c, symbol, places[0])
+            if lag is None:
+                continue
+            if symbol not in best or lag.standard_error < best[symbol].standard_error:
+                best[symbol] = lag
+            size = np.abs(solution.theta[mine, c])
+            bad = (moved > MOVED * errors) & (moved > TRIFLE * size)
+            if abs(lag.delay) > SURE * lag.standard_error and bad.any():
+                spoilt[mine[bad], c] = True
+                blamed[c] = symbol
+    return Timing(tuple(best.values()), spoilt, blamed)
+
+
+def _with_rate(
+    plan: Plan, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array, c: int, symbol: str, place: int
+) -> tuple[Lag | None, Array]:
+    """The control's lag by one coefficient's equation, and how far (p,) its estimates move when it is allowed for."""
+    mine = plan.unknowns(c)
+    J, rate = plan.columns[mine], layout.column(f"{symbol} rate")
+    block = solution.inverse[np.ix_(mine, mine)]
+    v = np.zeros(plan.width)
+    v[plan.outputs[c]], v[J] = 1.0, -solution.theta[mine, c]
+    # one regressor more, by the partitioned inverse
+    share = block @ gram[plan.instruments[mine], rate]
+    left = float(gram[rate, rate] - gram[rate, J] @ share)
+    effect = float(solution.theta[mine[place], c])
+    if left <= 1e-6 * float(gram[rate, rate]) or effect == 0.0:
+        return None, np.zeros(mine.size)
+    slope = float(gram[rate] @ v) / left
+    variance = np.maximum(spread.covariance[c].diagonal()[mine], 0.0)
+    colour = float(np.max(variance / np.maximum(np.abs(block.diagonal()), 1e-300)))
+    return Lag(symbol, -slope / effect, math.sqrt(colour / left) / abs(effect)), np.abs(share * slope)

@@ -1,0 +1,55 @@
+"""Gusts that the deflections may know of.
+
+Instruments made of the deflections hold nothing of the gusts as long as nobody answers to gusts with the surfaces.
+Pilots and autopilots do. What this does to the estimates cannot be told from the flight, but it can be allowed for: a
+correlation of ``ALLOWED`` between instruments and gusts shifts an estimate by that share of the square root of the
+degrees of freedom in standard errors (Conley, Hansen & Rossi, "Plausibly exogenous", Review of Economics and Statistics
+94, 2012). So intervals stop shrinking where they would claim more than that. Noise of the sensors moves no surface
+worth mentioning: only what a residual holds beyond it counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.regression.heteroskedasticity import DOUBT, Unevenness
+from sysid_node.online.regression.least_squares import Plan, Solution, Uncertainty, misfits
+
+Array = NDArray[np.float64]
+
+ALLOWED = 0.05  # correlation between instruments and gusts
+
+
+def share_of_gusts(spread: Uncertainty, sensed: Array) -> Array:
+    """(C,) share of each residual that is not the sensors' noise, of which ``sensed`` (C,) is the density."""
+    return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(spread.density, 1e-300), 0.0, 1.0))
+
+
+def inflation(spread: Uncertainty, gusts: Array) -> Array:
+    """(C,) factors of the covariance; ``gusts`` (C,): see ``share_of_gusts``."""
+    return np.asarray(1.0 + ALLOWED**2 * spread.freedom * gusts)
+
+
+def sensed(
+    aircraft: Aircraft, plan: Plan, solution: Solution, bias: Array, uneven: Unevenness, step: float, omega: Array
+) -> Array:
+    """(C,) density of the sensors' noise in the residuals.
+
+    ``bias`` (W, W): of the noise of the regressors, per line and second (``noise.gram_bias``); ``step`` (s): the IMU's
+    interval; ``omega`` (F,) rad/s: the lines, over which a rate's derivative has the noise of the rate times omega.
+    """
+    v = misfits(plan, solution.theta)
+    density: Array = ((bias @ v) * v).sum(axis=0)
+    if uneven.duration > 0.0:
+        density = density + (uneven.power + uneven.lifted_power) / uneven.duration
+    reference, g, i = aircraft.reference, aircraft.geometry, aircraft.inertia
+    qS = 0.5 * reference.air_density * reference.airspeed**2 * g.S
+    force = aircraft.noise["accel"] * aircraft.mass / qS
+    turning = aircraft.noise["gyro"] * math.sqrt(float(np.mean(omega**2))) / qS
+    gains = {"CL": force, "CD": force, "CY": force}
+    gains |= {"Cl": turning * i.Ixx / g.b, "Cm": turning * i.Iyy / g.cbar, "Cn": turning * i.Izz / g.b}
+    return density + step * np.array([gains[c] for c in plan.coefficients]) ** 2

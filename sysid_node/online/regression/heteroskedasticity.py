@@ -1,0 +1,116 @@
+"""Sensor noise that comes and goes with the motion.
+
+Noise in the airspeed multiplies a coefficient's motion, errors of the angle of attack the lift on its way into the
+drag: such noise is there while the regressors move, and a stationary density of the same energy makes too little of it.
+With the noise's density w(t) the estimates' covariance holds the integral of w x x' where stationary noise has that of
+x x' times the mean of w (the heteroskedastic sandwich of White, Econometrica 48, 1980). The two integrals are collected
+in the time domain; how many of the lines' products they stand for is told by those of stationary noise.
+
+The drag's part by the angle of attack is kept apart: what is left of the drag beyond the sensors' noise is an error of
+that angle, too, as where the air turns and the probe is not at the centre of gravity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+
+if TYPE_CHECKING:
+    from sysid_node.online.regression.least_squares import Plan
+
+Array = NDArray[np.float64]
+DOUBT = 1.5  # times the sensors' noise that a residual holds before it is more than that
+RIDGE, TINY = 1e-9, 1e-100  # set regressors apart that moved alike, or not at all
+
+
+@dataclass
+class Unevenness:
+    """Integrals over time, of C coefficients and P unknowns."""
+
+    weighted: Array | float = 0.0  # (C, P, P) of w x x'
+    power: Array | float = 0.0  # (C,) of w
+    moments: Array | float = 0.0  # (P, P) of x x'
+    lifted: Array | float = 0.0  # (C, P, P) of w x x', where w is by the angle of attack
+    lifted_power: Array | float = 0.0  # (C,) of that w
+    steady: Array | float = 0.0  # (C,) of the accelerometer's noise density, where it matters beside that w
+    duration: float = 0.0  # s
+
+    def __add__(self, other: Unevenness) -> Unevenness:
+        return Unevenness(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+    def __mul__(self, factor: float) -> Unevenness:
+        return Unevenness(*(getattr(self, f.name) * factor for f in fields(self)))
+
+
+def measure(
+    aircraft: Aircraft,
+    layout: Layout,
+    plan: Plan,
+    theta: Array,
+    rows: Array,
+    mean: Array,
+    duration: float,
+    every: float,
+    boxes: int,
+) -> Unevenness:
+    """Of a stretch of ``duration`` (s): signals ``rows`` (N, T) about their ``mean`` (T,).
+
+    ``theta`` (P, C): derivatives, right in size, such as the aircraft file's. ``every`` (s): the air data's interval,
+    over which their noise lasts. ``boxes``: into so many stretches, as long as the lines' band resolves, regressors are
+    averaged; the noise's density is not.
+    """
+    x = rows[:, plan.columns] - mean[plan.columns]
+    relative = 2.0 * aircraft.noise["airspeed"] / aircraft.reference.airspeed
+    w, lifted, steady = (relative * (x @ theta)) ** 2, np.zeros((len(rows), theta.shape[1])), np.zeros(theta.shape[1])
+    step = duration / len(rows)
+    if "CD" in plan.coefficients and "alpha" in layout.names:
+        c = plan.coefficients.index("CD")
+        of_alpha = theta[[i for i in plan.unknowns(c).tolist() if plan.regressors[i] == "alpha"], c].sum()
+        turned = rows[:, layout.column("CL")] - of_alpha * rows[:, OFFSET]
+        lifted[:, c] = (aircraft.noise["alpha"] * turned) ** 2
+        steady[c] = duration * step * (aircraft.noise["accel"] * _per_acceleration(aircraft)) ** 2
+    starts = np.arange(0, len(rows), -(-len(rows) // boxes))
+    counts = np.diff(starts, append=len(rows))[:, None]
+    slow = np.add.reduceat(x, starts) / counts
+    sums = [np.add.reduceat(density, starts) * (every * step) for density in (w, lifted)]
+    weighted, by_lift = ((w.T[:, :, None] * slow).swapaxes(1, 2) @ slow for w in sums)
+    powers = [w.sum(axis=0) for w in sums]
+    return Unevenness(weighted, powers[0], (counts * slow).T @ slow * step, by_lift, powers[1], steady, duration)
+
+
+def _per_acceleration(aircraft: Aircraft) -> float:
+    """Coefficient of a force that accelerates the aircraft by 1 m/s^2 at the reference."""
+    reference = aircraft.reference
+    return aircraft.mass / (0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S)
+
+
+def excess(uneven: Unevenness, even: Array, same: Array, density: Array) -> Array | float:
+    """(C, P, P) what the unevenness adds to the scores' covariance; ``even`` (P, P) is theirs for noise of density 1.
+
+    ``same`` (P, P): 1 where two unknowns belong to one block. The integrals hold more than the lines' band, so they are
+    turned and scaled such that for stationary noise they would be ``even``, and no more than the residual's ``density``
+    (C,) is taken to come and go.
+    """
+    if uneven.duration <= 0.0:
+        return 0.0
+    moments = uneven.moments * same
+    other = density * uneven.duration - DOUBT * (uneven.power + uneven.steady)
+    more = np.maximum(other / np.maximum(uneven.lifted_power, TINY), 1.0)
+    weighted = uneven.weighted + more[:, None, None] * uneven.lifted
+    mean = (uneven.power + more * uneven.lifted_power) / uneven.duration
+    extra = (weighted - np.multiply.outer(mean, moments)) * same
+    extra *= np.minimum(density / np.maximum(mean, TINY), 1.0)[:, None, None]
+    turn = np.linalg.solve(_root(moments).T, _root(even).T).T
+    found: Array = turn @ extra @ turn.T
+    return found
+
+
+def _root(moments: Array) -> Array:
+    """Cholesky factor of a matrix that may be singular."""
+    return np.asarray(np.linalg.cholesky(moments + np.diag(RIDGE * moments.diagonal() + TINY)))

@@ -1,0 +1,215 @@
+"""What a stretch of flight says: Gram matrices of the transformed signals, and how its noise is correlated.
+
+A record is taken in segments no longer than one period of the line spacing. Within a segment every signal is taken
+about its mean, z - k mean(z) / mean(k), which removes the offset k C_0 exactly, and a constant and a straight drift are
+projected out (trim, slow drift and transients leak into all lines otherwise); then the Gram matrices of the segments
+add up: least squares on their sum is sequential over segments and uses all that the record holds in the band. On one
+long transform a coarse grid would skip what lies between its lines, and a fine one would count the same information
+twice.
+
+Noise of spectral density S appears in the lines of a transform over a window w with the covariance
+
+    E[X_i X_j^*] = S integral w^2 exp(-j (omega_i - omega_j) t) dt      (and with + for E[X_i X_j])
+
+so neighbouring lines of a short record are far from independent. ``scores`` keeps A' Sigma A with this covariance, per
+band of lines: with the residual's density in each band it gives the covariance of the estimates whatever the grid is
+(sandwich form: Klein & Morelli 2006, eq. 5.38, with the exact covariance of the finite transform's lines).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.blas import dger
+
+from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.regression.heteroskedasticity import Unevenness
+from sysid_node.online.regression.instruments import Auxiliary, fill_in
+from sysid_node.online.regression.matrices import product
+
+Array = NDArray[np.float64]
+_N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
+_NUISANCES = slice(OFFSET, OFFSET + 3)
+BANDS = 6
+#: Share of the drift's energy that is not the constant's, under which it brings nothing.
+INDEPENDENT = 1e-12
+
+
+@dataclass
+class Information:
+    """Sums over segments. B bands, W columns of the signal vector."""
+
+    grams: Array  # (B, W, W) sums over the band's lines of the projected signals' products
+    scores: Array  # (B, W, W) the same with the noise covariance of unit density in between
+    traces: Array  # (B,) expected sum of squares of unit-density noise
+    trace_square: float  # of the noise covariance squared, over all lines
+    energy: float  # s: integral of the window squared: the duration, where nothing is forgotten
+    bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
+    integrals: Array  # (W,) of the transformed signals over time
+    samples: float
+    uneven: Unevenness = field(default_factory=Unevenness)
+
+    def __add__(self, other: Information) -> Information:
+        return Information(*(getattr(self, f) + getattr(other, f) for f in self.__dataclass_fields__))
+
+    def scaled(self, factor: float) -> Information:
+        """With all that was counted worth ``factor`` as much."""
+        return Information(*(getattr(self, f) * factor for f in self.__dataclass_fields__))
+
+
+def nothing(layout: Layout) -> Information:
+    """No information at all."""
+    width = layout.width
+    zeros = np.zeros((BANDS, width, width))
+    bias, none = np.zeros((width, width)), np.zeros(width)
+    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, 0.0)
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """What the covariance of the lines needs of their frequencies, computed once."""
+
+    omega: Array  # (F,) rad/s
+    bands: tuple[slice, ...]  # lines of each band
+    order: NDArray[np.intp]  # (2F,) real and imaginary parts of the lines, band after band
+    rate: float  # 1/s: decay of the window's energy
+    minus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i - omega_j)); 0 where that has no inverse
+    plus: NDArray[np.complex128]  # (F, F) 1 / (rate - j (omega_i + omega_j))
+
+
+def _band_edges(omega: Array) -> list[int]:
+    """Lines at which the bands begin, and their end: even on a logarithmic scale, no band without a line of its own."""
+    F = omega.size
+    even = np.searchsorted(omega, np.geomspace(omega[0], omega[-1], BANDS + 1)[1:-1])
+    edges = [0]
+    for band, edge in enumerate(even.tolist(), start=1):
+        edges.append(max(min(max(edge, edges[-1] + 1), F - BANDS + band), 0))
+    return [*edges, F]
+
+
+def spectrum(omega: Array, memory: float) -> Spectrum:
+    """Lines omega (F,) rad/s in ``BANDS`` octave-like bands; the window fades with ``memory`` (s)."""
+    edges = _band_edges(omega)
+    bands = tuple(slice(a, b) for a, b in pairwise(edges))
+    rate = 1.0 / memory if math.isfinite(memory) else 0.0
+    minus, plus = (rate - 1j * (omega[:, None] + sign * omega) for sign in (-1.0, 1.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = np.where(np.abs(minus) > 1e-9, 1.0 / minus, 0.0)
+    order = np.concatenate([np.r_[part, omega.size + part.start : omega.size + part.stop] for part in bands])
+    return Spectrum(omega, bands, order, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
+
+
+def about_mean(transform: Array, model: Auxiliary | None) -> Array:
+    """(..., 2F, W) lines of transforms (..., 2F + 1, W) whose signals are taken about their means, and of instruments.
+
+    The lines are made where the transforms lie, which must be in one piece. Nuisances are kept. The airspeed's noise is
+    in k: fitting the offset to the lines of k would regress on noise.
+    """
+    if transform.ndim > 2:
+        for one in transform:
+            about_mean(one, None)
+    else:
+        share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
+        share[_NUISANCES] = 0.0
+        dger(-1.0, share, transform[:, OFFSET], a=transform.T, overwrite_a=True)  # z - k share
+    lines = transform[..., :-1, :]
+    if model is not None:
+        fill_in(model, lines)
+    return lines
+
+
+def project(lines: Array) -> Array:
+    """(..., 2F, W) with constant and drift projected out of the other columns; they themselves are kept."""
+    n = lines[..., _N].copy()
+    across = n.swapaxes(-1, -2)
+    clean: Array = lines - n @ (inverse2(across @ n) @ (across @ lines))
+    clean[..., _N] = n
+    return clean
+
+
+def inverse2(gram: Array) -> Array:
+    """(..., 2, 2) inverses of symmetric matrices; of the first element alone where the second column brings nothing."""
+    rows = []
+    for a, b, _, d in gram.reshape(-1, 4).tolist():
+        det = a * d - b * b
+        if det > INDEPENDENT * a * d:
+            rows.append((d / det, -b / det, -b / det, a / det))
+        else:
+            rows.append((1.0 / a if a > 0.0 else 0.0, 0.0, 0.0, 0.0))
+    return np.array(rows).reshape(gram.shape)
+
+
+def noise_covariance(lines: Spectrum, begin: float, end: float) -> Array:
+    """(2F, 2F) covariance of the stacked real and imaginary parts for unit spectral density on begin..end (s)."""
+    late = np.exp(-1j * lines.omega * end)
+    early = np.exp(-1j * lines.omega * begin - 0.5 * lines.rate * (end - begin))
+    # integrals of exp(-rate (end - t)) exp(-j (omega_i -+ omega_j) t) dt
+    minus = (late[:, None] * late.conj() - early[:, None] * early.conj()) * lines.minus
+    plus = (late[:, None] * late - early[:, None] * early) * lines.plus
+    if lines.rate == 0.0:
+        np.fill_diagonal(minus, end - begin)
+    F = lines.omega.size
+    covariance = np.empty((2 * F, 2 * F))
+    covariance[:F, :F] = minus.real + plus.real
+    covariance[F:, F:] = minus.real - plus.real
+    covariance[:F, F:] = plus.imag - minus.imag
+    covariance[F:, :F] = covariance[:F, F:].T
+    covariance *= 0.5
+    return covariance
+
+
+def window_energy(duration: float, rate: float) -> float:
+    """Integral of exp(-rate t) over ``duration`` (s)."""
+    return -math.expm1(-rate * duration) / rate if rate else duration
+
+
+def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
+    """(..., 2F, W) lines of transforms (..., 2F + 1, W) without offset, constant and drift, with their instruments."""
+    return project(about_mean(transform.copy(), model))
+
+
+def products(transform: Array, model: Auxiliary | None) -> Array:
+    """(..., W, W) Gram matrices of transforms' (..., 2F + 1, W) clean lines, constant and drift projected out.
+
+    The transforms are used up.
+    """
+    lines = about_mean(transform, model)
+    gram = product(lines.swapaxes(-1, -2), lines)
+    for one in gram.reshape(-1, *gram.shape[-2:]):
+        _project_out(one)
+    return gram
+
+
+def _project_out(gram: Array) -> None:
+    """Take constant and drift out of a Gram matrix (W, W) where it lies: Gaussian elimination."""
+    energies = gram.diagonal()[_N].tolist()
+    for n, energy in zip(range(_N.start, _N.stop), energies, strict=True):
+        row, left = gram[n].copy(), float(gram[n, n])
+        if left > INDEPENDENT * energy:
+            dger(-1.0 / left, row, row, a=gram.T, overwrite_a=True)
+
+
+def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
+    """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
+    clean = clean_lines(transform, model)
+    covariance = noise_covariance(lines, begin, end)
+    spread = covariance @ clean
+    n = clean[:, _N]
+    # what projecting the nuisances out leaves of the noise's square in each line: diagonal of (I - H) K
+    left = covariance.diagonal() - ((n @ inverse2(n.T @ n)) * spread[:, _N]).sum(axis=1)
+    W = clean.shape[1]
+    grams, scores, traces = np.empty((BANDS, W, W)), np.empty((BANDS, W, W)), np.empty(BANDS)
+    clean, spread, left = clean[lines.order], spread[lines.order], left[lines.order]
+    for band, part in enumerate(lines.bands):
+        rows = slice(2 * part.start, 2 * part.stop)
+        grams[band] = clean[rows].T @ clean[rows]
+        score = clean[rows].T @ spread[rows]
+        scores[band] = 0.5 * (score + score.T)
+        traces[band] = left[rows].sum()
+    square = float(np.vdot(covariance, covariance))
+    energy = window_energy(end - begin, lines.rate)
+    return Information(grams, scores, traces, square, energy, np.zeros((W, W)), transform[-1].copy(), 0.0)

@@ -1,0 +1,288 @@
+"""Least squares on the information matrices: values, covariances, and what they rest on.
+
+All coefficients with the same regressors share one factorisation; the groups stand as blocks on the diagonal of one
+matrix, so that one call solves for all six coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgesv, dposv
+from scipy.special import stdtrit
+
+from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.regression import heteroskedasticity
+from sysid_node.online.regression.information import BANDS, Information
+from sysid_node.online.regression.matrices import diagonal, product
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Weight of the mean density, in degrees of freedom, when the residual's density in one band is estimated.
+BAND_PRIOR = 8.0
+#: F statistic of an instrument under which estimates that rest on it are not to be trusted.
+STRONG = 25.0
+#: Energy under which a regressor has not moved at all.
+TINY = 1e-18
+#: Share of its energy by which a regressor is set apart from others where their equations are singular.
+RIDGE = 1e-12
+#: Share of an output's energy that is rounding: no residual is smaller.
+ROUNDING = 1e-14
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which entries of the W x W Gram matrix make the normal equations. P unknowns (blocks), C coefficients."""
+
+    coefficients: tuple[str, ...]
+    regressors: tuple[str, ...]  # of each unknown
+    group: Index  # (P,) block of each unknown
+    block: Index  # (C,) block of each coefficient
+    columns: Index  # (P,) column of each unknown's regressor
+    outputs: Index  # (C,) column of each coefficient
+    instruments: Index  # (P,) column of each unknown's instrument: its regressor, in least squares
+    same: Array  # (P, P) 1 where two unknowns belong to one block
+    mine: Array  # (P, C) 1 where the unknown belongs to the coefficient
+    width: int  # W
+    # flat indices into the Gram matrix; transposed, so that LAPACK takes what is gathered as it lies
+    entries: Index = field(init=False)  # (2, P + C, P) of A'A above A'y, and of Z'A above Z'y
+    sides: Index = field(init=False)  # (P + C,) columns of the regressors, then of the coefficients
+    square: Index = field(init=False)  # (C,) of y'y
+    energy: Index = field(init=False)  # (P,) of x'x
+    counted: Array = field(init=False)  # (2, P + C, P) 1 where the entry lies in a block, of A'y 2: see ``solve``
+    unit: Array = field(init=False)  # (P, P)
+    known: Array = field(init=False)  # (P + C, P) the unit matrix, and room for what is known
+    instrumented: NDArray[np.bool_] = field(init=False)  # (C,) whether any of its regressors has an instrument
+    least_squares: bool = field(init=False)  # whether every regressor is its own instrument
+    kin: dict[tuple[int, ...], Plan] = field(init=False, default_factory=dict, repr=False)  # see ``without``
+
+    def __post_init__(self) -> None:
+        both = np.concatenate([self.columns, self.outputs])[:, None]
+        plain = bool((self.columns == self.instruments).all())
+        sources = self.columns, self.instruments
+        object.__setattr__(self, "sides", both[:, 0])
+        object.__setattr__(self, "entries", np.stack([both + rows * self.width for rows in sources]))
+        object.__setattr__(self, "square", self.outputs * (self.width + 1))
+        object.__setattr__(self, "energy", self.columns * (self.width + 1))
+        counted = [np.vstack([self.same, times * self.mine.T]) for times in (2.0, 1.0)]
+        object.__setattr__(self, "counted", np.stack(counted))
+        object.__setattr__(self, "unit", np.eye(self.columns.size))
+        object.__setattr__(self, "known", np.eye(both.size, self.columns.size))
+        object.__setattr__(self, "instrumented", (self.mine.T @ (self.columns != self.instruments)) > 0.0)
+        object.__setattr__(self, "least_squares", plain)
+
+    def unknowns(self, coefficient: int) -> Index:
+        """Indices of a coefficient's unknowns."""
+        return np.flatnonzero(self.group == self.block[coefficient])
+
+
+def plan(structure: dict[str, tuple[str, ...]], layout: Layout) -> Plan:
+    """Normal equations for a model structure, e.g. ``{"Cm": ("0", "alpha", "q", "de")}``; offsets come after."""
+    slopes = {c: tuple(r for r in rs if r != "0") for c, rs in structure.items()}
+    blocks = list(dict.fromkeys(slopes.values()))
+    regressors = tuple(r for block in blocks for r in block)
+    group = np.array([i for i, block in enumerate(blocks) for _ in block], dtype=np.intp)
+    block = np.array([blocks.index(rs) for rs in slopes.values()], dtype=np.intp)
+    return Plan(
+        coefficients=tuple(slopes),
+        regressors=regressors,
+        group=group,
+        block=block,
+        columns=np.array([layout.column(r) for r in regressors], dtype=np.intp),
+        outputs=np.array([layout.column(c) for c in slopes], dtype=np.intp),
+        instruments=np.array([layout.instrument(r) for r in regressors], dtype=np.intp),
+        same=(group[:, None] == group).astype(float),
+        mine=(group[:, None] == block).astype(float),
+        width=layout.width,
+    )
+
+
+def trusting(full: Plan, strength: Array) -> Plan:
+    """The plan with least squares in the blocks of which an instrument is weak: better biased a little than lost."""
+    weak = full.group[strength < STRONG].tolist()
+    return without(full, tuple(sorted(set(weak)))) if weak else full
+
+
+def without(full: Plan, blocks: tuple[int, ...]) -> Plan:
+    """The plan with least squares in these blocks; made once."""
+    if blocks not in full.kin:
+        own = np.isin(full.group, blocks)
+        full.kin[blocks] = replace(full, instruments=np.where(own, full.columns, full.instruments))
+    return full.kin[blocks]
+
+
+@dataclass
+class Solution:
+    """Solution of all coefficients' normal equations, or of several: then all have a further axis in front.
+
+    ``usable`` is False where the equations are singular.
+    """
+
+    theta: Array  # (P, C), zero where an unknown does not belong
+    inverse: Array  # (P, P) of Z'A (of A'A in least squares)
+    residual: Array  # (C,) sum of squares
+    motion: Array  # (C,) sum of squares of what is to be explained
+    usable: NDArray[np.bool_]  # ()
+
+
+def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
+    """Solve (Z'A - bias) theta = Z'y - bias from summed Gram matrices (..., W, W); ``bias`` is from ``bias_of``.
+
+    Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
+    """
+    P, several = plan.columns.size, gram.shape[:-2]
+    flat = gram.reshape(*several, gram.shape[-1] ** 2)
+    gathered = flat.take(plan.entries, axis=-1)
+    gathered *= plan.counted
+    normal, cross = gathered[..., 0, :, :], gathered[..., 1, :, :]
+    if bias is not None:
+        cross -= bias
+    if several:
+        solved, usable = _each(plan, cross)
+    else:
+        solved, fine = _factorised(plan, cross)
+        usable = np.array(fine)
+    theta = solved[..., P:]
+    # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
+    row = theta.swapaxes(-1, -2)
+    misfit = product(row, normal[..., :P, :])
+    misfit -= normal[..., P:, :]
+    motion = flat.take(plan.square, axis=-1)
+    residual: Array = np.maximum(diagonal(product(misfit, theta)) + motion, ROUNDING * motion)
+    return Solution(theta, solved[..., :P], residual, motion, usable)
+
+
+def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """``_factorised`` of each of K moments, each laid out in memory as one alone is: equal bits need equal strides."""
+    solved, usable = np.empty(cross.shape).swapaxes(-1, -2), np.empty(len(cross), dtype=bool)
+    for k, one in enumerate(cross):
+        solved[k], usable[k] = _factorised(plan, one)
+    return solved, usable
+
+
+def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
+    """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), zero and False where there are none."""
+    solved, fault = _factorise(plan, cross)
+    if fault:
+        # a regressor that has not moved, or that moved as others did: its own estimate is lost, not all of them
+        P = plan.columns.size
+        ridged = cross.copy()
+        ridged[:P] += plan.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
+        solved, fault = _factorise(plan, ridged)
+    if fault or not math.isfinite(solved[0, 0]):
+        return np.zeros_like(solved), False
+    return solved, True
+
+
+def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
+    """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), and LAPACK's fault, 0 for none."""
+    P = plan.columns.size
+    known = plan.known.copy()
+    known[P:] = cross[P:]
+    solver = dposv if plan.least_squares else dgesv
+    *_, solved, fault = solver(cross[:P].T, known.T)
+    return solved, fault
+
+
+def bias_of(plan: Plan, bias: Array) -> Array:
+    """(P + C, P) the entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts."""
+    return np.asarray(bias.take(plan.entries[1]) * plan.counted[1])
+
+
+def misfits(plan: Plan, theta: Array) -> Array:
+    """(W, C) the combinations of signals y - sum theta_j x_j that ``theta`` (P, C) leaves of each coefficient."""
+    C = plan.outputs.size
+    v = np.zeros((plan.width, C))
+    np.add.at(v, (plan.columns[:, None], np.arange(C)), -theta)
+    v[plan.outputs, np.arange(C)] = 1.0
+    return v
+
+
+@dataclass
+class Uncertainty:
+    """What the residuals of all coefficients say of the estimates' covariance."""
+
+    covariance: Array  # (C, P, P) of the unknowns, zero where they do not belong
+    density: Array  # (C,) of the residual over the whole band
+    bands: Array  # (C, B) of the residual in each band
+    freedom: Array  # (C,) degrees of freedom
+
+
+def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertainty:
+    """Sandwich covariance with the residual's density estimated in each band, and with noise that comes and goes."""
+    C, P = len(plan.coefficients), plan.columns.size
+    if not solution.usable or info.trace_square <= 0.0:
+        return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
+    v = misfits(plan, solution.theta)
+    least = ROUNDING * info.grams[:, plan.outputs, plan.outputs]
+    squares = np.maximum(((info.grams @ v) * v).sum(axis=1), least).T  # (C, B)
+    scores = info.scores[:, plan.instruments[:, None], plan.instruments] * plan.same
+    used = ((scores * solution.inverse.T).sum(axis=2) @ plan.mine).T  # (C, B): taken up by the unknowns
+    expected = np.maximum(info.traces - used, 0.05 * info.traces + TINY)
+    whole = expected.sum(axis=1)
+    density = squares.sum(axis=1) / whole
+    freedom = whole**2 / info.trace_square
+    share = expected * (freedom / whole)[:, None]
+    bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
+    middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
+    middle += heteroskedasticity.excess(info.uneven, scores.sum(axis=0), plan.same, density)
+    covariance = solution.inverse @ middle @ solution.inverse.T
+    covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
+    return Uncertainty(covariance, density, bands, freedom)
+
+
+class Hold(NamedTuple):
+    """How firmly instruments hold on to the regressors. Of each of the P unknowns."""
+
+    strength: Array  # F statistic: what instruments explain of a regressor over what they do not
+    luck: Array  # by how much variances would be larger without chance; at least 1
+
+
+def hold(plan: Plan, solution: Solution, info: Information) -> Hold:
+    """The instruments' strength, and the luck that is in the solution.
+
+    Under an F of about 10 estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
+    instruments in linear IV regression", 2005). Infinite where every regressor is its own instrument.
+
+    Instruments are what the aircraft file's model makes of the deflections, so Z'A is Z'Z and chance. Where chance adds
+    to it instruments seem strong, the standard error is small and the estimate is off, all in one. So the strength is
+    that of Z'Z where this is less, and ``luck`` says what it makes of the variance.
+    """
+    P = plan.columns.size
+    if plan.least_squares:
+        return Hold(np.full(P, np.inf), np.ones(P))
+    if not solution.usable or info.trace_square <= 0.0:
+        return Hold(np.zeros(P), np.ones(P))
+    gram = info.grams.sum(axis=0)
+    outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
+    plain = solve(without(plan, tuple(range(int(plan.group.max()) + 1))), gram)
+    if not plain.usable:
+        return Hold(np.zeros(P), np.ones(P))
+    achieved = np.maximum((solution.inverse @ outer @ solution.inverse.T).diagonal(), TINY)
+    ridged = outer + plan.unit * (RIDGE * outer.diagonal() + TINY)
+    expected = np.maximum(np.linalg.inv(ridged).diagonal(), achieved)
+    efficiency = np.clip(plain.inverse.diagonal() / expected, 0.0, 1.0 - 1e-9)
+    freedom = float(info.traces.sum()) ** 2 / info.trace_square
+    statistic: Array = freedom * efficiency / (1.0 - efficiency)
+    statistic[outer.diagonal() <= TINY] = 0.0  # no instrument at all
+    return Hold(statistic, expected / achieved)
+
+
+def student_95(freedom: Array) -> Array:
+    """Two-sided 95 % quantile of Student's t."""
+    return np.asarray(stdtrit(np.maximum(freedom, 1.0), 0.975))
+
+
+def rivals(plan: Plan, solution: Solution) -> Index:
+    """(..., P) of each unknown the one of the same equation whose estimate is most correlated with its own."""
+    spread = np.sqrt(np.abs(diagonal(solution.inverse)))
+    # each row's own spread is common to all of it
+    correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)[..., None, :]
+    correlation *= plan.same - plan.unit
+    rival: Index = correlation.argmax(axis=-1)
+    return rival

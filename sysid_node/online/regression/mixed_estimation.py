@@ -1,0 +1,36 @@
+"""What the aircraft file believes, weighed with what the flight says.
+
+Both are normal: with the estimate's covariance P and tolerances D of the believed values, the mean is
+(P^-1 + D^-1)^-1 (P^-1 theta + D^-1 believed) (mixed estimation: Klein & Morelli 2006, sec. 5.4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.regression.least_squares import Plan
+
+Array = NDArray[np.float64]
+
+
+def beliefs(aircraft: Aircraft, plan: Plan) -> tuple[Array, Array]:
+    """(P, C) believed values and their precisions 1 / tolerance^2; precision 0 where the file states no tolerance."""
+    values, precisions = np.zeros(plan.mine.shape), np.zeros(plan.mine.shape)
+    for c, coefficient in enumerate(plan.coefficients):
+        for i in plan.unknowns(c).tolist():
+            belief = aircraft.derivatives[f"{coefficient}_{plan.regressors[i]}"]
+            values[i, c] = belief.value
+            if belief.tolerance:
+                precisions[i, c] = belief.tolerance**-2
+    return values, precisions
+
+
+def weighed(plan: Plan, theta: Array, covariance: Array, values: Array, precisions: Array) -> tuple[Array, Array]:
+    """``theta`` (..., P, C) and its ``covariance`` (C, P, P) with the beliefs counted in."""
+    believed = covariance @ (precisions * values).T[:, :, None]
+    # gain form: needs no inverse of a covariance that may be near singular
+    gain = plan.unit + covariance * precisions.T[:, None]
+    found = np.linalg.solve(gain, theta.swapaxes(-1, -2)[..., None] + believed)
+    return np.asarray(found[..., 0].swapaxes(-1, -2)), np.asarray(np.linalg.solve(gain, covariance))

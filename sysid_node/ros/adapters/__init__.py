@@ -1,1 +1,0 @@
-"""What other autopilots publish, as the identifier's topics. All but the node ``adapter`` itself runs without ROS."""

@@ -1,0 +1,85 @@
+"""Programs kept as JAX traced them: a process would trace anew, for seconds, what it then finds compiled.
+
+A program is kept under a digest of this package's sources, JAX's release, and what it was traced for; where any of
+these differs it is another program. Without the ``flatbuffers`` package, by which JAX writes programs, all are traced.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import threading
+from collections.abc import Callable
+from functools import cache, partial, wraps
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar
+
+import jax
+from jax import export
+
+from sysid_node.sim.compiled.xla import cache_folder
+
+_Result = TypeVar("_Result")
+
+
+def kept(fixed: int) -> Callable[[Callable[..., _Result]], Callable[..., _Result]]:
+    """Decorator: a compiled program for each value of the first ``fixed`` arguments, traced once and for all.
+
+    These arguments must be hashable and look the same in every process (functions go by their names); the others and
+    the result are trees of arrays, the result's of tuples that ``jax.export`` knows. Programs cannot be differentiated
+    further.
+    """
+
+    def decorated(function: Callable[..., _Result]) -> Callable[..., _Result]:
+        @wraps(function)
+        def program(*arguments: Any) -> _Result:
+            leaves, tree = jax.tree.flatten(arguments[fixed:])
+            shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in leaves]  # type: ignore[no-untyped-call]
+
+            def flat(*moving: Any) -> _Result:
+                return function(*arguments[:fixed], *jax.tree.unflatten(tree, moving))
+
+            if find_spec("flatbuffers") is None:
+                return flat(*leaves)
+            what = (function.__qualname__, *map(_said, arguments[:fixed]), tree, shapes)
+            found: Any = _program(repr(what), partial(export.export(jax.jit(flat)), *shapes))
+            result: _Result = found.call(*leaves)
+            return result
+
+        compiled: Callable[..., _Result] = jax.jit(program, static_argnums=tuple(range(fixed)))
+        return compiled
+
+    return decorated
+
+
+def _said(value: Any) -> str:
+    """A fixed argument as it looks in every process."""
+    return str(value.__qualname__) if callable(value) and hasattr(value, "__qualname__") else repr(value)
+
+
+def _program(what: str, traced: Callable[[], export.Exported]) -> export.Exported:
+    """The program from the disk; traced, and written there, where it is not or cannot be read."""
+    name = hashlib.sha256(f"{jax.__version__} {_sources()} {what}".encode()).hexdigest()
+    path = cache_folder("programs") / name
+    try:
+        return export.deserialize(bytearray(path.read_bytes()))
+    except Exception:  # whatever is there: another release's, half of one, none
+        found = traced()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        own = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+        own.write_bytes(found.serialize())
+        own.replace(path)
+    except OSError:
+        pass  # a cache that cannot be written is none
+    return found
+
+
+@cache
+def _sources() -> str:
+    """Digest of the package's sources."""
+    digest, package = hashlib.sha256(), Path(__file__).parents[2]
+    for path in sorted(package.rglob("*.py")):
+        digest.update(str(path.relative_to(package)).encode() + path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,157 @@
+"""A plain attitude-hold autopilot, so that simulated data look like flown data: surfaces answer to the motion.
+
+It holds trim attitude and airspeed with feedback that is limited to a share of each surface's travel, on top of the
+planned commands. Gains follow from the aircraft's steady responses (Stevens, Lewis & Johnson (2016), ch. 4: attitude
+loops around rate damping); they are plain, not optimal.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.sim.body import euler_angles, unpack
+from sysid_node.sim.flying.rollout import Flight, Inputs, fly
+from sysid_node.sim.flying.trim import Trim
+from sysid_node.sim.model.chain import Chain
+from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.simulator import Simulator
+from sysid_node.sim.stations import command
+
+Array = NDArray[np.float64]
+
+#: Bandwidth of the attitude loops, rad/s; of the integral in it, 1/s; of the airspeed loop, 1/s.
+_BANDWIDTH, _INTEGRAL, _SPEED = 1.5, 0.3, 0.4
+
+#: Share of a surface's travel that feedback may use.
+_SHARE = 0.5
+
+#: Longest command delay that a flight with the autopilot can have, s.
+_LONGEST_DELAY = 0.5
+
+#: Outputs that it looks at, in the order of the gain matrix's columns.
+_SEEN = ("p", "q", "r", "phi", "theta", "V")
+
+
+class Autopilot(NamedTuple):
+    """Feedback: correction = gains (seen - hold) + integral gains * time integral of it, limited."""
+
+    gains: Scalar  # (controls + 1, 6) on p q r phi theta V
+    integral: Scalar  # (controls + 1, 6)
+    hold: Scalar  # (6,)
+    limit: Scalar  # (controls + 1,) rad, N
+    lowest: Scalar  # (controls + 1,) limits of the command itself
+    highest: Scalar
+
+
+class _State(NamedTuple):
+    """Of the autopilot."""
+
+    integral: Scalar  # (6,)
+    history: Scalar  # (K, controls + 1) commands given, the newest last
+
+
+def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
+    """An autopilot that holds this trim. Loops whose surface the aircraft does not have stay open."""
+    aircraft, commands = simulator.aircraft, simulator.commands
+    gains, integral = np.zeros((len(commands), len(_SEEN))), np.zeros((len(commands), len(_SEEN)))
+    for control, entries in _loops(aircraft).items():
+        for seen, gain in entries.items():
+            gains[commands.index(control), _SEEN.index(seen)] = gain
+            if seen in ("phi", "theta"):
+                integral[commands.index(control), _SEEN.index(seen)] = _INTEGRAL * gain
+    limits = np.minimum(np.asarray(simulator.model.limits), 0.5)
+    thrust = min(float(simulator.model.max_thrust), 10.0 * 9.8 * aircraft.mass) if aircraft.throttle else 0.0
+    attitude = euler_angles(unpack(jnp.asarray(trim.initial)).attitude)
+    speed = float(np.linalg.norm(trim.initial[3:6]))
+    return Autopilot(
+        gains=jnp.asarray(gains),
+        integral=jnp.asarray(integral),
+        hold=jnp.asarray([0.0, 0.0, 0.0, attitude.x, attitude.y, speed]),
+        limit=jnp.asarray([*(_SHARE * limits), thrust]),
+        lowest=jnp.asarray([*(-np.asarray(simulator.model.limits)), 0.0]),
+        highest=jnp.asarray([*np.asarray(simulator.model.limits), thrust]),
+    )
+
+
+def fly_held(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, autopilot: Autopilot) -> Flight:
+    """A flight from trim with the autopilot on; ``inputs.commands`` are what is planned, trim included."""
+    history = round(_LONGEST_DELAY * simulator.rate) + 2
+    flight: Flight = _fly_held(
+        simulator.layout, history, simulator.model, theta, trim.initial, inputs, simulator.step, autopilot
+    )
+    return flight
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _fly_held(
+    layout: Layout,
+    history: int,
+    model: Model,
+    theta: Scalar,
+    initial: Scalar,
+    inputs: Inputs,
+    step: Scalar,
+    autopilot: Autopilot,
+) -> Flight:
+    chain = Chain.of(layout, model, theta, step, -initial[2])
+    columns = jnp.array([OUTPUTS.index(name) for name in _SEEN])
+
+    def pilot(state: _State, outputs: Scalar, planned: Scalar) -> tuple[Scalar, Scalar, _State]:
+        error = outputs[columns] - autopilot.hold
+        # sums, not matrix products: XLA would call a library for these and leave the loop's kernel
+        wanted = jnp.sum(autopilot.gains * error + autopilot.integral * state.integral, axis=1)
+        correction = jnp.clip(wanted, -autopilot.limit, autopilot.limit)
+        held = jnp.any(jnp.abs(wanted) > autopilot.limit)  # no winding up
+        given = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)
+        past = jnp.concatenate([state.history[1:], given[None]])
+        arriving = command.arrive_from_history(chain.effects, past, step)
+        return given, arriving, _State(state.integral + jnp.where(held, 0.0, error * step), past)
+
+    start = _State(jnp.zeros(len(_SEEN)), jnp.tile(inputs.commands[0], (history, 1)))
+    return fly(chain, initial, inputs, pilot, start)
+
+
+def _loops(aircraft: Aircraft) -> dict[str, dict[str, float]]:
+    """control -> output -> gain, from the aircraft's steady responses."""
+    loops: dict[str, dict[str, float]] = {}
+    pitch, roll, yaw = _pitch_response(aircraft), _roll_response(aircraft), _value(aircraft, "Cn_dr")
+    if pitch:
+        loops["elevator"] = {"theta": -_BANDWIDTH / pitch, "q": -0.2 * _BANDWIDTH / pitch}
+    if roll:
+        loops["aileron"] = {"phi": -_BANDWIDTH / roll, "p": -0.05 * _BANDWIDTH / roll}
+    if yaw:
+        span, speed = aircraft.geometry.b, aircraft.reference.airspeed
+        damping = abs(_value(aircraft, "Cn_r")) * span / (2.0 * speed)  # doubles the natural one
+        loops["rudder"] = {"r": -damping / yaw}
+    if aircraft.throttle is not None:
+        loops["thrust"] = {"V": -_SPEED * aircraft.mass}
+    return {control: entries for control, entries in loops.items() if control in (*aircraft.controls, "thrust")}
+
+
+def _pitch_response(aircraft: Aircraft) -> float:
+    """Steady turning of the flight path, rad/s for each rad of elevator."""
+    if not _value(aircraft, "Cm_alpha"):
+        return 0.0
+    alpha = _value(aircraft, "Cm_de") / abs(_value(aircraft, "Cm_alpha"))
+    lift = _value(aircraft, "CL_alpha") * alpha + _value(aircraft, "CL_de")
+    reference = aircraft.reference
+    return 0.5 * reference.air_density * reference.airspeed * aircraft.geometry.S / aircraft.mass * lift
+
+
+def _roll_response(aircraft: Aircraft) -> float:
+    """Steady roll rate, rad/s for each rad of aileron."""
+    damping = _value(aircraft, "Cl_p")
+    if not damping:
+        return 0.0
+    return -_value(aircraft, "Cl_da") / damping * 2.0 * aircraft.reference.airspeed / aircraft.geometry.b
+
+
+def _value(aircraft: Aircraft, name: str) -> float:
+    return aircraft.derivatives[name].value if name in aircraft.derivatives else 0.0

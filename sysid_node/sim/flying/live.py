@@ -1,0 +1,161 @@
+"""A flight one sample at a time: the same chain as ``rollout``, for a pilot that is another program.
+
+    flight = start(simulator, trim, Air(seed=1), simulator.neutral())
+    now = step(simulator, flight, command)     # what the instruments read now, and the flight moves on by a sample
+
+Effects are an argument of every step: they come and go in flight. What the command of one step asks for, the surfaces
+reach at the end of the next sample. Of the station ``clock`` nothing is here: stamps are the sender's business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.errors import InputError
+from sysid_node.sim.body import STATES
+from sysid_node.sim.effects import EFFECTS
+from sysid_node.sim.flying.rollout import Pilot, advance, begin
+from sysid_node.sim.flying.trim import Trim
+from sysid_node.sim.model import parameters
+from sysid_node.sim.model.chain import Chain
+from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.signals.atmosphere import air_density
+from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
+from sysid_node.sim.simulator import Simulator
+from sysid_node.sim.stations import airflow, command
+
+Array = NDArray[np.float64]
+
+#: Longest command delay that a live flight can have, s.
+_LONGEST_DELAY = 0.5
+
+#: Turbulence repeats after this time, and its end is faded into its beginning over the next, s.
+_PERIOD, _FADE = 300.0, 10.0
+
+#: Where a reading's outputs, state and surfaces begin.
+_PARTS = (1, 1 + len(OUTPUTS), 1 + len(OUTPUTS) + len(STATES))
+
+
+@dataclass(frozen=True)
+class Air:
+    """The weather and the instruments' noise (share of the aircraft file's); height above the ground in m."""
+
+    turbulence: str = "none"  # none, light, moderate, severe
+    height: float = 100.0
+    noise: float = 1.0
+    seed: int = 0
+
+
+class Reading(NamedTuple):
+    """What one step gives: the instruments, and the truth, at the step's beginning."""
+
+    time: float  # s
+    outputs: Array  # (12,) layout.OUTPUTS
+    state: Array  # (13,) body.STATES
+    surfaces: Array  # (controls + 1,) true positions rad, thrust N
+    density: float  # kg/m^3
+
+
+class _Carried(NamedTuple):
+    """What a step hands to the next."""
+
+    carry: Any
+    history: Scalar  # (K, controls + 1) commands, the newest last
+    surfaces: Scalar  # (controls + 1,) now
+
+
+@dataclass
+class Live:
+    """A flight under way."""
+
+    theta: Array  # (P,) without weather and noise: may be replaced between steps
+    samples: int
+    altitude: float
+    turbulence: Array  # (N, 6) repeats
+    intensity: float  # m/s
+    noise: float
+    random: np.random.Generator
+    carried: _Carried
+
+
+def start(simulator: Simulator, trim: Trim, air: Air, theta: Array) -> Live:
+    """A flight that begins in trim. Raises InputError on unknown turbulence or an effect of the clock."""
+    if air.turbulence not in INTENSITIES:
+        raise InputError(f"turbulence {air.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
+    gusts, noise = np.random.default_rng(air.seed).spawn(2)
+    speed = float(np.linalg.norm(trim.initial[3:6]))
+    intensity = INTENSITIES[air.turbulence]
+    turbulence = np.zeros((1, 6))
+    if intensity:
+        turbulence = _endless(Dryden.at(air.height, simulator.aircraft.geometry.b), simulator.rate, speed, gusts)
+    altitude = -float(trim.initial[2])
+    first = jnp.concatenate([jnp.asarray(trim.command), intensity * jnp.asarray(turbulence[0])])
+    history = round(_LONGEST_DELAY * simulator.rate) + 2
+    carried = _begin(simulator.layout, history, simulator.model, theta, simulator.step, trim.initial, first)
+    return Live(theta, 0, altitude, turbulence, intensity, air.noise, noise, carried)
+
+
+def step(simulator: Simulator, live: Live, commands: Sequence[float]) -> Reading:
+    """Read the instruments and fly on for one sample with commands (controls + 1,): rad, thrust in N."""
+    time = live.samples * simulator.step
+    gust = live.intensity * live.turbulence[(live.samples + 1) % len(live.turbulence)]
+    noise = live.noise * live.random.standard_normal(len(OUTPUTS))
+    row = np.concatenate([commands, gust, noise, (time + simulator.step, live.altitude)])
+    live.carried, reading = _advance(simulator.layout, simulator.model, live.theta, simulator.step, live.carried, row)
+    live.samples += 1
+    density, outputs, state, surfaces = np.split(np.asarray(reading), _PARTS)
+    return Reading(time, outputs, state, surfaces, float(density[0]))
+
+
+def vector(simulator: Simulator, effects: Sequence[str]) -> Array:
+    """The vector (P,) of effects ``name:key=value``. Raises InputError, also on effects that a live flight lacks."""
+    for name in parameters.parse(effects):
+        if EFFECTS[name].station == "clock" or name in ("turbulence", "sensor_noise", "actuator_stamp_delay"):
+            raise InputError(f"effect {name} cannot be switched on in a live flight; choose another")
+    return simulator.vector(effects)
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _begin(
+    layout: Layout, history: int, model: Model, theta: Scalar, step: Scalar, initial: Scalar, first: Scalar
+) -> _Carried:
+    chain = Chain.of(layout, model, theta, step, -initial[2])
+    commands, gusts = first[:-6], first[-6:]
+    carry, surfaces = begin(chain, initial, commands, gusts, ())
+    return _Carried(carry, jnp.tile(commands, (history, 1)), surfaces)
+
+
+@partial(jax.jit, static_argnums=0)
+def _advance(
+    layout: Layout, model: Model, theta: Scalar, step: Scalar, carried: _Carried, row: Scalar
+) -> tuple[_Carried, Scalar]:
+    m = len(layout.commands)
+    commands, gust, noise, time, altitude = row[:m], row[m : m + 6], row[m + 6 : -2], row[-2], row[-1]
+    chain = Chain.of(layout, model, theta, step, altitude)
+    chain.effects["sensor_noise"] = {"scale": jnp.ones(())}  # the noise comes to scale
+    gusts = airflow.gusts(model, chain.effects, gust, jnp.zeros(6), time)
+    past = jnp.concatenate([carried.history[1:], commands[None]])
+    arriving = command.arrive_from_history(chain.effects, past, step)
+    follow: Pilot = lambda state, outputs, planned: (planned, planned, outputs)  # noqa: E731
+    # the pilot's state brings out what the instruments read
+    carry, (_, state, _, moved) = advance(chain, follow, carried.carry._replace(pilot=()), arriving, gusts, time, noise)
+    density = air_density(-state[2])
+    reading = jnp.concatenate([density[None], carry.pilot, state, carried.surfaces])
+    return _Carried(carry._replace(pilot=()), past, moved[:m]), reading
+
+
+def _endless(dryden: Dryden, rate: float, speed: float, random: np.random.Generator) -> Array:
+    """A realisation that can be repeated: what follows its end is faded into its beginning, its variance kept."""
+    count, fade = round(_PERIOD * rate), round(_FADE * rate)
+    whole = dryden.realisation(count + fade, rate, speed, random)
+    angle = 0.5 * np.pi * np.arange(fade)[:, None] / fade
+    whole[:fade] = np.sin(angle) * whole[:fade] + np.cos(angle) * whole[count:]
+    return whole[:count]

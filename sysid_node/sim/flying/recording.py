@@ -1,0 +1,125 @@
+"""What the recorder of a real aircraft would hold of a simulated flight: messages at each instrument's own rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Streams
+from sysid_node.sim.flying.sortie import Sortie
+from sysid_node.sim.signals.atmosphere import air_density
+
+Array = NDArray[np.float64]
+
+#: Stamp of the first instant: a fixed date (2026-01-01), so that the same flight gives the same bag.
+START_NS = 1_767_225_600_000_000_000
+
+_GRAVITY = 9.80665
+#: Least steps of the readings: accelerometers of 16 bits over +-16 g, gyroscopes over +-2000 deg/s, airspeed 1 cm/s,
+#: vanes of 14 bits over a turn; attitude is a filter's output and has none.
+_STEPS = np.array(
+    [32 * _GRAVITY / 2**16] * 3 + [np.deg2rad(4000.0) / 2**16] * 3 + [0.0] * 3 + [0.01] + [2 * np.pi / 2**14] * 2
+)
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Rates (Hz), jitter (s rms) of when an instrument is read, latency (s) from stamp to log, and what is recorded."""
+
+    imu_rate: float = 200.0
+    air_data_rate: float = 100.0
+    actuator_rate: float = 100.0
+    jitter: float = 0.0002
+    latency: float = 0.002
+    quantise: bool = True
+    surfaces: Literal["commanded", "measured"] = "commanded"
+
+    def __post_init__(self) -> None:
+        for name in ("imu_rate", "air_data_rate", "actuator_rate"):
+            if not 1.0 <= getattr(self, name) <= 5000.0:
+                raise InputError(f"{name} {getattr(self, name):g} Hz: expected 1 to 5000 Hz")
+        if self.surfaces not in ("commanded", "measured"):
+            raise InputError(f"surfaces {self.surfaces!r}: expected commanded or measured")
+
+    def record(self, sortie: Sortie) -> Streams:
+        """The messages of a flight; stamps say when each instrument was read, but for the effects of the clock."""
+        random = np.random.default_rng(sortie.conditions.seed).spawn(3)[2]
+        span = (len(sortie.flight.outputs) - 1) * sortie.simulator.step
+        rates = (self.imu_rate, self.air_data_rate, self.actuator_rate)
+        times = [_instants(rate, span, self.jitter, random) for rate in rates]
+        imu, air, actuators = self._arrivals(times, random)
+        inertial, flow = self._readings(sortie, times[0]), self._readings(sortie, times[1])
+        altitude = np.interp(times[1], _grid(sortie), -np.asarray(sortie.flight.states[:, 2]))
+        density = np.round(np.asarray(air_density(altitude)), 5)
+        joints, positions = _joints(sortie.simulator.aircraft, self._controls(sortie, times[2]))
+        return Streams(
+            ImuStream(imu, inertial[:, :6], inertial[:, 6:9], "imu"),
+            AirDataStream(air, np.column_stack([flow[:, 9:], density])),
+            JointStream(actuators, joints, positions),
+            f"simulated {sortie.simulator.aircraft.name}",
+        )
+
+    def _readings(self, sortie: Sortie, times: Array) -> Array:
+        """All readings (N, 12) at the times: the motion between samples, the noise of the nearest sample."""
+        grid, outputs = _grid(sortie), np.asarray(sortie.flight.outputs)
+        noise = _noise(sortie)
+        nearest = np.clip(np.round(times * sortie.simulator.rate).astype(int), 0, len(grid) - 1)
+        readings = CubicSpline(grid, outputs - noise)(times) + noise[nearest]
+        steps = np.where(_STEPS > 0.0, _STEPS, 1.0)
+        rounded: Array = np.where((_STEPS > 0.0) & self.quantise, np.round(readings / steps) * steps, readings)
+        return rounded
+
+    def _controls(self, sortie: Sortie, times: Array) -> Array:
+        """Controls and thrust (N, controls + 1) as the actuators' messages have them."""
+        known = sortie.flight.commands if self.surfaces == "commanded" else sortie.flight.surfaces
+        late = sortie.effects.get("actuator_stamp_delay", {}).get("delay", 0.0)
+        return np.column_stack([np.interp(times - late, _grid(sortie), column) for column in np.asarray(known).T])
+
+    def _arrivals(self, times: list[Array], random: np.random.Generator) -> list[Arrival]:
+        """Stamps, when each message was logged, and its place among all."""
+        stamps = [START_NS + np.round(t * 1e9).astype(np.int64) for t in times]
+        delays = [self.latency * (0.5 + random.random(t.size)) for t in times]
+        logged = [s + np.round(1e9 * d).astype(np.int64) for s, d in zip(stamps, delays, strict=True)]
+        logged = [np.maximum.accumulate(x) for x in logged]  # a topic's messages do not overtake one another
+        every = np.concatenate(logged)
+        place = np.empty(every.size, np.int64)
+        place[np.argsort(every, kind="stable")] = np.arange(every.size)
+        places = np.split(place, np.cumsum([x.size for x in logged])[:-1])
+        return [Arrival(s, x, p) for s, x, p in zip(stamps, logged, places, strict=True)]
+
+
+def _grid(sortie: Sortie) -> Array:
+    return np.arange(len(sortie.flight.outputs), dtype=float) * np.float64(sortie.simulator.step)
+
+
+def _noise(sortie: Sortie) -> Array:
+    """The white noise (N, 12) in the flight's outputs."""
+    scale = sortie.effects.get("sensor_noise", {}).get("scale", 0.0)
+    return np.asarray(scale * sortie.simulator.model.noise * sortie.inputs.noise)
+
+
+def _instants(rate: float, span: float, jitter: float, random: np.random.Generator) -> Array:
+    """When an instrument of this rate is read, s: regular but for a jitter of at most a fifth of the period."""
+    regular = np.arange(int(span * rate + 1e-9) + 1) / rate
+    off = np.clip(jitter * random.standard_normal(regular.size), -0.2 / rate, 0.2 / rate)
+    instants: Array = np.clip(regular + off, 0.0, span)
+    return instants
+
+
+def _joints(aircraft: Aircraft, controls: Array) -> tuple[tuple[str, ...], Array]:
+    """Joint names and positions (N, J) from controls and thrust (N, controls + 1): the file's map turned round."""
+    surfaces = list(aircraft.controls.values())
+    names = tuple(dict.fromkeys(joint for control in surfaces for joint in control.joints))
+    scales = np.array([[control.joints.get(name, 0.0) for name in names] for control in surfaces])
+    offsets = np.array([control.offset for control in surfaces])
+    positions: Array = np.asarray((controls[:, :-1] - offsets) @ np.linalg.pinv(scales).T, dtype=float)
+    if aircraft.throttle is None:
+        return names, positions
+    lever = controls[:, -1] / (aircraft.throttle.max_thrust or 1.0)
+    return (*names, aircraft.throttle.joint), np.column_stack([positions, lever])

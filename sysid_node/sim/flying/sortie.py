@@ -1,0 +1,113 @@
+"""A whole simulated flight: trim, weather, autopilot, noise; from planned deflections to what was flown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.errors import InputError
+from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
+from sysid_node.sim.flying.rollout import Flight, Inputs
+from sysid_node.sim.flying.trim import Trim, trim_flight
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.model.parameters import parse
+from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
+from sysid_node.sim.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+Effects = Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """In what the flight is flown."""
+
+    effects: Effects | Sequence[str] = field(default_factory=dict)  # by which the aircraft differs from its file
+    airspeed: float | None = None  # m/s, of the trim; None: the reference one
+    turbulence: str = "none"  # none, light, moderate, severe
+    height: float = 100.0  # m above the ground: scale length of the turbulence
+    autopilot: bool = True
+    noise: float = 1.0  # of the aircraft file's sigmas
+    seed: int = 0
+    rotary_gusts: bool = True  # whether the air of the turbulence turns, too
+
+
+@dataclass(frozen=True)
+class Sortie:
+    """A flight and everything that made it."""
+
+    simulator: Simulator
+    conditions: Conditions
+    effects: dict[str, dict[str, float]]  # all of them: those asked for, turbulence and noise
+    theta: Array  # (P,)
+    trim: Trim
+    inputs: Inputs
+    flight: Flight
+
+    @property
+    def derivatives(self) -> dict[str, float]:
+        """The true derivatives: the file's plus ``derivative_error``."""
+        error = self.effects.get("derivative_error", {})
+        return {name: d.value + error.get(name, 0.0) for name, d in self.simulator.aircraft.derivatives.items()}
+
+
+def fly_sortie(simulator: Simulator, deflections: Array, conditions: Conditions | None = None) -> Sortie:
+    """Fly deflections (N, controls + 1) from trim (rad, N), sampled at the simulator's rate.
+
+    The flight begins in trim with its effects. Raises InputError: no trim, a surface beyond its limit, divergence.
+    """
+    conditions = conditions or Conditions()
+    effects = _all_effects(conditions)
+    theta = simulator.vector(effects)
+    trim = trim_flight(simulator, conditions.airspeed, theta)
+    commands = trim.command + deflections
+    _check_travel(simulator, commands)
+    inputs = _inputs(simulator, trim, commands, conditions)
+    if conditions.autopilot:
+        flight = fly_held(simulator, theta, trim, inputs, autopilot_for(simulator, trim))
+    else:
+        flight = simulator.rollout(theta, trim.initial, inputs)
+    return Sortie(simulator, conditions, effects, theta, trim, inputs, simulator.check(flight))
+
+
+def _all_effects(conditions: Conditions) -> dict[str, dict[str, float]]:
+    """The effects asked for, with turbulence and noise as the conditions have them."""
+    asked = conditions.effects if isinstance(conditions.effects, Mapping) else parse(conditions.effects)
+    effects = {name: dict(values) for name, values in asked.items()}
+    if conditions.turbulence not in INTENSITIES:
+        raise InputError(f"turbulence {conditions.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
+    intensity = INTENSITIES[conditions.turbulence]
+    for name, key, value in (("turbulence", "intensity", intensity), ("sensor_noise", "scale", conditions.noise)):
+        if value and name not in effects:
+            effects[name] = {key: value}
+    return effects
+
+
+def _check_travel(simulator: Simulator, commands: Array) -> None:
+    """Raise where trim and manoeuvre together pass a control's limit."""
+    limits = np.asarray(simulator.model.limits)
+    beyond = np.abs(commands[:, :-1]) > limits * (1.0 + 1e-9)
+    if beyond.any():
+        k, i = np.unravel_index(int(beyond.argmax()), beyond.shape)
+        raise InputError(
+            f"manoeuvre: trim included, {simulator.commands[i]} reaches {commands[k, i]:.4g} rad at "
+            f"{k * simulator.step:.2f} s, but its limit is {limits[i]:g}; lower the amplitude"
+        )
+
+
+def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: Conditions) -> Inputs:
+    """Commands, with realisations of turbulence and noise from the seed."""
+    turbulence, noise = np.random.default_rng(conditions.seed).spawn(2)
+    samples = len(commands)
+    speed = float(np.linalg.norm(trim.initial[3:6]))
+    dryden = Dryden.at(conditions.height, simulator.aircraft.geometry.b)
+    gusts = dryden.realisation(samples, simulator.rate, speed, turbulence)
+    gusts[:, 3:] *= conditions.rotary_gusts
+    return simulator.inputs(
+        jnp.asarray(commands), turbulence=gusts, noise=noise.standard_normal((samples, len(OUTPUTS)))
+    )

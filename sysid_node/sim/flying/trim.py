@@ -1,0 +1,166 @@
+"""Trim: the state and the command at which a flight goes on unchanged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from sysid_node.errors import InputError
+from sysid_node.sim import body as rigid
+from sysid_node.sim.flying.rollout import settled
+from sysid_node.sim.model.chain import Chain, derivative, drive_of
+from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.signals.atmosphere import GRAVITY, altitude_of
+from sysid_node.sim.simulator import Simulator
+from sysid_node.sim.stations import actuator, propulsion
+from sysid_node.sim.stations.airflow import velocity_of
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Largest acceleration that a trim may leave over, m/s^2 and rad/s^2.
+_TOLERANCE = 1e-8
+
+#: What a trim looks for besides the command, rad.
+_ANGLES = ("alpha", "beta", "phi", "theta", "gamma")
+
+
+class Point(NamedTuple):
+    """Where a trim is sought."""
+
+    airspeed: Scalar  # m/s
+    altitude: Scalar  # m
+    heading: Scalar  # rad
+
+
+@dataclass(frozen=True)
+class Trim:
+    """A steady, straight flight: the body's state (13,) and the command (controls + 1,) that keeps it."""
+
+    initial: Array
+    command: Array
+    alpha: float  # rad
+    gamma: float  # rad, climb angle through the air
+
+
+def trim_flight(
+    simulator: Simulator,
+    airspeed: float | None = None,
+    theta: Array | None = None,
+    climb_angle: float = 0.0,
+    altitude: float | None = None,
+    heading: float = 0.0,
+) -> Trim:
+    """Steady, straight flight without sideslip, wings as level as the aircraft allows.
+
+    ``airspeed`` m/s (default: the reference one), ``theta`` the effects (default: neutral), ``climb_angle`` rad (an
+    aircraft without an engine glides: it is found), ``altitude`` m (default: of the reference density). With fewer
+    than three controls the sideslip is free. Raises InputError where the aircraft cannot fly so, naming what stops it.
+    """
+    reference = simulator.aircraft.reference
+    speed = reference.airspeed if airspeed is None else airspeed
+    if not (np.isfinite(speed) and speed > 0.0):
+        raise InputError(f"trim: airspeed {speed:g} m/s: expected more than zero")
+    height = altitude_of(reference.air_density) if altitude is None else altitude
+    point = Point(jnp.asarray(speed), jnp.asarray(height), jnp.asarray(heading))
+    vector = simulator.neutral() if theta is None else theta
+    start, lower, upper, free = _search_space(simulator, climb_angle)
+    found, left = _solve(simulator, vector, point, start, (lower, upper), free)
+    if np.abs(left).max() > _TOLERANCE:
+        raise InputError(_why_not(simulator, speed, found, lower, upper))
+    state = np.asarray(_state(point, jnp.asarray(found)))
+    return Trim(state, found[len(_ANGLES) :], float(found[0]), float(found[4]))
+
+
+def _solve(
+    simulator: Simulator, theta: Array, point: Point, start: Array, bounds: tuple[Array, Array], free: Index
+) -> tuple[Array, Array]:
+    """Everything (angles, command) at the trim, and the residual there."""
+    fixed = (simulator.layout, simulator.model, theta, point)
+
+    def whole(z: Array) -> Scalar:
+        return jnp.asarray(start).at[free].set(z)
+
+    def residual(z: Array) -> Array:
+        return np.asarray(_residual(*fixed, whole(z)))
+
+    def slope(z: Array) -> Array:
+        return np.asarray(_slope(*fixed, whole(z)))[:, free]
+
+    solution = least_squares(
+        residual,
+        start[free],
+        slope,
+        bounds=(bounds[0][free], bounds[1][free]),
+        x_scale=np.where(free == len(start) - 1, simulator.aircraft.mass, 0.1),
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    return np.asarray(whole(solution.x)), solution.fun
+
+
+def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Array, Array, Index]:
+    """Start, lower and upper bound of everything, and which of it is free."""
+    model, powered = simulator.model, simulator.aircraft.throttle is not None
+    weight = float(model.mass) * GRAVITY
+    thrust = min(0.1 * weight, 0.5 * float(model.max_thrust)) if powered else 0.0
+    alpha = float(model.alpha)
+    start = np.array([alpha, 0.0, 0.0, alpha + climb_angle, climb_angle, *np.zeros(len(model.limits)), thrust])
+    top = [0.7, 0.5, 1.0, 1.5, 1.5, *np.minimum(model.limits, 1.5)]
+    upper = np.array([*top, min(float(model.max_thrust), 20.0 * weight)])
+    lower = np.array([*(-x for x in top), -1e-9])
+    fixed = {1} if len(model.limits) >= 3 else set()
+    fixed |= {4} if powered else {len(start) - 1}
+    return start, lower, upper, np.array([i for i in range(len(start)) if i not in fixed])
+
+
+@partial(jax.jit, static_argnums=0)
+def _residual(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scalar) -> Scalar:
+    """Accelerations (6,) and what is wrong with the climb angle."""
+    chain = Chain.of(layout, model, theta, jnp.asarray(0.01), point.altitude)
+    command = z[len(_ANGLES) :]
+    zero = jnp.zeros(())
+    motor = propulsion.commanded(model, command[-1])
+    drive, _ = drive_of(chain, actuator.start(model, command[:-1]).position, motor, jnp.zeros(6), zero)
+    state = _state(point, z)
+    rates, _ = derivative(chain, settled(chain, state, drive), drive)
+    body = rigid.unpack(state)
+    sink = rigid.to_earth(body.attitude, body.velocity).z
+    return jnp.concatenate([rates[3:6], rates[10:13], (sink / point.airspeed + jnp.sin(z[4]))[None]])
+
+
+@partial(jax.jit, static_argnums=0)
+def _slope(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scalar) -> Scalar:
+    """Of the residual, to everything."""
+    slope: Scalar = jax.jacfwd(lambda y: _residual(layout, model, theta, point, y))(z)
+    return slope
+
+
+def _state(point: Point, z: Scalar) -> Scalar:
+    """The body's state (13,)."""
+    alpha, beta, phi, theta = z[0], z[1], z[2], z[3]
+    zero = jnp.zeros(())
+    velocity = velocity_of(point.airspeed, alpha, beta)
+    attitude = rigid.quaternion(phi, theta, point.heading)
+    return jnp.stack([zero, zero, -point.altitude, *velocity, *attitude, zero, zero, zero])
+
+
+def _why_not(simulator: Simulator, speed: float, found: Array, lower: Array, upper: Array) -> str:
+    """One line: what is at its limit, and what to try."""
+    names = (*_ANGLES, *simulator.commands)
+    margin = 1e-3 * (upper - lower)
+    at_limit = [n for n, x, a, b, m in zip(names, found, lower, upper, margin, strict=True) if x < a + m or x > b - m]
+    limits = ", ".join(n for n in at_limit if n not in ("beta", "gamma"))
+    reason = f"{limits} at its limit" if limits else "the forces do not balance"
+    return (
+        f"aircraft {simulator.aircraft.name!r}: no steady flight at {speed:g} m/s ({reason}); "
+        "try another airspeed or smaller effects"
+    )

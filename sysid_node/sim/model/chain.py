@@ -1,0 +1,144 @@
+"""The chain at one instant: from the state and what drives it to the rates of the state and the motion behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from sysid_node.sim import body as rigid
+from sysid_node.sim.body import MassProperties, Vector
+from sysid_node.sim.effects import stall_separation, steady_wind, unsteady_aerodynamics
+from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.parameters import Parameters, unpack
+from sysid_node.sim.signals.atmosphere import GRAVITY, air_density
+from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
+from sysid_node.sim.stations.aerodynamics import Coefficients
+from sysid_node.sim.stations.airflow import Air
+
+#: Places in the continuous state (16,), after the body's: attached fraction of the flow, modal displacement and speed.
+SEPARATION, MODE, MODE_RATE = 13, 14, 15
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    meta_fields=["layout"],
+    data_fields=["model", "effects", "body", "step", "altitude"],
+)
+@dataclass(frozen=True)
+class Chain:
+    """An aircraft with its effects, ready to fly: what does not change during a flight."""
+
+    layout: Layout
+    model: Model
+    effects: dict[str, Values]
+    body: MassProperties
+    step: Scalar  # s
+    altitude: Scalar  # m, at the start
+
+    @classmethod
+    def of(cls, layout: Layout, model: Model, theta: Parameters, step: Scalar, altitude: Scalar) -> Chain:
+        """From the parameter vector (P,)."""
+        effects = unpack(layout, theta)
+        return cls(layout, model, effects, mass.properties(model, effects), step, altitude)
+
+
+class Drive(NamedTuple):
+    """What moves the body at one instant."""
+
+    surfaces: Scalar  # (controls,) deflections that count, rad
+    thrust: Scalar  # N
+    gusts: Scalar  # (6,)
+
+
+class Load(NamedTuple):
+    """Everything that acts on the aircraft but gravity, about the file's CG, body axes."""
+
+    coefficients: Coefficients
+    force: Vector  # N
+    moment: Vector  # N m
+
+
+class Motion(NamedTuple):
+    """What the instruments feel of an instant."""
+
+    air: Air
+    coefficients: Coefficients
+    specific_force: Vector  # at the CG, m/s^2
+    acceleration: Vector  # angular, rad/s^2
+    mode_acceleration: Scalar  # m/s^2
+
+
+@jax.jit
+def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, Motion]:
+    """d/dt of the continuous state (16,), and the motion behind it."""
+    effects, state = chain.effects, rigid.unpack(x)
+    altitude = -state.position.z
+    air = airflow.meet(state.velocity, state.rates, drive.gusts, air_density(altitude))
+    free_fall = rigid.down_in_body(state.attitude).times(GRAVITY).minus(state.rates.cross(state.velocity))
+    load = steady_load(chain, air, drive, x[SEPARATION], altitude - chain.altitude)
+    alpha_rate = rate_of_alpha(chain, air, load.force.times(1.0 / chain.body.mass).plus(free_fall))
+    load = unsteady_load(chain, air, load, alpha_rate)
+    specific_force, acceleration = mass.accelerations(chain.body, state.rates, load.force, load.moment)
+    mode_rate, mode_acceleration = structure.rate(effects, x[MODE], x[MODE_RATE], specific_force.z)
+    over_ground = steady_wind.apply(effects["steady_wind"], rigid.to_earth(state.attitude, state.velocity))
+    rates = (
+        *over_ground,
+        *specific_force.plus(free_fall),
+        *rigid.attitude_rate(state.attitude, state.rates),
+        *acceleration,
+        separation_rate(chain, air, x[SEPARATION], alpha_rate),
+        mode_rate,
+        mode_acceleration,
+    )
+    return jnp.stack(rates), Motion(air, load.coefficients, specific_force, acceleration, mode_acceleration)
+
+
+def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb: Scalar) -> Load:
+    """Aerodynamics and propulsion without what the rate of alpha adds; climb (m) since the start."""
+    layout, model, effects = chain.layout, chain.model, chain.effects
+    surfaces = [drive.surfaces[..., i] for i in range(len(layout.controls))]
+    bent = aerodynamics.deflections(layout, model, effects, surfaces, air, drive.thrust)
+    regressors = aerodynamics.regressors(layout, model, air, bent)
+    coefficients = aerodynamics.coefficients(layout, model, effects, regressors, separation, climb)
+    force, moment = aerodynamics.load(model, air, coefficients)
+    pull, pull_moment = propulsion.load(model, effects, drive.thrust, air.alpha)
+    return Load(coefficients, force.plus(pull), moment.plus(pull_moment))
+
+
+def unsteady_load(chain: Chain, air: Air, steady: Load, alpha_rate: Scalar) -> Load:
+    """With what the rate of alpha (rad/s) adds."""
+    extra = aerodynamics.of_alpha_rate(chain.model, chain.effects, air, alpha_rate)
+    force, moment = aerodynamics.load(chain.model, air, extra)
+    total = Coefficients(*(a + b for a, b in zip(steady.coefficients, extra, strict=True)))
+    return Load(total, steady.force.plus(force), steady.moment.plus(moment))
+
+
+def rate_of_alpha(chain: Chain, air: Air, velocity_rate: Vector) -> Scalar:
+    """dalpha/dt (rad/s) in quasi-steady gusts from dv/dt (m/s^2, body axes), the lift that it makes itself included."""
+    u, _, w = air.velocity
+    forward = u * u + w * w
+    without = (u * velocity_rate.z - w * velocity_rate.x) / forward
+    pressure_area = air.pressure * chain.model.area
+    relief = pressure_area * chain.model.chord / (2.0 * air.speed * chain.body.mass * jnp.sqrt(forward))
+    return unsteady_aerodynamics.solve_rate(chain.effects["unsteady_aerodynamics"], without, relief)
+
+
+def separation_rate(chain: Chain, air: Air, separation: Scalar, alpha_rate: Scalar) -> Scalar:
+    """d/dt of the attached fraction of the flow, 1/s."""
+    time_scale = chain.model.chord / air.speed
+    values = chain.effects["stall_separation"]
+    attached = stall_separation.attached(values, air.alpha, alpha_rate, time_scale)
+    return stall_separation.rate(values, separation, attached, time_scale)
+
+
+def drive_of(chain: Chain, actuators: Scalar, motor: Scalar, gusts: Scalar, time: Scalar) -> tuple[Drive, Scalar]:
+    """What moves the body, and the true surfaces and thrust (controls + 1,), at a time (s), by where the actuators
+    (controls,) stand (rad) and the motor (N)."""
+    surfaces = actuator.positions(chain.layout, chain.effects, actuators, time)
+    effective = actuator.effective(chain.layout, chain.effects, surfaces, time)
+    thrust = propulsion.thrust(chain.effects, motor)
+    return Drive(jnp.stack(effective, -1), thrust, gusts), jnp.stack([*surfaces, thrust], -1)

@@ -1,0 +1,130 @@
+"""An aircraft as the simulator sees it: what shapes the program (Layout) and what are numbers in it (Model).
+
+Two aircraft of the same Layout share one compiled program.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import split_derivative
+from sysid_node.errors import InputError
+from sysid_node.sim.signals.atmosphere import GRAVITY
+
+#: A scalar, or a time series of one: stations and effects work on either.
+Scalar = jax.Array
+
+#: An effect's parameters by name.
+Values = Mapping[str, Scalar]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What shapes the compiled program: the names of an aircraft's controls and derivatives."""
+
+    controls: tuple[str, ...]  # aerodynamic controls: "elevator", ...
+    symbols: tuple[str, ...]  # their symbols: "de", ...
+    derivatives: tuple[str, ...]  # "CL_0", ...
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Columns of a command: the aerodynamic controls, rad, then thrust, N."""
+        return (*self.controls, "thrust")
+
+    def terms(self, coefficient: str) -> tuple[tuple[str, str], ...]:
+        """(derivative, regressor) pairs of one coefficient."""
+        pairs = ((name, split_derivative(name)) for name in self.derivatives)
+        return tuple((name, regressor) for name, (c, regressor) in pairs if c == coefficient)
+
+
+class Model(NamedTuple):
+    """The aircraft file's numbers, SI."""
+
+    mass: Scalar
+    inertia: Scalar  # Ixx Iyy Izz Ixz
+    area: Scalar
+    span: Scalar
+    chord: Scalar
+    airspeed: Scalar  # reference condition
+    density: Scalar  # reference condition
+    lift: Scalar  # CL of level flight at the reference condition
+    alpha: Scalar  # angle of attack there
+    derivatives: Scalar  # in the layout's order
+    limits: Scalar  # of the controls, rad; inf = none
+    max_thrust: Scalar  # N; inf where the file gives none
+    thrust_inclination: Scalar
+    thrust_arm: Scalar
+    imu: Scalar  # (3,) m from the CG, FRD
+    air_data: Scalar  # (3,)
+    noise: Scalar  # (12,) 1 sigma of each output
+
+
+#: What the sensors measure, in the order of ``Flight.outputs``. Units of FlightRecord's columns.
+OUTPUTS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "V", "alpha", "beta")
+
+_NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "alpha", "beta")
+
+
+def layout_of(aircraft: Aircraft) -> Layout:
+    """The program's shape for this aircraft."""
+    return Layout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives))
+
+
+def model_of(aircraft: Aircraft) -> Model:
+    """The numbers of this aircraft. Raises InputError where the file leaves out what motion needs."""
+    inertia = aircraft.inertia
+    moments = np.array([inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz])
+    if not np.isfinite(moments).all():
+        raise InputError(
+            f"aircraft {aircraft.name!r}: inertia {inertia}: simulation needs Ixx, Iyy, Izz and Ixz; complete the file"
+        )
+    lift, alpha = level_flight(aircraft)
+    geometry, throttle = aircraft.geometry, aircraft.throttle
+    numbers: dict[str, Any] = {
+        "mass": aircraft.mass,
+        "inertia": moments,
+        "area": geometry.S,
+        "span": geometry.b,
+        "chord": geometry.cbar,
+        "airspeed": aircraft.reference.airspeed,
+        "density": aircraft.reference.air_density,
+        "lift": lift,
+        "alpha": alpha,
+        "derivatives": [d.value for d in aircraft.derivatives.values()],
+        "limits": [math.inf if c.limit is None else c.limit for c in aircraft.controls.values()],
+        "max_thrust": (throttle.max_thrust if throttle and throttle.max_thrust else math.inf),
+        "thrust_inclination": throttle.inclination if throttle else 0.0,
+        "thrust_arm": throttle.arm if throttle else 0.0,
+        "imu": aircraft.sensors.imu,
+        "air_data": aircraft.sensors.air_data,
+        "noise": [aircraft.noise[name] for name in _NOISE_OF],
+    }
+    return Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})
+
+
+def level_flight(aircraft: Aircraft) -> tuple[float, float]:
+    """CL and alpha (rad) of unaccelerated level flight at the reference condition, thrust along the path.
+
+    Solves CL = weight and Cm = 0 for alpha and the elevator; without an elevator, CL alone.
+    """
+
+    def get(name: str) -> float:
+        return aircraft.derivatives[name].value if name in aircraft.derivatives else 0.0
+
+    pressure = 0.5 * aircraft.reference.air_density * aircraft.reference.airspeed**2
+    lift = aircraft.mass * GRAVITY / (pressure * aircraft.geometry.S)
+    if not get("CL_alpha"):
+        return lift, 0.0
+    matrix = np.array([[get("CL_alpha"), get("CL_de")], [get("Cm_alpha"), get("Cm_de")]])
+    right = np.array([lift - get("CL_0") - get("CL_V"), -get("Cm_0") - get("Cm_V")])
+    if not get("Cm_de"):
+        return lift, float(right[0] / get("CL_alpha"))
+    return lift, float(np.linalg.solve(matrix, right)[0])

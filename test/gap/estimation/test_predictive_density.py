@@ -1,0 +1,35 @@
+"""Probabilities from scores: sure where every group agrees, not where one group decides."""
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.estimation.fit import blank, polish
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.predictive_density import cross_validated, held_out, probabilities
+
+
+def test_equal_scores_share() -> None:
+    assert probabilities([np.zeros(6), np.zeros(6)]) == pytest.approx([0.5, 0.5])
+
+
+def test_all_groups_agreeing_is_sure() -> None:
+    assert probabilities([np.full(6, 5.0), np.zeros(6)])[0] > 0.99
+
+
+def test_one_group_alone_is_not_sure() -> None:
+    scores = np.array([9.0, -1.0, -1.0, -1.0, -1.0, -1.0])
+    plain = 1.0 / (1.0 + np.exp(-scores.sum()))
+    assert probabilities([scores, np.zeros(6)])[0] < plain - 0.1
+
+
+def test_what_is_flown_is_what_is_written(plain_view) -> None:
+    """Truth: corrected.yaml, which holds derivatives and neither biases nor clocks, though the fit has found some."""
+    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
+    fit = polish(blank([plain_view], nuisances), rounds=1)
+    others = [i for i, (effect, _) in enumerate(plain_view.simulator.parameters) if effect != "derivative_error"]
+    neutral = plain_view.simulator.neutral()
+    assert np.any(fit.points[0][others] != neutral[others])
+    for evidence in (cross_validated(fit), held_out(fit, [plain_view], [nuisances])):
+        for point in evidence.points[0]:
+            np.testing.assert_array_equal(point[others], neutral[others])
+            assert np.any(point != neutral)

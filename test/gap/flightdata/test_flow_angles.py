@@ -1,0 +1,116 @@
+"""Flights without vanes: flow angles inferred from the inertial instruments; truth: the vanes that were taken away."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.errors import InputError
+from sysid_node.gap.diagnose import diagnose
+from sysid_node.gap.document import document
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.flightdata.gap_flight import Flight, complete
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.gap.validation.multiple_shooting import course_of, off
+from sysid_node.gap.validation.noise_floor import unavoidable
+from sysid_node.sim import Simulator
+
+
+def blind(aircraft, flight: Flight, *lost: str) -> Flight:
+    """The flight as an aircraft without these instruments has it."""
+    columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in lost}}
+    return complete(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+
+
+@pytest.fixture(scope="module")
+def vaneless(aircraft, plain) -> Flight:
+    return blind(aircraft, plain, "alpha", "beta")
+
+
+@pytest.fixture(scope="module")
+def vaneless_view(aircraft, vaneless):
+    return view_of(Simulator(aircraft, 50.0), vaneless)
+
+
+def test_angles_are_those_that_the_vanes_read(plain, vaneless) -> None:
+    assert vaneless.inferred == ("alpha", "beta")
+    for angle in vaneless.inferred:
+        error, moved = vaneless.record[angle] - plain.record[angle], plain.record[angle].std()
+        assert np.sqrt((error**2).mean()) < 0.006 < moved / 2.0
+
+
+def test_one_vane_is_used_where_it_is_there(aircraft, plain) -> None:
+    flight = blind(aircraft, plain, "beta")
+    assert flight.inferred == ("beta",)
+    np.testing.assert_array_equal(flight.record["alpha"], plain.record["alpha"])
+
+
+def test_what_was_not_measured_is_not_compared(vaneless_view) -> None:
+    assert {c for c, measured in zip(CHANNELS, vaneless_view.axes, strict=True) if not measured} == {"alpha", "beta"}
+    effects = {c.effect for c in candidates_of(vaneless_view.simulator, [vaneless_view])}
+    assert not {"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"} & effects
+    assert {"actuator_lag", "command_delay", "cg_shift"} <= effects
+
+
+def test_only_noise_is_left_of_the_same_aircraft(vaneless_view) -> None:
+    view = vaneless_view
+    residual = np.abs(view.residual(view.simulator.neutral())[:, 1:]) ** 2
+    ratio = (residual.mean(axis=0).sum(axis=0) / view.noise[1:].sum(axis=0))[view.axes]
+    assert (ratio < 8.0).all(), ratio
+
+
+def test_still_air_is_known_to_be_still(vaneless_view) -> None:
+    assert vaneless_view.gusts < 0.01 * vaneless_view.record["V"].mean()
+
+
+def test_a_late_imu_cannot_be_told_from_late_commands(aircraft, make_flight) -> None:
+    flights = [blind(aircraft, make_flight({"imu_delay": {"delay": 0.06}}, seed=s), "alpha", "beta") for s in (5, 6)]
+    found = diagnose(aircraft, flights[:1], flights[1:])
+    (cause,) = document(found)["causes"]
+    assert found.verdict == "ambiguous"
+    assert (cause["effect"], cause["indistinguishable_from"]) == ("command_delay", ["imu_delay"])
+    assert cause["parameters"]["delay"][0] == pytest.approx(0.06, rel=0.1)
+    assert cause["probability"] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_lag_is_named_without_vanes(aircraft, make_flight) -> None:
+    effects = {"actuator_lag": {"time_constant": 0.1}}
+    flights = [blind(aircraft, make_flight(effects, seed=seed), "alpha", "beta") for seed in (5, 6)]
+    found = diagnose(aircraft, flights[:1], flights[1:])
+    (cause,) = document(found)["causes"]
+    assert found.verdict == "explained" and cause["effect"] == "actuator_lag"
+    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.1, rel=0.15)
+    assert not {"alpha", "beta"} & found.size.per_channel.keys()
+
+
+def test_tolerances_are_no_gap_without_vanes(aircraft, make_flight) -> None:
+    """A lift slope that is off makes the mean angle of attack wrong, and with it the drag."""
+    wrong = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "CL_0": 0.02, "Cl_p": 0.03, "Cn_beta": 0.006}
+    flight = blind(aircraft, make_flight({"derivative_error": wrong}, seed=7), "alpha", "beta")
+    assert diagnose(aircraft, [flight], []).verdict == "no_gap"
+
+
+def test_what_cannot_be_inferred_is_said(aircraft, plain) -> None:
+    with pytest.raises(InputError, match=r"no complete alpha; the gap cannot be measured without"):
+        blind(aircraft, plain, "alpha", "beta", "ay")
+    derivatives = {name: d for name, d in aircraft.derivatives.items() if name != "CL_alpha"}
+    with pytest.raises(
+        InputError, match=r"no alpha or beta; they can be inferred where the aircraft file has CL_alpha"
+    ):
+        blind(replace(aircraft, derivatives=derivatives), plain, "alpha", "beta")
+
+
+def test_the_floor_without_vanes_knows_of_gusts(aircraft, make_flight) -> None:
+    """What no vane shows is no error of the simulator; in still air there is nothing that it could not see."""
+    floors = []
+    for turbulence in ("none", "light"):
+        flight = blind(aircraft, make_flight({}, seed=3, turbulence=turbulence), "alpha", "beta")
+        view = view_of(Simulator(aircraft, 50.0), flight)
+        course = course_of(view, 100)
+        error, _ = next(unavoidable(view, view.simulator.neutral(), course))
+        mine = off(view, view.simulator.neutral(), course)
+        floors.append((np.sqrt((error[:, 4] ** 2).mean()), np.sqrt((mine[:, 4] ** 2).mean())))
+    (calm, calm_flown), (rough, rough_flown) = floors
+    assert rough > 3.0 * calm and rough_flown > 3.0 * calm_flown
+    assert 0.4 < rough / rough_flown < 2.5

@@ -1,0 +1,59 @@
+"""Flights on which nobody metered the thrust; truth: the thrust that was taken away."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.errors import InputError
+from sysid_node.gap.diagnose import diagnose
+from sysid_node.gap.document import document
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.flightdata.gap_flight import Flight, complete
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.report.sections.gap_words import paragraph
+from sysid_node.sim import Simulator
+
+
+def without_thrust(aircraft, flight: Flight) -> Flight:
+    """The flight as it is recorded where nobody meters the engine."""
+    columns = {**flight.record.columns, "thrust": np.full(len(flight.record), np.nan)}
+    return complete(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+
+
+def test_thrust_is_what_the_files_drag_leaves(aircraft, plain) -> None:
+    """Of the same aircraft, over a second: what is left is noise and the accelerometer's arm."""
+    flight = without_thrust(aircraft, plain)
+    assert not flight.metered and plain.metered
+    window = np.hanning(round(2.0 / np.median(np.diff(plain.record.time))))
+    found, true = (np.convolve(f.record["thrust"], window / window.sum(), "valid") for f in (flight, plain))
+    assert found.mean() == pytest.approx(true.mean(), rel=0.02)
+    assert (found - true).std() < 0.5 * true.std()
+
+
+def test_forward_motion_is_not_compared(aircraft, plain) -> None:
+    view = view_of(Simulator(aircraft, 50.0), without_thrust(aircraft, plain))
+    assert {c for c, measured in zip(CHANNELS, view.axes, strict=True) if not measured} == {"CD"}
+    effects = {c.effect for c in candidates_of(view.simulator, [view])}
+    assert not {"thrust_scale", "motor_lag", "thrust_line_offset", "thrust_yaw", "propwash"} & effects
+    assert {"actuator_lag", "command_delay", "cg_shift"} <= effects
+
+
+def test_a_lag_is_named_and_forward_motion_left_out(aircraft, make_flight) -> None:
+    effects = {"actuator_lag": {"time_constant": 0.1}}
+    flights = [without_thrust(aircraft, make_flight(effects, seed=seed)) for seed in (5, 6)]
+    found = diagnose(aircraft, flights[:1], flights[1:])
+    (cause,) = document(found)["causes"]
+    assert found.verdict == "explained" and cause["effect"] == "actuator_lag"
+    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.1, rel=0.15)
+    assert not {"ax", "V"} & found.size.per_channel.keys()
+    assert "Thrust was not recorded" in paragraph(found)
+
+
+def test_a_thrust_with_holes_is_refused(aircraft, plain) -> None:
+    thrust = plain.record["thrust"].copy()
+    thrust[100:120] = np.nan
+    holed = replace(plain.record, columns={**plain.record.columns, "thrust": thrust})
+    with pytest.raises(InputError, match="no complete thrust"):
+        complete(aircraft, replace(plain, record=holed))

@@ -1,0 +1,47 @@
+"""Sizes that neither gusts nor chance bias; truth: Monte Carlo of equations with many instruments, and still air."""
+
+import numpy as np
+
+from sysid_node.gap.estimation.fit import blank, polish
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.instruments.liml import _channels, _without_chance, unbiased
+from sysid_node.gap.instruments.overidentification import Equations
+
+ROWS, INSTRUMENTS, DRAWS = 400, 60, 200
+TRUTH = 1.0
+
+
+def drawn(random: np.random.Generator) -> Equations:
+    """One channel: a slope that the instruments foretell by a fifth; gusts move it and the remainder alike."""
+    instruments = np.linalg.qr(random.standard_normal((ROWS, INSTRUMENTS)))[0]
+    gusts = random.standard_normal(ROWS)
+    slope = instruments @ random.standard_normal(INSTRUMENTS) * 1.1 + gusts
+    remainder = TRUTH * slope + 0.8 * gusts + 0.6 * random.standard_normal(ROWS)
+    along = instruments.T @ slope
+    information, right = np.array([[1e-6 + along @ along]]), np.array([along @ (instruments.T @ remainder)])
+    rows, slopes = remainder.reshape(1, ROWS, 1), slope.reshape(1, ROWS, 1, 1)
+    return Equations([{0: instruments}], [rows], [slopes], information, right, 0.0)
+
+
+def solved(seen: Equations) -> tuple[float, float]:
+    """By two stages, and without what chance gives to them."""
+    channels, two_stages = _channels(seen), seen.right / seen.information[0]
+    step = two_stages
+    for _ in range(10):
+        corrected = _without_chance(seen, channels, step, np.array([1e-6]))
+        step = corrected.right / corrected.information[0]
+    return float(two_stages[0]), float(step[0])
+
+
+def test_many_instruments_bias_two_stages_and_not_the_likelihood() -> None:
+    """Bekker (1994): two stages err by about m / n of what least squares does, over the share foretold."""
+    random = np.random.default_rng(5)
+    found = np.array([solved(drawn(random)) for _ in range(DRAWS)]) - TRUTH
+    error = found.std(axis=0) / np.sqrt(DRAWS)
+    assert found[:, 0].mean() > 20.0 * error[0]
+    assert abs(np.median(found[:, 1])) < 0.2 * found[:, 0].mean()
+
+
+def test_in_still_air_least_squares_stands(plain_view) -> None:
+    fit = polish(blank([plain_view], nuisances_of(plain_view.simulator.aircraft, plain_view)), rounds=1)
+    assert unbiased(fit) is fit

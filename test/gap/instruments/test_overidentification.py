@@ -1,0 +1,117 @@
+"""When coherence is structure; truth: Monte Carlo of noise that is stronger than the level it is counted in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_flights import fly
+from scipy.signal import lsim
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.gap.estimation.fit import _root, blank, polish
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.instruments import overidentification as structure
+from sysid_node.gap.instruments.excitation import deliberate
+from sysid_node.gap.instruments.overidentification import (
+    CHANCE,
+    Structure,
+    commands,
+    instruments,
+    pooled,
+    ringing,
+    structure_left,
+    structure_of,
+)
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.residual_model import COEFFICIENTS, View
+from sysid_node.sim import Simulator
+
+DIRECTIONS, ROWS = 37, 400
+
+
+def measured(random: np.random.Generator, strength: float, structure: float = 0.0) -> Structure:
+    """One channel of noise of so many levels, and structure of so many along the instruments' directions."""
+    series = np.sqrt(strength) * random.standard_normal(ROWS)
+    series[:DIRECTIONS] += np.sqrt(structure) * random.choice([-1.0, 1.0], DIRECTIONS)
+    inside, outside = float(np.sum(series[:DIRECTIONS] ** 2)), float(np.sum(series[DIRECTIONS:] ** 2))
+    noise = max(outside / (ROWS - DIRECTIONS), 1.0)
+    found = (inside - DIRECTIONS, inside + outside, np.sqrt(2.0 * DIRECTIONS), noise)
+    return Structure(*(np.array([value]) for value in found))
+
+
+@pytest.mark.parametrize("strength", [1.0, 1.8])
+def test_noise_is_chance_however_strong(strength: float) -> None:
+    """Basmann's statistic: zero on average, of unit spread, whatever level least squares took for the noise."""
+    random = np.random.default_rng(4)
+    found = np.array([measured(random, strength).deviations[0] for _ in range(2000)])
+    assert abs(found.mean()) < 0.2
+    assert found.std() == pytest.approx(1.0, abs=0.15)
+
+
+def test_structure_in_strong_noise_is_still_seen() -> None:
+    random = np.random.default_rng(5)
+    found = np.array([measured(random, 1.8, structure=4.0).deviations[0] for _ in range(200)])
+    assert np.median(found) > 4.5
+
+
+def test_flights_pooled_leave_chance_as_it_is_and_add_up_what_is_in_both() -> None:
+    random = np.random.default_rng(6)
+    chance = np.array([pooled([measured(random, 1.8), measured(random, 1.0)]).deviations[0] for _ in range(2000)])
+    assert abs(chance.mean()) < 0.2
+    assert chance.std() == pytest.approx(1.0, abs=0.15)
+    alone, both = [], []
+    for _ in range(200):
+        flights = [measured(random, 1.2, structure=1.0) for _ in range(2)]
+        alone.append(flights[0].deviations[0])
+        both.append(pooled(flights).deviations[0])
+    assert np.mean(both) == pytest.approx(np.sqrt(2.0) * np.mean(alone), rel=0.1)
+
+
+def test_information_that_rounding_makes_singular_has_a_factor() -> None:
+    alike = np.array([[1.0, 1.0], [1.0, 1.0 - 1e-15]])
+    root = _root(alike)
+    np.testing.assert_allclose(root.T @ root, alike, atol=1e-9)
+    clear = np.array([[1.0, 0.5], [0.5, 1.0]])
+    np.testing.assert_array_equal(_root(clear), np.linalg.cholesky(clear).T)
+
+
+def foretold(table: np.ndarray, series: np.ndarray) -> float:
+    """Share of a series' power that the signals of a table hold."""
+    left = series - table @ np.linalg.lstsq(table, series, rcond=None)[0]
+    return float(1.0 - left.var() / series.var())
+
+
+def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_view: View) -> None:
+    """An oscillator at 1.15 Hz, between two of the resonators, of damping 0.08, driven by the elevator's command."""
+    omega, damping, rate = 2.0 * np.pi * 1.15, 0.08, plain_view.simulator.rate
+    given = deliberate(plain_view).all[:, 0]
+    rung = lsim(([omega**2], [1.0, 2.0 * damping * omega, omega**2]), given - given[0], np.arange(given.size) / rate)[1]
+    assert foretold(ringing(plain_view)[0], rung - rung.mean()) > 0.9
+    assert foretold(commands(plain_view)[0], rung - rung.mean()) < 0.75
+
+
+def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_view: View, monkeypatch) -> None:
+    """On a flight held out, that is; of the one that was fitted they do."""
+    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
+    fit = polish(blank([plain_view], nuisances), rounds=1)
+    alone = structure_left(fit)
+    endless = replace(fit, information=np.full_like(fit.information, np.nan))
+    monkeypatch.setattr(structure, "upon", lambda *_: endless)
+    np.testing.assert_array_equal(structure_left(fit, [plain_view], [nuisances]).deviations, alone.deviations)
+    monkeypatch.setattr(structure, "upon", lambda *_: fit)  # seen twice
+    again = structure_left(fit, [plain_view], [nuisances])
+    np.testing.assert_allclose(again.beyond, 2.0 * alone.beyond)
+    np.testing.assert_allclose(again.share, alone.share)
+
+
+def test_gusts_that_pass_for_derivatives_make_no_structure_of_sharp_steps() -> None:
+    """Rolling gusts and short doublets, nothing else: least squares takes half of the roll's derivatives away, and what
+    it then leaves of the doublets stands out of a noise that it has made too low."""
+    aircraft, steps = load_aircraft("kestrel"), (("elevator", 0.05, 1.0), ("aileron", 0.06, 3.8), ("rudder", 0.11, 6.0))
+    doublets = [f"doublet:{name}:amplitude={size}:width=0.4:start={at}:every=8:repeat=5" for name, size, at in steps]
+    flight = fly(aircraft, {}, seed=4, turbulence="light", manoeuvre=doublets, duration=44.0)
+    view = view_of(Simulator(aircraft, 50.0), flight)
+    fit = polish(blank([view], nuisances_of(aircraft, view)))
+    roll = COEFFICIENTS.index("Cl")
+    assert structure_of(fit, by=instruments).deviations[roll] > CHANCE
+    assert structure_left(fit).deviations[roll] < 0.6 * CHANCE

@@ -1,0 +1,26 @@
+"""Windows keep power and count every sample once: Parseval, and white noise."""
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.residuals.windowed_spectra import SHARE, Windows
+
+
+def test_white_noise_keeps_its_variance(random) -> None:
+    windows = Windows.over(20000, 50.0)
+    power = np.abs(windows.transform(random.standard_normal(20000))) ** 2
+    assert power[:, 1:].mean() == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_sine_lies_on_its_line() -> None:
+    windows = Windows.over(2000, 50.0)
+    series = np.sin(2 * np.pi * 1.5 * np.arange(2000) / 50.0)
+    spectrum = np.abs(windows.transform(series)).mean(axis=0)
+    assert windows.frequencies[spectrum.argmax()] == pytest.approx(1.5, abs=0.5 / windows.length)
+
+
+def test_coefficients_count_each_sample_once() -> None:
+    """Twice as many coefficients as samples in the band: each window of T s has one line each 1/T, every T/2."""
+    windows = Windows.over(50000, 50.0)
+    independent = 2 * windows.frequencies[-1] * 1000.0  # real numbers in 1000 s of this band
+    assert SHARE * 2 * windows.count * (windows.frequencies.size - 1) == pytest.approx(independent, rel=0.02)

@@ -1,0 +1,49 @@
+"""A law that is not the right one leaves what goes with it; truth: gyros that read low, and that saturate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.estimation.checkpoint import Steps
+from sysid_node.gap.estimation.fit import blank
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.selection.calibration import Grounds
+from sysid_node.gap.selection.candidate_fitter import Trier
+from sysid_node.gap.selection.misspecification import adequacy_of
+from sysid_node.sim import Simulator
+
+
+@pytest.fixture(scope="module")
+def misfit(aircraft):
+    """What a scale of the IMU leaves of what it does, fitted to a flight."""
+
+    def of(flight):
+        view = view_of(Simulator(aircraft, 50.0), flight)
+        nuisances = nuisances_of(aircraft, view)
+        trier = Trier(nuisances, Steps())
+        base = trier.trial(blank([view], nuisances), [])
+        (candidate,) = (c for c in candidates_of(view.simulator, [view]) if c.label == "imu_scale")
+        return Grounds.of("imu_scale", 1000.0, adequacy_of(trier.beside(base, candidate).fit, candidate))
+
+    return of
+
+
+@pytest.mark.parametrize("turbulence", ["none", "light"])
+def test_a_gyro_that_reads_low_is_one(misfit, make_flight, turbulence) -> None:
+    grounds = misfit(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
+    assert grounds.misfit < 0.2
+    assert grounds.credence > 0.9
+
+
+@pytest.mark.parametrize("turbulence", ["none", "light"])
+def test_a_gyro_that_saturates_is_not_one_that_reads_low(misfit, make_flight, turbulence) -> None:
+    flight = make_flight({}, seed=5, turbulence=turbulence)
+    rate = flight.record["p"]
+    cut = np.clip(rate, -0.4 * np.abs(rate).max(), 0.4 * np.abs(rate).max())
+    clipped = replace(flight.record, columns={**flight.record.columns, "p": cut})
+    grounds = misfit(replace(flight, record=clipped))
+    assert grounds.misfit > 0.4
+    assert grounds.wanting

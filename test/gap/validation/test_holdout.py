@@ -1,0 +1,85 @@
+"""What flight not fitted says of an explanation. Truth: an explanation of which no numbers come explains nothing."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from gap_flights import fly
+
+from sysid_node.gap.diagnose import diagnose
+from sysid_node.gap.validation import holdout
+
+WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """As much of an attribution as the check of its numbers looks at; a matrix that is not positive predicts none."""
+
+    corrected: Any
+    chosen: Any = None
+    causes: tuple[str, ...] = ("a cause",)
+
+    def by_least_squares(self) -> "Explanation":
+        return Explanation(self.chosen.fit)
+
+    def without_the_weakest(self) -> "Explanation":
+        return Explanation(2.0 * np.eye(2))
+
+    def without_causes(self) -> "Explanation":
+        return Explanation(np.eye(2), causes=())
+
+
+def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
+    """The larger, the better it predicts; 3 is as good as the file, for which 1.5 are the derivatives alone."""
+    size = float(np.linalg.cholesky(explanation.corrected)[0, 0] ** 2)
+    return SimpleNamespace(gaps=[SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size)], size=size)
+
+
+@pytest.mark.parametrize(
+    ("unbiased", "least_squares", "stands"),
+    [
+        (9.0, 4.0, 9.0),
+        (-1.0, 4.0, 4.0),  # of some fits no numbers come
+        (0.5, 4.0, 4.0),  # worse than the file
+        (-1.0, 1.5, 1.0),  # no better than the derivatives: nothing is blamed
+        (-1.0, -1.0, 1.0),
+    ],
+)
+def test_the_first_explanation_that_predicts_better_stands(
+    monkeypatch: pytest.MonkeyPatch, unbiased: float, least_squares: float, stands: float
+) -> None:
+    monkeypatch.setattr(holdout, "check", by_cholesky)
+    chosen = SimpleNamespace(fit=least_squares * np.eye(2))
+    _, checked = holdout._standing(Explanation(unbiased * np.eye(2), chosen), (), ())
+    assert checked.size == pytest.approx(stands)
+
+
+def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(holdout, "check", by_cholesky)
+    wild = -np.eye(2)
+    explanation = Explanation(wild, SimpleNamespace(fit=wild), ("sound", "wild"))
+    monkeypatch.setattr(Explanation, "without_the_weakest", lambda self: Explanation(4.0 * np.eye(2)))
+    _, checked = holdout._standing(explanation, (), ())
+    assert checked.size == pytest.approx(4.0)
+
+
+def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(aircraft) -> None:
+    flights = [fly(aircraft, {"actuator_lag": {"time_constant": 0.08}, "derivative_error": WRONG}, s) for s in (5, 6)]
+    attribution = diagnose(aircraft, flights[:1], flights[1:]).attribution
+    beside = attribution.beside_the_file()
+    fit = beside.corrected
+    (lag,) = fit.indices
+    assert beside.filed and fit.points[0][lag] == attribution.corrected.points[0][lag] == pytest.approx(0.08, rel=0.1)
+    assert np.flatnonzero(fit.points[0] != fit.views[0].simulator.neutral()).tolist() == [lag]
+
+
+def test_a_single_flight_with_each_manoeuvre_once_is_checked_on_its_parts(aircraft) -> None:
+    """Each part then holds what no other does; a lag that moved every reading must not be lost for that."""
+    steps = ["3211:elevator:start=2", "3211:aileron:start=14", "3211:rudder:start=26"]
+    flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, seed=3, manoeuvre=steps, duration=40.0)
+    found = diagnose(aircraft, [flight], [])
+    assert [cause.candidate.effect for cause in found.attribution.causes] == ["actuator_lag"]
+    assert found.size.after < 0.7 * found.size.before

@@ -1,0 +1,36 @@
+"""The flight that tells effects apart; truth: a late command and an early stamp are the same thing in any flight."""
+
+import numpy as np
+import pytest
+from gap_flights import fly
+
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.estimation.fit import Fit, blank, linearised, with_candidates
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.verdict.next_flight import propose
+from sysid_node.sim import Simulator
+
+
+@pytest.fixture(scope="module")
+def fits(aircraft) -> dict[str, Fit]:
+    """Explanations of a flight with late commands, each where it belongs."""
+    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"command_delay": {"delay": 0.08}}, seed=14))
+    nuisances = nuisances_of(aircraft, view)
+    base = blank([view], nuisances)
+    table = {c.effect: c for c in candidates_of(view.simulator, [view])}
+    sizes = {"command_delay": 0.08, "actuator_stamp_delay": -0.08, "actuator_lag": 0.08}
+    return {n: linearised(with_candidates(base, [table[n]], nuisances, [size])) for n, size in sizes.items()}
+
+
+def test_what_is_the_same_thing_is_not_parted(fits) -> None:
+    chosen = fits["command_delay"]
+    best = propose(chosen, [(chosen.candidates[0], fits["actuator_stamp_delay"])])
+    assert best is not None and best.separation < 0.1
+
+
+def test_a_lag_and_a_delay_are_parted_by_some_flight(fits) -> None:
+    chosen = fits["command_delay"]
+    best = propose(chosen, [(chosen.candidates[0], fits["actuator_lag"])])
+    assert best is not None and best.separation > 3.0
+    assert np.isfinite(best.flown)

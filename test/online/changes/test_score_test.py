@@ -1,0 +1,116 @@
+"""Contradictions: F against plain least squares and against its distribution by Monte Carlo; changes found."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from plant import fly, made_aircraft, multisteps
+from scipy.stats import f as fisher
+
+from sysid_node.online import estimator
+from sysid_node.online.changes.detection import Looking
+from sysid_node.online.changes.score_test import Contradiction, Reference, contradiction, disagreement
+from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.regression import least_squares
+from sysid_node.online.regression.information import BANDS, spectrum
+from sysid_node.online.regression.least_squares import Solution, Uncertainty
+from sysid_node.online.settings import METHODS, Settings
+from sysid_node.online.state import State
+
+Array = NDArray[np.float64]
+AIRCRAFT = made_aircraft()
+RATE, SECONDS, CHANGED_AT = 100.0, 22.0, 18.0
+LAYOUT = Layout(("alpha", "q", "de"), ("de",), ())
+PLAN = least_squares.plan({"CL": ("0", "alpha", "de"), "Cm": ("0", "alpha", "q", "de")}, LAYOUT)
+SPECTRUM = spectrum(2.0 * math.pi * np.arange(0.1, 2.0, 0.04), math.inf)
+LINES = 2 * SPECTRUM.omega.size
+
+
+def reference(theta: Array, covariance: Array, density: float = 1.0, freedom: float = 50.0) -> Reference:
+    """Estimates of one density in all bands."""
+    C, P = PLAN.outputs.size, PLAN.columns.size
+    solution = Solution(theta, np.eye(P), np.ones(C), np.ones(C), np.array(True))
+    bands = np.full((C, BANDS), density)
+    return Reference(0.0, PLAN, solution, Uncertainty(covariance, bands[:, 0], bands, np.full(C, freedom)))
+
+
+def test_statistic_is_that_of_plain_least_squares() -> None:
+    """Known theta, white noise: F = |X b|^2 / (p s^2), b the least-squares fit to the residuals."""
+    rng = np.random.default_rng(0)
+    lines, duration, density = rng.normal(size=(LINES, PLAN.width)), 500.0, 3.0
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    theta = rng.normal(size=(P, C)) * PLAN.mine
+    found = contradiction(reference(theta, np.zeros((C, P, P)), density), lines, SPECTRUM, duration)
+    for c in range(C):
+        mine = PLAN.unknowns(c)
+        X = lines[:, PLAN.columns[mine]]
+        r = lines[:, PLAN.outputs[c]] - X @ theta[mine, c]
+        fit = X @ np.linalg.lstsq(X, r, rcond=None)[0]
+        # long enough for the stretch itself to look quiet beside the usual density
+        F = float(fit @ fit) / (mine.size * density * 0.5 / 0.04)
+        assert found.statistic[c] == pytest.approx(F, rel=1e-6)
+        assert found.chance(1.0)[c] == pytest.approx(fisher.sf(F, mine.size, 50.0), rel=1e-6)
+        rest = float(r @ r - fit @ fit) / float(np.square(lines[:, PLAN.outputs[c]]).sum())
+        assert found.share[c] == pytest.approx(rest, rel=1e-6)
+
+
+def test_uncertain_estimates_contradict_less() -> None:
+    rng = np.random.default_rng(1)
+    lines = rng.normal(size=(LINES, PLAN.width))
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    covariances = [scale * np.tile(np.eye(P), (C, 1, 1)) for scale in (0.0, 1e-2, 1.0)]
+    sure, less, hardly = (
+        contradiction(reference(np.zeros((P, C)), covariance, 1e-3), lines, SPECTRUM, 500.0).statistic
+        for covariance in covariances
+    )
+    assert (sure > less).all()
+    assert (less > hardly).all()
+
+
+def test_disagreement_is_the_chance_of_the_difference() -> None:
+    """One derivative each differs by d, of variance v on both sides: F = d^2 / (2 v p)."""
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    covariance = np.tile(0.5 * np.eye(P), (C, 1, 1))
+    shift = np.zeros((P, C))
+    shift[PLAN.unknowns(1)[0], 1] = 3.0
+    chance = disagreement(reference(shift, covariance), reference(np.zeros((P, C)), covariance, freedom=30.0))
+    assert chance[0] == pytest.approx(1.0)
+    assert chance[1] == pytest.approx(fisher.sf(9.0 / 3, 3, 30.0), rel=1e-6)
+
+
+def flown(samples: Array, time: Array, method: str) -> State:
+    state = estimator.init(AIRCRAFT, Settings(method=method, detect_changes=False))
+    for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, t, sample)
+    return state
+
+
+def looked(state: State, span: int) -> Contradiction:
+    model = state.model
+    looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, math.inf)
+    found = next((found for _, found in looking.contradictions([span])), None)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nothing_is_unlikely_where_nothing_has_changed(method: str) -> None:
+    """Gusts of 0.7 m/s, autopilot: of 120 chances no more than a fifth are under a tenth, none under 1e-4."""
+    time, flights = fly(AIRCRAFT, multisteps(SECONDS, RATE), RATE, 10, seed=4, gusts=0.7)
+    states = [flown(samples, time, method) for samples in flights]
+    chances = np.array([[looked(state, span).chance(1.0) for span in (6, 12)] for state in states])
+    assert (chances < 0.1).mean() < 0.2
+    assert np.median(chances) < 0.9
+    assert chances.min() > 1e-4
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_half_a_surface_lost_contradicts_its_own_equation(method: str) -> None:
+    after = (CHANGED_AT, {"Cl_da": 0.5})
+    time, flights = fly(AIRCRAFT, multisteps(SECONDS, RATE), RATE, 2, seed=4, gusts=0.7, after=after)
+    for samples in flights:
+        state = flown(samples, time, method)
+        chance = dict(zip(state.plan.coefficients, looked(state, 7).chance(1.0), strict=True))
+        assert chance["Cl"] < 1e-6
+        assert chance["Cm"] > 1e-3

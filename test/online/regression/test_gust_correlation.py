@@ -1,0 +1,57 @@
+"""How far intervals may shrink where deflections may answer to gusts."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from plant import made_aircraft
+
+from sysid_node.online.frequency.regression_signals import layout
+from sysid_node.online.regression import gust_correlation, least_squares
+from sysid_node.online.regression.gust_correlation import ALLOWED
+from sysid_node.online.regression.heteroskedasticity import DOUBT, Unevenness
+from sysid_node.online.regression.least_squares import Solution, Uncertainty
+
+Array = NDArray[np.float64]
+AIRCRAFT = made_aircraft()
+
+
+def spread(density: Array, freedom: float) -> Uncertainty:
+    """Of as many coefficients as densities."""
+    return Uncertainty(np.zeros((density.size, 1, 1)), density, density[:, None], np.full(density.size, freedom))
+
+
+def inflation(of: Uncertainty, sensed: Array) -> Array:
+    return gust_correlation.inflation(of, gust_correlation.share_of_gusts(of, sensed))
+
+
+def test_sensor_noise_alone_is_no_reason_for_doubt() -> None:
+    noise = np.array([1.0, 2.0])
+    np.testing.assert_allclose(inflation(spread(DOUBT * noise, 1e4), noise), 1.0)
+
+
+def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -> None:
+    """Slope of y = u + n where n is correlated with u by ALLOWED: 95 % intervals of 4000 records, short and long."""
+    rng = np.random.default_rng(1)
+    for length, least in ((100, 0.93), (1000, 0.91), (10000, 0.91)):
+        u = rng.normal(size=(4000, length)).astype(np.float32)
+        means = np.einsum("ij,ij->i", u, rng.normal(size=u.shape).astype(np.float32)) / length
+        errors = means + ALLOWED  # n = ALLOWED u + an independent part
+        factor = inflation(spread(np.ones(1), float(length)), np.zeros(1))[0]
+        inside = np.abs(errors) < 1.96 * np.sqrt(factor / length)
+        assert inside.mean() > least
+        if length == 10000:
+            assert (np.abs(errors) < 1.96 / np.sqrt(length)).mean() < 0.01  # and not without the allowance
+
+
+def test_the_sensors_part_of_a_residual_is_their_noise() -> None:
+    """The gyro's noise differentiated, and the accelerometer's, against noise passed through the coefficients."""
+    plan = least_squares.plan({"CL": ("alpha",), "Cm": ("alpha",)}, signals := layout(AIRCRAFT, ()))
+    still = Solution(np.zeros((1, 2)), np.zeros((1, 1)), np.zeros(2), np.zeros(2), np.array(True))
+    omega, step = np.array([3.0, 4.0, 5.0]), 0.01
+    nothing = np.zeros((signals.width, signals.width))
+    lift, pitch = gust_correlation.sensed(AIRCRAFT, plan, still, nothing, Unevenness(), step, omega)
+    reference, g = AIRCRAFT.reference, AIRCRAFT.geometry
+    qS = 0.5 * reference.air_density * reference.airspeed**2 * g.S
+    assert lift == pytest.approx(step * (AIRCRAFT.noise["accel"] * AIRCRAFT.mass / qS) ** 2)
+    turning = AIRCRAFT.noise["gyro"] * AIRCRAFT.inertia.Iyy / (qS * g.cbar)
+    assert pitch == pytest.approx(step * turning**2 * (9.0 + 16.0 + 25.0) / 3.0)

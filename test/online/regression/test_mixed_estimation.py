@@ -1,0 +1,71 @@
+"""Beliefs weighed with the flight: the product of two normal densities."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plant import TRUTH, exact_flight, made_aircraft
+
+from sysid_node.aircraft.model import Derivative
+from sysid_node.online.frequency import regression_signals
+from sysid_node.online.regression import least_squares
+from sysid_node.online.regression.mixed_estimation import beliefs, weighed
+from sysid_node.online.settings import Settings
+from sysid_node.online.whole_record import run
+
+AIRCRAFT = made_aircraft()
+PLAN = least_squares.plan(AIRCRAFT.structure, regression_signals.layout(AIRCRAFT))
+
+
+def test_beliefs_are_the_file_s() -> None:
+    aircraft = replace(AIRCRAFT, derivatives={**AIRCRAFT.derivatives, "CL_q": Derivative(3.0)})
+    values, precisions = beliefs(aircraft, PLAN)
+    c = PLAN.coefficients.index("CL")
+    named = {PLAN.regressors[i]: (values[i, c], precisions[i, c]) for i in PLAN.unknowns(c)}
+    assert named["alpha"] == (TRUTH["CL_alpha"], pytest.approx((0.1 * TRUTH["CL_alpha"]) ** -2))
+    assert named["q"] == (3.0, 0.0)
+
+
+def test_the_mean_is_that_of_mixed_estimation() -> None:
+    """Klein & Morelli (2006), sec. 5.4: (P^-1 + D^-1)^-1 (P^-1 theta + D^-1 believed)."""
+    rng = np.random.default_rng(0)
+    values, precisions = beliefs(AIRCRAFT, PLAN)
+    theta = (values + 0.3 * rng.normal(size=values.shape)) * PLAN.mine
+    covariance = np.zeros((theta.shape[1], *PLAN.same.shape))
+    for c in range(theta.shape[1]):
+        root = rng.normal(size=PLAN.same.shape)
+        covariance[c] = root @ root.T * np.outer(PLAN.mine[:, c], PLAN.mine[:, c])
+    mean, spread = weighed(PLAN, theta, covariance, values, precisions)
+    for c in range(theta.shape[1]):
+        mine = PLAN.unknowns(c)
+        P, D = np.linalg.inv(covariance[c][np.ix_(mine, mine)]), np.diag(precisions[mine, c])
+        expected = np.linalg.inv(P + D)
+        np.testing.assert_allclose(spread[c][np.ix_(mine, mine)], expected, rtol=1e-7)
+        np.testing.assert_allclose(mean[mine, c], expected @ (P @ theta[mine, c] + D @ values[mine, c]), rtol=1e-7)
+
+
+def test_without_tolerances_nothing_changes() -> None:
+    values, precisions = beliefs(AIRCRAFT, PLAN)
+    theta, covariance = values + 1.0, np.tile(PLAN.same, (values.shape[1], 1, 1))
+    mean, spread = weighed(PLAN, theta, covariance, values, 0.0 * precisions)
+    for c in range(theta.shape[1]):
+        mine = PLAN.unknowns(c)
+        np.testing.assert_allclose(mean[mine, c], theta[mine, c])
+        np.testing.assert_allclose(spread[c][np.ix_(mine, mine)], covariance[c][np.ix_(mine, mine)])
+
+
+def test_a_flight_that_shows_little_leaves_the_beliefs() -> None:
+    """Four seconds: no interval is wider than the file's tolerance, no estimate far from what is believed."""
+    time = np.arange(0.0, 4.0, 0.01)
+    samples = exact_flight(AIRCRAFT, time)
+    samples[:, :9] += 0.02 * np.random.default_rng(1).normal(size=(time.size, 9)) * np.abs(samples[:, :9]).mean(axis=0)
+    plain, informed = (
+        run(AIRCRAFT, Settings(method="sls_rft", use_prior=use), time, samples, time[-1:])[0].derivatives
+        for use in (False, True)
+    )
+    for name, belief in AIRCRAFT.derivatives.items():
+        if name.endswith("_0"):
+            continue
+        assert belief.tolerance is not None
+        assert informed[name].standard_error <= min(plain[name].standard_error * 1.5, belief.tolerance) + 1e-12, name
+        assert abs(informed[name].value - belief.value) < 4.0 * belief.tolerance

@@ -1,0 +1,77 @@
+"""Programs kept on disk. Truth: the same function, traced by JAX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from sysid_node.sim.compiled import programs
+from sysid_node.sim.compiled.programs import kept
+from sysid_node.sim.model.layout import Scalar
+
+X = jnp.linspace(0.0, 1.0, 5)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "sysid" / "programs"
+
+
+def traced(times: list[str]) -> object:
+    """A program that notes when it is traced."""
+
+    @kept(1)
+    def powers(name: str, tree: dict[str, Scalar]) -> tuple[Scalar, Scalar]:
+        times.append(name)
+        return jnp.sin(tree["x"]), jax.jacfwd(lambda x: x**3)(tree["x"]).diagonal()
+
+    return powers
+
+
+def test_it_gives_what_the_function_gives_and_is_traced_once_for_all_processes(folder: Path) -> None:
+    for times, wanted in (([], ["once"]), ([], [])):  # another closure: as another process
+        sine, slope = traced(times)("once", {"x": X})
+        np.testing.assert_array_equal(sine, jnp.sin(X))
+        np.testing.assert_allclose(slope, 3.0 * X**2, rtol=1e-15)
+        assert times == wanted
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_other_fixed_arguments_shapes_or_sources_are_other_programs(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times: list[str] = []
+    program = traced(times)
+    program("one", {"x": X})
+    program("two", {"x": X})
+    program("one", {"x": X[:3]})
+    monkeypatch.setattr(programs, "_sources", lambda: "others")
+    traced(times)("one", {"x": X})
+    assert times == ["one", "two", "one", "one"]
+    assert len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.parametrize("content", [b"", b"half of one"])
+def test_a_file_that_cannot_be_read_is_written_anew(folder: Path, content: bytes) -> None:
+    traced([])("once", {"x": X})
+    (path,) = folder.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(content)
+    times: list[str] = []
+    sine, _ = traced(times)("once", {"x": X})
+    np.testing.assert_array_equal(sine, jnp.sin(X))
+    assert times == ["once"]
+    assert len(path.read_bytes()) == len(whole)
+
+
+def test_without_a_folder_to_write_or_flatbuffers_it_is_traced(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder.parent.write_text("a file where the folder would be")
+    np.testing.assert_array_equal(traced([])("once", {"x": X})[0], jnp.sin(X))
+    monkeypatch.setattr(programs, "find_spec", lambda name: None)
+    np.testing.assert_array_equal(traced([])("once", {"x": X})[0], jnp.sin(X))

@@ -1,0 +1,166 @@
+"""Flights with the autopilot, weather and noise; and what the recorder makes of them."""
+
+import numpy as np
+import pytest
+from plain import make_aircraft, three_axes
+
+from sysid_node.aircraft.model import Control
+from sysid_node.errors import InputError
+from sysid_node.sim import Simulator
+from sysid_node.sim.flying.recording import START_NS, Recorder
+from sysid_node.sim.flying.sortie import Conditions, fly_sortie
+
+RATE, SECONDS = 200.0, 12.0
+
+
+@pytest.fixture(scope="module")
+def fast():
+    return Simulator(make_aircraft(), RATE)
+
+
+@pytest.fixture(scope="module")
+def moves(fast):
+    return three_axes(round(SECONDS * RATE) + 1, fast.step)
+
+
+@pytest.fixture(scope="module")
+def sortie(fast, moves):
+    return fly_sortie(fast, moves, Conditions(turbulence="light", seed=4))
+
+
+def columns(sortie):
+    return dict(zip(sortie.simulator.outputs, np.asarray(sortie.flight.outputs).T, strict=True))
+
+
+def test_the_autopilot_holds_attitude_and_speed(fast):
+    """In turbulence an aircraft left alone wanders off; the autopilot keeps it level and at its speed."""
+    still = np.zeros((round(30.0 * RATE) + 1, 4))
+    held, free = (
+        columns(fly_sortie(fast, still, Conditions(turbulence="moderate", seed=1, noise=0.0, autopilot=autopilot)))
+        for autopilot in (True, False)
+    )
+    for name in ("phi", "theta"):
+        assert held[name].std() < 0.5 * free[name].std(), name
+    assert abs(held["V"][-1000:].mean() - 18.0) < 1.0
+
+
+def test_recorded_commands_fly_the_same_flight_again(sortie):
+    """What the autopilot commanded, flown open loop through the same air, is the same flight."""
+    again = sortie.simulator.rollout(
+        sortie.theta, sortie.trim.initial, sortie.inputs._replace(commands=sortie.flight.commands)
+    )
+    np.testing.assert_allclose(again.outputs, sortie.flight.outputs, atol=1e-6)
+
+
+def test_delays_reach_the_autopilots_commands_too(fast, moves):
+    sortie = fly_sortie(fast, moves, Conditions(["command_delay:delay=0.0625"], seed=4))
+    again = fast.rollout(sortie.theta, sortie.trim.initial, sortie.inputs._replace(commands=sortie.flight.commands))
+    np.testing.assert_allclose(again.outputs, sortie.flight.outputs, atol=1e-6)
+
+
+def test_truth_of_a_sortie(fast, moves):
+    sortie = fly_sortie(fast, moves, Conditions(["derivative_error:Cm_alpha=-0.1"]))
+    assert sortie.derivatives["Cm_alpha"] == pytest.approx(-0.7)
+    assert sortie.effects["sensor_noise"] == {"scale": 1.0}
+
+
+def test_rotary_gusts_may_be_left_out(fast, moves):
+    gusts = [
+        fly_sortie(fast, moves, Conditions(turbulence="light", rotary_gusts=on)).inputs.turbulence for on in (0, 1)
+    ]
+    np.testing.assert_array_equal(gusts[0][:, :3], gusts[1][:, :3])
+    assert not gusts[0][:, 3:].any() and gusts[1][:, 3:].all()
+
+
+def test_seeds_decide(fast, moves, sortie):
+    again = fly_sortie(fast, moves, sortie.conditions)
+    np.testing.assert_array_equal(again.flight.outputs, sortie.flight.outputs)
+    other = fly_sortie(fast, moves, Conditions(turbulence="light", seed=5))
+    assert np.abs(other.flight.outputs - sortie.flight.outputs).max() > 0.1
+
+
+def test_streams_have_their_rates_and_honest_stamps(sortie):
+    streams = Recorder().record(sortie)
+    span = SECONDS
+    assert [len(s.arrival) for s in streams.by_topic.values()] == [200 * span + 1, 100 * span + 1, 100 * span + 1]
+    stamps = streams.imu.arrival.stamp_ns
+    assert stamps[0] >= START_NS
+    period = np.diff(stamps) / 1e9
+    assert period.mean() == pytest.approx(0.005, rel=1e-3)
+    assert 0.0001 < period.std() < 0.0005
+    assert (streams.imu.arrival.log_ns >= stamps).all()
+    order = np.concatenate([s.arrival.order for s in streams.by_topic.values()])
+    assert sorted(order) == list(range(order.size))
+
+
+def test_readings_are_the_flight_at_the_stamps(fast, moves):
+    quiet = fly_sortie(fast, moves, Conditions(noise=0.0))
+    streams = Recorder(quantise=False).record(quiet)
+    time = (streams.imu.arrival.stamp_ns - START_NS) / 1e9
+    outputs, grid = np.asarray(quiet.flight.outputs), np.arange(len(moves)) * fast.step
+    for i, name in enumerate(("p", "q", "r"), start=3):
+        between = np.interp(time, grid, outputs[:, i])
+        np.testing.assert_allclose(streams.imu.values[:, i], between, atol=3e-3, err_msg=name)
+    at = (streams.actuators.arrival.stamp_ns - START_NS) / 1e9
+    elevator = np.interp(at, grid, np.asarray(quiet.flight.commands)[:, 0])
+    np.testing.assert_allclose(streams.actuators.positions[:, 0], elevator, atol=1e-7)  # stamps are whole ns
+    thrust = np.interp(at, grid, np.asarray(quiet.flight.commands)[:, 3])
+    np.testing.assert_allclose(streams.actuators.positions[:, 3] * 30.0, thrust, atol=1e-6)
+
+
+def test_noise_and_quantisation(fast, moves, sortie):
+    streams = Recorder().record(sortie)
+    clean = Recorder(quantise=False).record(fly_sortie(fast, moves, Conditions(turbulence="light", seed=4, noise=0.0)))
+    step = 32 * 9.80665 / 2**16
+    ratio = streams.imu.values[:, :3] / step
+    np.testing.assert_allclose(ratio, np.round(ratio), atol=1e-6)
+    # the autopilot answers to noise, so that the flights differ a little: their difference is mostly noise
+    sigma = (streams.air_data.values - clean.air_data.values).std(axis=0)
+    assert sigma[:3] == pytest.approx([0.3, 0.005, 0.005], rel=0.1)
+
+
+def test_stamp_delay_of_the_actuators(fast, moves):
+    recorder = Recorder(jitter=0.0)
+    late = recorder.record(fly_sortie(fast, moves, Conditions(["actuator_stamp_delay:delay=0.05"], noise=0.0)))
+    plain = recorder.record(fly_sortie(fast, moves, Conditions(noise=0.0)))
+    np.testing.assert_allclose(late.actuators.positions[5:], plain.actuators.positions[:-5], atol=1e-9)
+
+
+def test_measured_surfaces_and_mixed_joints(moves):
+    mix = {"elevator": {"left": 0.5, "right": 0.5}, "aileron": {"left": 0.5, "right": -0.5}}
+    symbols = {"elevator": "de", "aileron": "da", "rudder": "dr"}
+    joints = {**mix, "rudder": {"rudder": 1.0}}
+    controls = {n: Control(n, symbols[n], joints[n], limit=0.4, offset=0.01) for n in symbols}
+    simulator = Simulator(make_aircraft(controls=controls), RATE)
+    sortie = fly_sortie(simulator, moves, Conditions(["actuator_lag:time_constant=0.1"], noise=0.0))
+    streams = Recorder(surfaces="measured", jitter=0.0).record(sortie)
+    assert streams.actuators.names == ("left", "right", "rudder", "throttle")
+    left, right = streams.actuators.positions[:, 0], streams.actuators.positions[:, 1]
+    surfaces = np.asarray(sortie.flight.surfaces)[::2]
+    np.testing.assert_allclose(0.5 * (left + right) + 0.01, surfaces[:, 0], atol=1e-9)
+    np.testing.assert_allclose(0.5 * (left - right) + 0.01, surfaces[:, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "pattern"),
+    [
+        (Conditions(turbulence="heavy"), "'heavy': expected one of none, light, moderate, severe"),
+        (Conditions(airspeed=3.0), "no steady flight at 3 m/s"),
+        (Conditions({"nonsense": {}}), "'nonsense' is not known"),
+    ],
+)
+def test_bad_conditions(fast, moves, conditions, pattern):
+    with pytest.raises(InputError, match=pattern):
+        fly_sortie(fast, moves, conditions)
+
+
+def test_travel_is_checked_with_trim(fast, moves):
+    with pytest.raises(InputError, match=r"elevator reaches .* rad at 0\.\d\d s, but its limit is 0.4"):
+        fly_sortie(fast, 10.0 * moves)
+
+
+def test_bad_recorders():
+    with pytest.raises(InputError, match="air_data_rate 0 Hz: expected 1 to 5000"):
+        Recorder(air_data_rate=0.0)
+    with pytest.raises(InputError, match="expected commanded or measured"):
+        Recorder(surfaces="guessed")
