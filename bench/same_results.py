@@ -58,7 +58,7 @@ CASES = {
     "replay_instruments": "replay {bags}/cdrw_turbulence --aircraft cdrw --set method=iv_rft",
     "replay_plain": "replay {in}/plain --aircraft cdrw",
     "replay_loss": "replay {in}/loss --aircraft kestrel",
-    "replay_no_vanes": "replay {in}/no_vanes.csv --aircraft cdrw",
+    "replay_no_vanes": "replay {in}/no_vanes_bag --aircraft cdrw",
     "replay_hfb320": "replay {in}/hfb320_bag --aircraft {in}/hfb320.yaml --set settle_time=0",
     "replay_thor": "replay {in}/thor_bag --aircraft {in}/thor.yaml",
     "replay_twin_otter": "replay {in}/twin_otter_bag --aircraft {in}/twin_otter.yaml --set settle_time=0",
@@ -73,8 +73,8 @@ CASES = {
     "identify_gusts": "identify {bags}/cdrw_turbulence --aircraft cdrw --method filter_error",
     "identify_stepwise": "identify {bags}/cdfp_multistep --aircraft cdfp --method equation_error --set stepwise=true "
     "--set correct_sensors=true",
-    "identify_hfb320": "identify {in}/hfb320.csv --aircraft {in}/hfb320.yaml --method output_error --set segment=0",
-    "identify_twin_otter": "identify {in}/twin_otter.csv --aircraft {in}/twin_otter.yaml --method equation_error",
+    "identify_hfb320": "identify {in}/hfb320_bag --aircraft {in}/hfb320.yaml --method output_error --set segment=0",
+    "identify_twin_otter": "identify {in}/twin_otter_bag --aircraft {in}/twin_otter.yaml --method equation_error",
     "gap_lag": "gap {in}/lag --holdout {in}/lag_holdout --aircraft cdrw",
     "gap_plain": "gap {in}/plain --aircraft cdrw",
     "gap_gusty_pair": "gap {in}/gusty_pair --holdout {in}/gusty_pair_holdout --aircraft cdfp",
@@ -95,6 +95,10 @@ def make_inputs(folder: Path) -> None:
         if not (folder / name).exists():
             sysid(["simulate", *shlex.split(arguments), "--out", str(folder / name), "--quiet"], ROOT)
     _without_vanes(folder / "lag", folder / "no_vanes.csv")
+    bag = folder / "no_vanes_bag"
+    if not bag.exists():
+        log = str(folder / "no_vanes.csv")
+        sysid(["convert", log, "--aircraft", "cdrw", "--out", str(bag), "--quiet"], ROOT)
     flights = Path(os.environ.get("SYSID_FLIGHTS", ROOT.parent / "shared" / "flights"))
     if not flights.is_dir():
         print(f"real flights not found at {flights}: their cases are left out")
