@@ -28,7 +28,8 @@ BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["cli"] = {*BELOW["report"], "report"}
 
 ROS_PACKAGES = {"rclpy", "ament_index_python", "rosidl_runtime_py", "launch", "launch_ros", "sysid_msgs"}
-ONLINE_PACKAGES = {"numpy", "scipy", "cython_runtime"}  # the last is SciPy's own
+# the last two are SciPy's own and, where it happens to be installed, what NumPy's f2py takes along
+ONLINE_PACKAGES = {"numpy", "scipy", "cython_runtime", "charset_normalizer"}
 
 
 def modules() -> list[Path]:
