@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from evaluation.pages import publish, table
 
-from sysid_node.cli.ros_domain import own_domain
+from sysid_node.cli.live.ros_domain import own_domain
 
 RAW = ("imu/data", "air_data", "actuators")
 NODES: Mapping[str, tuple[str, ...]] = {

@@ -21,7 +21,6 @@ from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Sensors
-from sysid_node.cli.estimates_bag import write_estimates
 from sysid_node.cli.replay import replay, write_replay
 from sysid_node.flight.bag.message_types import type_store
 from sysid_node.flight.bag.reader import read_streams
@@ -30,6 +29,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
 from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.settings import Settings
+from sysid_node.report.files.estimates_bag import write_estimates
 
 GRAVITY = 9.81
 STATES, CONTROLS = ("alpha", "q", "beta", "p", "r"), ("de", "da", "dr")

@@ -11,6 +11,10 @@ from collections.abc import Iterable
 #: Non-dimensional coefficients. CL, CD in stability axes; CY, Cl, Cm, Cn in body axes.
 COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 
+#: Coefficients of motion in the plane of symmetry, and out of it.
+LONGITUDINAL = ("CL", "CD", "Cm")
+LATERAL = ("CY", "Cl", "Cn")
+
 #: Regressors that every aircraft has, and what each means. Control symbols come on top.
 STATE_REGRESSORS = {
     "0": "offset, 1",

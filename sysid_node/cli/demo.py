@@ -13,9 +13,9 @@ from rich.live import Live
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.live_table import Moment, Reference, live_table
-from sysid_node.cli.processes import node_process
-from sysid_node.cli.ros_domain import make_folder, own_domain
+from sysid_node.cli.live.live_table import Moment, Reference, live_table
+from sysid_node.cli.live.processes import node_process
+from sysid_node.cli.live.ros_domain import make_folder, own_domain
 from sysid_node.errors import InputError
 from sysid_node.flight.align import why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
@@ -25,8 +25,8 @@ from sysid_node.flight.truth import read_truth
 from sysid_node.online.alignment.whole_record import Aligned, align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
-from sysid_node.report.folder import write_run
-from sysid_node.report.replay import replay_result
+from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.results.from_replay import replay_result
 
 if TYPE_CHECKING:
     from sysid_node.ros.follower import Follower

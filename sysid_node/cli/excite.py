@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
 import shutil
@@ -15,7 +14,8 @@ import numpy as np
 
 from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.cli.show import progress_bar
+from sysid_node.cli.shared.terminal import progress_bar
+from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.logs import streams_of
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sysid_node.excite.optimise import Envelope
     from sysid_node.excite.prediction import Predictor
     from sysid_node.excite.spec import Segment
-    from sysid_node.report.excite import ExciteResult
+    from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -61,11 +61,11 @@ def run(args: argparse.Namespace) -> None:
         print(args.out / "report.html")
 
 
-def design(args: argparse.Namespace) -> ExciteResult:
+def design(args: argparse.Namespace) -> ManoeuvreResult:
     """The manoeuvre with its prediction. Raises InputError."""
     from sysid_node.excite.prediction import Predictor  # noqa: PLC0415  # JAX takes its time
     from sysid_node.excite.spec import draw_manoeuvre, parse_segments  # noqa: PLC0415
-    from sysid_node.report.excite import ExciteResult  # noqa: PLC0415
+    from sysid_node.report.results.manoeuvre_result import ManoeuvreResult  # noqa: PLC0415
 
     if not 10 <= args.evaluations <= 10_000:
         raise InputError(f"--evaluations {args.evaluations}: expected 10 to 10000")
@@ -75,7 +75,7 @@ def design(args: argparse.Namespace) -> ExciteResult:
     with progress_bar("excite", quiet=args.quiet) as progress:
         predictor = Predictor(aircraft, args.rate, args.airspeed, autopilot=not args.open_loop)
         if not args.optimise:
-            return ExciteResult(aircraft, predictor.predict(plan), envelope, not args.open_loop)
+            return ManoeuvreResult(aircraft, predictor.predict(plan), envelope, not args.open_loop)
         return _optimised(args, predictor, segments, plan, envelope, progress)
 
 
@@ -86,13 +86,13 @@ def _optimised(
     plan: Manoeuvre,
     envelope: Envelope,
     progress: Callable[[float], None],
-) -> ExciteResult:
+) -> ManoeuvreResult:
     from sysid_node.excite.optimise import optimise  # noqa: PLC0415
-    from sysid_node.report.excite import ExciteResult  # noqa: PLC0415
+    from sysid_node.report.results.manoeuvre_result import ManoeuvreResult  # noqa: PLC0415
 
     tell = lambda count, _: progress(min(count / args.evaluations, 1.0))  # noqa: E731
     optimum = optimise(predictor, segments, plan.duration, envelope, args.evaluations, tell)
-    return ExciteResult(predictor.aircraft, optimum.best, envelope, not args.open_loop, optimum)
+    return ManoeuvreResult(predictor.aircraft, optimum.best, envelope, not args.open_loop, optimum)
 
 
 def parse_envelope(texts: Iterable[str]) -> Envelope:
@@ -114,12 +114,12 @@ def parse_envelope(texts: Iterable[str]) -> Envelope:
     return Envelope(**values)
 
 
-def write_design(folder: Path, result: ExciteResult) -> None:
+def write_design(folder: Path, result: ManoeuvreResult) -> None:
     """Write manoeuvre.csv, prediction.csv, correlations.csv, summary.json, report.html and the bag ``flight``.
 
     What an earlier run left there is replaced. Raises InputError where the folder cannot be written.
     """
-    from sysid_node.report.excite import write_excite_report  # noqa: PLC0415
+    from sysid_node.report.pages.manoeuvre_page import write_manoeuvre_report  # noqa: PLC0415
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -127,13 +127,13 @@ def write_design(folder: Path, result: ExciteResult) -> None:
         _write_tables(folder, result)
         text = json.dumps(summary(result), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-        write_excite_report(folder / "report.html", result)
+        write_manoeuvre_report(folder / "report.html", result)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error}; give another folder as --out") from error
     write_streams(folder / FLIGHT_BAG, streams_of(result.prediction.flight, result.aircraft))
 
 
-def summary(result: ExciteResult) -> dict[str, Any]:
+def summary(result: ManoeuvreResult) -> dict[str, Any]:
     """The content of ``summary.json``; a derivative that the flight does not show has no standard error: null."""
     information, plan = result.prediction.information, result.prediction.manoeuvre
     errors = (None if math.isinf(error) else error for error in information.standard_errors.tolist())
@@ -160,23 +160,16 @@ def summary(result: ExciteResult) -> dict[str, Any]:
     return content
 
 
-def _write_tables(folder: Path, result: ExciteResult) -> None:
+def _write_tables(folder: Path, result: ManoeuvreResult) -> None:
     plan, information = result.prediction.manoeuvre, result.prediction.information
     times = zip(plan.time.tolist(), *(values.tolist() for values in plan.deflections.values()), strict=True)
-    _write_csv(folder / "manoeuvre.csv", ["t", *plan.deflections], times)
+    write_table(folder / "manoeuvre.csv", ["t", *plan.deflections], times)
     tolerances = [d.tolerance for d in result.aircraft.derivatives.values()]
     numbers = (information.values.tolist(), tolerances, information.standard_errors.tolist())
     rows = zip(information.names, *numbers, strict=True)
-    _write_csv(folder / "prediction.csv", ["name", "value", "tolerance", "standard_error"], rows)
+    write_table(folder / "prediction.csv", ["name", "value", "tolerance", "standard_error"], rows)
     matrix = zip(information.names, *information.correlations.T.tolist(), strict=True)
-    _write_csv(folder / "correlations.csv", ["name", *information.names], matrix)
-
-
-def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
+    write_table(folder / "correlations.csv", ["name", *information.names], matrix)
 
 
 def _remove_old_bag(bag: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.topics import topic_names
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
     """Diagnoses and writes."""
     from sysid_node.gap.diagnose import diagnose  # noqa: PLC0415  # JAX takes its time
     from sysid_node.gap.flightdata.gap_flight import load_flight  # noqa: PLC0415
-    from sysid_node.report.gap import opening_text  # noqa: PLC0415
+    from sysid_node.report.pages.gap_page import opening_text  # noqa: PLC0415
 
     aircraft, topics = load_aircraft(args.aircraft), topic_names(args.topic)
     flights, holdouts = (
@@ -79,16 +79,16 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[float, str], None]]:
 def write_gap(folder: Path, found: Diagnosis) -> None:
     """Writes gap.json, where.csv, candidates.csv, corrected.yaml, effects.txt and report.html. Raises InputError."""
     from sysid_node.gap.document import document  # noqa: PLC0415
-    from sysid_node.report.gap import write_gap_report  # noqa: PLC0415
+    from sysid_node.report.pages.gap_page import write_gap_report  # noqa: PLC0415
 
     content = document(found)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
-        _write_csv(folder / "where.csv", ["station", "axis", "share"],
+        write_table(folder / "where.csv", ["station", "axis", "share"],
                    [[w["station"], w["axis"], w["share"]] for w in found.where])  # fmt: skip
-        _write_csv(folder / "candidates.csv", ["effect", "probability", "share"],
+        write_table(folder / "candidates.csv", ["effect", "probability", "share"],
                    [list(candidate.values()) for candidate in content["candidates"]])  # fmt: skip
         (folder / "corrected.yaml").write_text(dump_aircraft(corrected(found)), encoding="utf-8")
         (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
@@ -121,10 +121,3 @@ def effect_options(found: Diagnosis) -> list[str]:
         if cause.candidate.effect != "derivative_error":
             options.append(":".join([cause.candidate.effect, *pairs]))
     return options
-
-
-def _write_csv(path: Path, header: list[str], rows: list[list[object]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
@@ -18,7 +17,8 @@ from sysid_node.batch.identify import METHODS, Identification, identify
 from sysid_node.batch.models.rigid_body import OUTPUTS
 from sysid_node.batch.results.result import Answer, Estimate, quality
 from sysid_node.batch.settings import Settings
-from sysid_node.cli.show import progress_bar, show_estimates
+from sysid_node.cli.shared.terminal import progress_bar, show_estimates
+from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.logs import load_flight
@@ -26,9 +26,9 @@ from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.report.data import Response, RunResult, Spectra, prior_of
-from sysid_node.report.folder import write_run
-from sysid_node.report.spectrum import amplitude_spectrum
+from sysid_node.report.drawing.spectrum import amplitude_spectrum
+from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.results.run_result import Response, RunResult, Spectra, prior_of
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -162,15 +162,7 @@ def write_tables(folder: Path, found: Identification) -> None:
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """One table; none where there are no rows."""
-    content = list(rows)
-    path.unlink(missing_ok=True)
-    if not content:
-        return
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(content)
+    write_table(path, header, rows, keep_empty=False)
 
 
 def parse_settings(texts: Iterable[str], frequencies: str | None = None) -> Settings:

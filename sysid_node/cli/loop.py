@@ -22,11 +22,11 @@ from rich.text import Text
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.processes import node_process
-from sysid_node.cli.ros_domain import make_folder, own_domain
+from sysid_node.cli.live.processes import node_process
+from sysid_node.cli.live.ros_domain import make_folder, own_domain
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
-from sysid_node.report.loop import Episode, Event, write_loop
+from sysid_node.report.pages.closed_loop_page import Episode, Event, write_loop
 
 if TYPE_CHECKING:
     from sysid_node.ros.loop_watch import LoopWatch

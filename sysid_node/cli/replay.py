@@ -16,8 +16,7 @@ import numpy as np
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.estimates_bag import write_estimates
-from sysid_node.cli.show import progress_bar, show_estimates, show_faults
+from sysid_node.cli.shared.terminal import progress_bar, show_estimates, show_faults
 from sysid_node.errors import InputError
 from sysid_node.faults.model.reference_model import known_of
 from sysid_node.faults.recorded_flight import Heard, Verdict, judge
@@ -36,8 +35,9 @@ from sysid_node.online.alignment.whole_record import Aligned, align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 from sysid_node.online.whole_record import run as run_online
-from sysid_node.report.folder import write_run
-from sysid_node.report.replay import replay_result
+from sysid_node.report.files.estimates_bag import write_estimates
+from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.results.from_replay import replay_result
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

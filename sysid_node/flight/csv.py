@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
@@ -42,11 +43,8 @@ def read_csv(path: str | Path) -> FlightRecord:
 def write_csv(path: str | Path, flight: FlightRecord) -> None:
     """A flight as CSV, every number to the last bit."""
     columns = [flight.time, *flight.columns.values()]
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([TIME, *flight.columns])
-        for row in zip(*(column.tolist() for column in columns), strict=True):
-            writer.writerow(["" if math.isnan(x) else repr(x) for x in row])
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    write_table(Path(path), [TIME, *flight.columns], rows, blank_nan=True)
 
 
 def _check_names(path: Path, names: list[str]) -> None:

@@ -1,5 +1,6 @@
-"""Layer ``report``: one self-contained HTML page and plain CSV tables from the results of a run.
+"""Layer ``report``: the files that a command leaves, among them one HTML page that needs no network.
 
-``write_run(folder, run)`` writes everything, ``read_run(folder)`` reads it back, ``write_report(path, run)``
-draws the page. A run is a ``RunResult`` (``sysid_node.report.data``).
+A command's outcome becomes a result (``results``); ``files`` writes it as JSON, CSV, bags and the page, and reads runs
+back. ``pages`` lists each report's ``sections``, which fill the templates with sentences (``wording``) and figures
+(``drawing``).
 """

@@ -4,8 +4,8 @@ import pytest
 
 from sysid_node.cli.main import main
 from sysid_node.online.types import DerivativeEstimate, Estimates
-from sysid_node.report.data import Prior, RunResult
-from sysid_node.report.folder import write_run
+from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.results.run_result import Prior, RunResult
 
 
 @pytest.fixture

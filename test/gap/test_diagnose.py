@@ -14,8 +14,8 @@ from sysid_node.gap.document import document
 from sysid_node.gap.validation.holdout import Check
 from sysid_node.gap.verdict.decision import _sampling, verdict_of
 from sysid_node.gap.verdict.localisation import _regime
-from sysid_node.report.gap import write_gap_report
-from sysid_node.report.sections.gap import candidates
+from sysid_node.report.pages.gap_page import write_gap_report
+from sysid_node.report.sections.gap.panels import candidates
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 

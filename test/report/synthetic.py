@@ -4,7 +4,7 @@ import numpy as np
 
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.report.data import Prior, Response, RunResult, Spectra
+from sysid_node.report.results.run_result import Prior, Response, RunResult, Spectra
 
 TRUTH = {
     **{"CL_0": 0.05, "CL_alpha": 3.0, "CL_q": 4.0, "CL_de": 1.1},

@@ -1,19 +1,4 @@
-"""A section of a report: a title, a template, and the function that fills it from the results."""
+"""The sections of the pages, one module each: from a result to the variables of a template.
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
-
-Results = TypeVar("Results")
-
-
-@dataclass(frozen=True)
-class Section(Generic[Results]):
-    """One section of the page. ``context`` gives the template's variables."""
-
-    anchor: str
-    title: str
-    template: str  # file in templates/sections
-    context: Callable[[Results], Mapping[str, Any]]
+The modules here draw a run of an estimator; ``gap`` and ``manoeuvre`` hold the sections of those two pages.
+"""

@@ -11,11 +11,12 @@ import numpy as np
 from markupsafe import Markup
 
 from sysid_node.online.types import DerivativeEstimate
-from sysid_node.report.compare import NORMAL_95, agrees, covers, half_width
-from sysid_node.report.data import Prior, RunResult
-from sysid_node.report.sections import Section
+from sysid_node.report.results.comparison import NORMAL_95, agrees, covers, half_width
+from sysid_node.report.results.run_result import Prior, RunResult
 from sysid_node.report.sections.groups import grouped
-from sysid_node.report.words import meaning, number, short_meaning, symbol, unit, with_interval
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.names import meaning, short_meaning, symbol, unit
+from sysid_node.report.wording.numbers import number, with_interval
 
 #: Half widths, as fractions of the reference, that the picture's axis may take.
 SPANS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from sysid_node.flight.record import COLUMNS, Array, FlightRecord
-from sysid_node.report import figures
-from sysid_node.report.data import RunResult, Spectra
-from sysid_node.report.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
-from sysid_node.report.sections import Section
-from sysid_node.report.thin import thin_curve
+from sysid_node.report.drawing import figures
+from sysid_node.report.drawing.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
+from sysid_node.report.drawing.thinning import thin_curve
+from sysid_node.report.results.run_result import RunResult, Spectra
+from sysid_node.report.sections.section import Section
 
 DEGREES = 180.0 / np.pi
 

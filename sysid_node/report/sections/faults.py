@@ -8,9 +8,9 @@ from typing import Any
 
 from sysid_node.faults.recorded_flight import Episode
 from sysid_node.faults.types import amount
-from sysid_node.report.data import RunResult
-from sysid_node.report.sections import Section
-from sysid_node.report.words import number, seconds
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.numbers import number, seconds
 
 
 def context(run: RunResult) -> Mapping[str, Any]:

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from sysid_node.report import figures
-from sysid_node.report.data import Response, RunResult
-from sysid_node.report.figures import Figure
-from sysid_node.report.sections import Section
-from sysid_node.report.thin import MAX_POINTS, thin_curve
-from sysid_node.report.words import COEFFICIENT_WORDS, number, symbol, words_of
+from sysid_node.report.drawing import figures
+from sysid_node.report.drawing.figures import Figure
+from sysid_node.report.drawing.thinning import MAX_POINTS, thin_curve
+from sysid_node.report.results.run_result import Response, RunResult
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.names import COEFFICIENT_WORDS, symbol, words_of
+from sysid_node.report.wording.numbers import number
 
 
 def context(run: RunResult) -> Mapping[str, Any]:

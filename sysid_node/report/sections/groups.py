@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from sysid_node.aircraft.names import COEFFICIENTS
-from sysid_node.report.words import LATERAL, LONGITUDINAL, split_name
+from sysid_node.aircraft.names import COEFFICIENTS, LATERAL, LONGITUDINAL
+from sysid_node.report.wording.names import split_name
 
 GROUPS = (("Longitudinal", LONGITUDINAL), ("Lateral and directional", LATERAL), ("Other parameters", ("",)))
 _ORDER = {coefficient: i for i, coefficient in enumerate(COEFFICIENTS)}

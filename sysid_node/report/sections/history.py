@@ -11,14 +11,15 @@ from markupsafe import Markup
 
 from sysid_node.flight.record import Array
 from sysid_node.online.types import DerivativeEstimate
-from sysid_node.report import figures
-from sysid_node.report.compare import changes, half_width
-from sysid_node.report.data import RunResult
-from sysid_node.report.figures import Figure, Mask
-from sysid_node.report.sections import Section
+from sysid_node.report.drawing import figures
+from sysid_node.report.drawing.figures import Figure, Mask
+from sysid_node.report.drawing.thinning import thin_curve
+from sysid_node.report.results.comparison import changes, half_width
+from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.sections.groups import grouped
-from sysid_node.report.thin import thin_curve
-from sysid_node.report.words import short_meaning, symbol, unit, with_interval
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.names import short_meaning, symbol, unit
+from sysid_node.report.wording.numbers import with_interval
 
 POINTS = 900  # of one panel's curves
 

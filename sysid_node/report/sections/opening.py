@@ -9,10 +9,11 @@ from typing import Any
 from markupsafe import Markup
 
 from sysid_node.online.types import DerivativeEstimate
-from sysid_node.report.compare import agrees, covers, half_width
-from sysid_node.report.data import RunResult
-from sysid_node.report.sections import Section
-from sysid_node.report.words import METHOD_WORDS, listing, number, plural, seconds, short_meaning, status_words, symbol
+from sysid_node.report.results.comparison import agrees, covers, half_width
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.names import METHOD_WORDS, short_meaning, status_words, symbol
+from sysid_node.report.wording.numbers import listing, number, plural, seconds
 
 #: What the sign of a derivative means in the air: (derivative, if negative, if positive).
 HANDLING = (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sysid_node.report.data import RunResult
-from sysid_node.report.sections import Section
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.sections.section import Section
 
 
 def context(run: RunResult) -> Mapping[str, Any]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sysid_node.report import figures
-from sysid_node.report.data import RunResult, Spectra
-from sysid_node.report.figures import Figure
-from sysid_node.report.sections import Section
-from sysid_node.report.words import COEFFICIENT_WORDS, symbol
+from sysid_node.report.drawing import figures
+from sysid_node.report.drawing.figures import Figure
+from sysid_node.report.results.run_result import RunResult, Spectra
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.names import COEFFICIENT_WORDS, symbol
 
 
 def context(run: RunResult) -> Mapping[str, Any]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sysid_node.report.data import RunResult
-from sysid_node.report.sections import Section
-from sysid_node.report.words import setting
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.numbers import setting
 
 #: Units of the settings that have one.
 UNITS = {

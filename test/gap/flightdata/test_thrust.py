@@ -12,7 +12,7 @@ from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.flightdata.gap_flight import Flight, complete
 from sysid_node.gap.residuals.build import view_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.report.sections.gap_words import paragraph
+from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.sim import Simulator
 
 

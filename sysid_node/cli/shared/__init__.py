@@ -1,0 +1,1 @@
+"""What several commands share: their options, progress bars, and tables in the terminal."""

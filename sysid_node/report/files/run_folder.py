@@ -1,0 +1,167 @@
+"""The folder of a run: ``summary.json``, the CSV tables and ``report.html``, written and read back."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from sysid_node.errors import InputError
+from sysid_node.online.types import Estimates
+from sysid_node.report.drawing.thinning import MAX_ROWS, thin_curve, thin_flight
+from sysid_node.report.files import run_tables as tables
+from sysid_node.report.files.fault_summary import as_summary, from_summary
+from sysid_node.report.pages.run_page import write_report
+from sysid_node.report.results.run_result import Response, RunResult
+
+SUMMARY = "summary.json"
+REPORT = "report.html"
+
+
+def write_run(folder: Path, run: RunResult) -> None:
+    """Writes all files of a run into ``folder``, which is made where it is missing.
+
+    ``sysid report`` makes the same ``report.html`` from the other files. Raises InputError where the folder
+    cannot be written.
+    """
+    stored = _stored(run)
+    with _writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        _write_tables(folder, stored)
+        text = json.dumps(summary(stored), indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / SUMMARY).write_text(text + "\n", encoding="utf-8")
+        write_report(folder / REPORT, stored)
+
+
+def rebuild_report(folder: Path) -> Path:
+    """Draws ``report.html`` from the folder's other files and gives its path. Raises as ``read_run`` does."""
+    run = read_run(folder)
+    with _writing(folder):
+        write_report(folder / REPORT, run)
+    return folder / REPORT
+
+
+def read_run(folder: Path) -> RunResult:
+    """The run that ``write_run`` wrote. Raises InputError naming the file where something is missing or wrong."""
+    found = _read_summary(folder / SUMMARY)
+    prior, truth, since = tables.read_references(folder / "derivatives.csv")
+    return RunResult(
+        aircraft=found["aircraft"],
+        method=found["method"],
+        history=tables.read_history(folder / "estimates.csv", folder / "fits.csv"),
+        title=found.get("title", ""),
+        data_seconds=_from_json(found.get("data_seconds")),
+        samples=found.get("samples", 0),
+        settings=found.get("settings", {}),
+        prior=prior,
+        truth=truth,
+        truth_since=since,
+        flight=tables.read_signals(folder / "signals.csv"),
+        spectra=tables.read_spectra(folder / "spectra.csv"),
+        responses=tables.read_responses(folder / "responses.csv"),
+        rejected=found.get("rejected", {}),
+        holdout=_from_json(found.get("holdout", {})),
+        faults=from_summary(found.get("faults")),
+        remarks=found.get("remarks", []),
+        response_note=found.get("response_note", ""),
+    )
+
+
+def summary(run: RunResult) -> dict[str, Any]:
+    """The content of ``summary.json``; what is not a finite number is null."""
+    final = run.final or Estimates(math.nan, {}, {})
+    content = {
+        "aircraft": run.aircraft,
+        "method": run.method,
+        "title": run.title,
+        "data_seconds": run.data_seconds,
+        "samples": run.samples,
+        "rejected": run.rejected,
+        "settings": run.settings,
+        "derivatives": {name: _without(d._asdict(), "name") for name, d in final.derivatives.items()},
+        "fits": {name: _without(f._asdict(), "coefficient") for name, f in final.fits.items()},
+        "holdout": run.holdout,
+        "faults": as_summary(run.faults),
+        "remarks": list(run.remarks),
+        "response_note": run.response_note,
+    }
+    plain: dict[str, Any] = _to_json(content)
+    return plain
+
+
+def _stored(run: RunResult) -> RunResult:
+    """The part of a run that its files hold: long records thinned, references only of what was estimated."""
+    known = run.final.derivatives if run.final else {}
+    return replace(
+        run,
+        history=[e for e in run.history if e.derivatives or e.fits],
+        prior={name: prior for name, prior in run.prior.items() if name in known},
+        truth={name: value for name, value in run.truth.items() if name in known},
+        truth_since={name: time for name, time in run.truth_since.items() if name in known},
+        flight=thin_flight(run.flight) if run.flight else None,
+        responses={name: _thin_response(response) for name, response in run.responses.items()},
+    )
+
+
+def _thin_response(response: Response) -> Response:
+    curves = thin_curve(response.time, response.measured, response.modelled, points=MAX_ROWS)
+    return Response(response.unit, *curves)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """What the system says where a file cannot be written, in one line."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder") from None
+
+
+def _write_tables(folder: Path, run: RunResult) -> None:
+    final = run.final.derivatives.values() if run.final else ()
+    tables.write_derivatives(folder / "derivatives.csv", final, run.prior, run.truth, run.truth_since)
+    tables.write_estimates(folder / "estimates.csv", run.history)
+    tables.write_fits(folder / "fits.csv", run.history)
+    tables.write_signals(folder / "signals.csv", run.flight)
+    tables.write_spectra(folder / "spectra.csv", run.spectra)
+    tables.write_responses(folder / "responses.csv", run.responses)
+
+
+def _read_summary(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(
+            f"{path.parent}: no {SUMMARY} in it; give the --out folder of sysid replay or sysid identify"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as JSON ({error}); run the command that wrote it again") from None
+    if not isinstance(found, dict) or not {"aircraft", "method"} <= found.keys():
+        raise InputError(f"{path}: keys 'aircraft' and 'method' are expected; run the command that wrote it again")
+    return found
+
+
+def _without(values: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if name != key}
+
+
+def _to_json(value: Any) -> Any:
+    """Plain JSON values: NumPy scalars unpacked, tuples as lists, what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(key): _to_json(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_to_json(part) for part in value]
+    if hasattr(value, "tolist"):
+        return _to_json(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _from_json(value: Any) -> Any:
+    """Figures as they were before ``_to_json``: null is NaN."""
+    if isinstance(value, Mapping):
+        return {key: _from_json(part) for key, part in value.items()}
+    return math.nan if value is None else value

@@ -1,0 +1,35 @@
+"""An estimate against what was believed of it and what is true."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from sysid_node.online.types import DerivativeEstimate, Estimates
+from sysid_node.report.results.run_result import Prior
+
+#: Half width of a 95 % interval in standard deviations of a normal distribution.
+NORMAL_95 = 1.959964
+
+
+def half_width(d: DerivativeEstimate) -> float:
+    """Half of the 95 % interval; NaN where there is none."""
+    return (d.upper - d.lower) / 2
+
+
+def covers(d: DerivativeEstimate, truth: float) -> bool:
+    """Whether the 95 % interval holds the true value."""
+    return d.lower <= truth <= d.upper
+
+
+def agrees(d: DerivativeEstimate, prior: Prior) -> bool:
+    """Whether estimate and prior differ by no more than both their 95 % intervals explain, as independent errors."""
+    tolerance = 0.0 if math.isnan(prior.tolerance) else NORMAL_95 * prior.tolerance
+    return abs(d.value - prior.value) <= math.hypot(half_width(d), tolerance)
+
+
+def changes(history: Sequence[Estimates], name: str) -> list[float]:
+    """Times (s) at which a derivative was first announced as changed, each spell once."""
+    states = [(e.time, e.derivatives[name].status.startswith("changed")) for e in history if name in e.derivatives]
+    before = [False, *(changed for _, changed in states)]
+    return [time for (time, changed), was in zip(states, before, strict=False) if changed and not was]

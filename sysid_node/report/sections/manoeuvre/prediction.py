@@ -1,0 +1,63 @@
+"""Predicted standard errors, derivative by derivative."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from sysid_node.excite.optimise import shares_left
+from sysid_node.excite.prediction import tolerances_of
+from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
+from sysid_node.report.sections.groups import grouped
+from sysid_node.report.wording.names import short_meaning, symbol
+from sysid_node.report.wording.numbers import number
+
+
+@dataclass(frozen=True)
+class Row:
+    """One derivative."""
+
+    name: str
+    symbol: Markup
+    meaning: str
+    value: str
+    tolerance: str
+    error: str
+    relative: str  # percent of the value
+    before: str  # the start's error, where there was an optimisation
+    left: float  # percent of the tolerance
+    seen: bool
+
+
+def context(result: ManoeuvreResult) -> Mapping[str, Any]:
+    """Groups of rows."""
+    information = result.prediction.information
+    left = shares_left(information, tolerances_of(result.aircraft))
+    errors = information.standard_errors
+    before = result.optimum.start.information.standard_errors if result.optimum else np.full(errors.size, np.nan)
+    rows = {
+        name: _row(result, name, float(error), float(start), float(share))
+        for name, error, start, share in zip(information.names, errors, before, left, strict=True)
+    }
+    groups = [(title, [rows[name] for name in names]) for title, names in grouped(rows)]
+    return {"groups": groups, "optimised": result.optimum is not None}
+
+
+def _row(result: ManoeuvreResult, name: str, error: float, before: float, left: float) -> Row:
+    derivative = result.aircraft.derivatives[name]
+    return Row(
+        name=name,
+        symbol=symbol(name),
+        meaning=short_meaning(name),
+        value=number(derivative.value),
+        tolerance="" if derivative.tolerance is None else number(derivative.tolerance, 2),
+        error=number(error, 2),
+        relative=f"{number(100 * error / abs(derivative.value), 2)}\u202f%" if derivative.value else "",
+        before=number(before, 2),
+        left=100 * left,
+        seen=left < 0.9,
+    )
