@@ -26,9 +26,9 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.estimation.candidates import UNSEEN
+from sysid_node.gap.estimation.candidates import UNOBSERVABLE
 from sysid_node.gap.flightdata.flow_angles import ANGLES
-from sysid_node.gap.flightdata.gap_flight import Flight, complete
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.sim import EFFECTS, Simulator
 from sysid_node.sim.flying.recording import Recorder
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
@@ -38,7 +38,7 @@ RATE, DURATION = 100.0, 44.0
 THROTTLE = "doublet:throttle:amplitude=0.3:width=2:start=38"
 PLANS = (("3211:width=0.4:repeat=2", THROTTLE), ("multisine:length=34:low=0.1:high=2", THROTTLE))
 #: Not here: what the vanes measure, noise, and what needs the ground.
-SHOWN = [effect for effect in EFFECTS if effect not in UNSEEN | {"ground_effect"}]
+SHOWN = [effect for effect in EFFECTS if effect not in UNOBSERVABLE | {"ground_effect"}]
 
 
 def believed(aircraft: Aircraft, random: np.random.Generator) -> Aircraft:
@@ -50,7 +50,7 @@ def believed(aircraft: Aircraft, random: np.random.Generator) -> Aircraft:
     return replace(aircraft, derivatives=off)
 
 
-def fly(aircraft: Aircraft, belief: Aircraft, effect: str, plan: tuple[str, ...], seed: int, vanes: bool) -> Flight:
+def fly(aircraft: Aircraft, belief: Aircraft, effect: str, plan: tuple[str, ...], seed: int, vanes: bool) -> GapFlight:
     """A flight of the aircraft as a bag would hold it, read with the file that is believed."""
     simulator = Simulator(aircraft, RATE)
     deflections = np.zeros((round(DURATION * RATE) + 1, len(simulator.commands)))
@@ -63,7 +63,7 @@ def fly(aircraft: Aircraft, belief: Aircraft, effect: str, plan: tuple[str, ...]
     record = flight_record(belief, Recorder(RATE, RATE, RATE).record(sortie), 0.2)
     unread = {} if vanes else {name: np.full(len(record), np.nan) for name in ANGLES}
     record = replace(record, columns={**record.columns, **unread})
-    return complete(belief, Flight(record, RATE, RATE, RATE, source=f"flight {seed}"))
+    return completed_flight(belief, GapFlight(record, RATE, RATE, RATE, source=f"flight {seed}"))
 
 
 def told(effect: str, vanes: bool) -> dict[str, Any]:

@@ -19,13 +19,13 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import Fit, blank, polish, with_candidates
+from sysid_node.gap.estimation.fit import CandidateFit, converged, unfitted, with_candidates
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.predictive_density import Evidence, groups_of, held_out
-from sysid_node.gap.flightdata.gap_flight import RATE, Flight, complete
-from sysid_node.gap.instruments.liml import unbiased
-from sysid_node.gap.residuals.build import view_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.predictive_density import Evidence, held_out_evidence, window_groups
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, completed_flight
+from sysid_node.gap.instruments.liml import liml_estimate
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import flown
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import Recorder
@@ -71,7 +71,7 @@ class Outcome:
         return low <= self.closed <= high
 
 
-def fly(aircraft: Aircraft, effects: Effects, seed: int, turbulence: str) -> Flight:
+def fly(aircraft: Aircraft, effects: Effects, seed: int, turbulence: str) -> GapFlight:
     """A flight as a bag would hold it."""
     simulator = Simulator(aircraft, _IMU_RATE)
     plan = parse_manoeuvre(list(_STEPS), aircraft, _IMU_RATE, _DURATION)
@@ -79,29 +79,29 @@ def fly(aircraft: Aircraft, effects: Effects, seed: int, turbulence: str) -> Fli
     deflections[:, :-1] = plan.surfaces()
     sortie = fly_sortie(simulator, deflections, Conditions(effects, turbulence=turbulence, seed=seed))
     record = flight_record(aircraft, Recorder(_IMU_RATE, 100.0, 100.0).record(sortie), 0.2)
-    return complete(aircraft, Flight(record, _IMU_RATE, 100.0, 100.0, source=f"flight {seed}"))
+    return completed_flight(aircraft, GapFlight(record, _IMU_RATE, 100.0, 100.0, source=f"flight {seed}"))
 
 
-def fitted(view: View, effect: str) -> tuple[Fit, Fit]:
+def fitted(model: ResidualModel, effect: str) -> tuple[CandidateFit, CandidateFit]:
     """Derivatives within their tolerances, and the effect with them."""
-    nuisances = nuisances_of(view.simulator.aircraft, view)
-    base = polish(blank([view], nuisances))
-    candidate = next(c for c in candidates_of(view.simulator, [view]) if c.effect == effect)
-    starts = (polish(with_candidates(base, [candidate], nuisances, start), rounds=1) for start in candidate.starts)
-    return unbiased(base), unbiased(polish(min(starts, key=lambda fit: fit.cost)))
+    nuisances = nuisances_of(model.simulator.aircraft, model)
+    base = converged(unfitted([model], nuisances))
+    candidate = next(c for c in candidates_of(model.simulator, [model]) if c.effect == effect)
+    starts = (converged(with_candidates(base, [candidate], nuisances, start), rounds=1) for start in candidate.starts)
+    return liml_estimate(base), liml_estimate(converged(min(starts, key=lambda fit: fit.cost)))
 
 
 def outcome(aircraft: Aircraft, case: int, turbulence: str) -> Outcome:
     """Of one pair of flights."""
-    random, simulator = np.random.default_rng(case), Simulator(aircraft, RATE)
+    random, simulator = np.random.default_rng(case), Simulator(aircraft, ANALYSIS_RATE)
     known = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
     wrong = {n: 0.5 * tolerance * float(random.standard_normal()) for n, tolerance in known.items()}
     effects = EFFECTS[case % len(EFFECTS)]
     truth = {**effects, "derivative_error": wrong}
-    first, second = (view_of(simulator, fly(aircraft, truth, 2 * case + k, turbulence)) for k in (0, 1))
+    first, second = (residual_model_of(simulator, fly(aircraft, truth, 2 * case + k, turbulence)) for k in (0, 1))
     own = [nuisances_of(aircraft, second)]
-    base, final = (held_out(fit, [second], own) for fit in fitted(first, next(iter(effects))))
-    groups = len(groups_of(second))
+    base, final = (held_out_evidence(fit, [second], own) for fit in fitted(first, next(iter(effects))))
+    groups = len(window_groups(second))
     right = Evidence(np.zeros(groups), (), (second,), ((simulator.vector(truth),) * groups,))
     stated, best = flown(base, final), flown(base, right)
     assert stated is not None and best is not None

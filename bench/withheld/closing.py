@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.flightdata.gap_flight import RATE as ANALYSIS_RATE
-from sysid_node.gap.flightdata.gap_flight import load_flight
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.validation.simulation_error import flown
 from sysid_node.sim import Simulator
 
@@ -91,10 +90,10 @@ def _beside_record(label: Mapping[str, Any], case: Path) -> dict[str, float]:
     """The simulator's errors on the held-out record, by the diagnosis' own rule, noise and all."""
     aircraft, corrected = (load_aircraft(str(case / name)) for name in ("aircraft.yaml", "out/corrected.yaml"))
     simulator = Simulator(aircraft, ANALYSIS_RATE)
-    view = view_of(simulator, load_flight(case / "held", aircraft, None, "flu"))
+    model = residual_model_of(simulator, load_gap_flight(case / "held", aircraft, None, "flu"))
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     points = (vector(simulator, corrected, effects) for effects in (found, label["effects"]))
-    gap = flown(*(everywhere((view,), point) for point in points))
+    gap = flown(*(everywhere((model,), point) for point in points))
     return {"before": gap.before, "after": gap.tolerances, "true_effect": gap.after} if gap else {}
 
 

@@ -18,10 +18,9 @@ import numpy as np
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.gap.flightdata.gap_flight import RATE as ANALYSIS_RATE
-from sysid_node.gap.flightdata.gap_flight import load_flight
-from sysid_node.gap.residuals.build import view_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import flown
 from sysid_node.sim import Simulator
 
@@ -42,17 +41,19 @@ def main(which: str, seed: int, folder: Path) -> None:
     plant = Plant(Case(**{k: v for k, v in label.items() if k in Case.__dataclass_fields__}), which)
     aircraft = load_aircraft(str(case / "aircraft.yaml"))
     simulator = Simulator(aircraft, ANALYSIS_RATE)
-    views = tuple(_view(plant, simulator, flight, label["effects"]) for flight in _FLIGHTS)
+    models = tuple(_model(plant, simulator, flight, label["effects"]) for flight in _FLIGHTS)
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     after = vector(simulator, load_aircraft(str(case / "out" / "corrected.yaml")), found)
-    before, corrected = (everywhere(views, point) for point in (simulator.neutral(), after))
+    before, corrected = (everywhere(models, point) for point in (simulator.neutral(), after))
     gap = flown(before, corrected)
     errors = asdict(gap) if gap else {}
     kept = {name: errors[name] for name in ("before", "after", "noise_floor", "shrink_percent") if errors}
     (case / "covered.json").write_text(json.dumps(kept), encoding="utf-8")
 
 
-def _view(plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str, Mapping[str, float]]) -> View:
+def _model(
+    plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str, Mapping[str, float]]
+) -> ResidualModel:
     """Another flight of the plant, through its instruments and a bag, as the diagnosis sees flights."""
     case, log = plant.case, plant.fly(effects, flight)
     random = np.random.default_rng([case.seed, flight])
@@ -60,7 +61,7 @@ def _view(plant: Plant, simulator: Simulator, flight: int, effects: Mapping[str,
     streams = record(log, seen, plant.truth, effects, SUITES[case.suite], case.noise, random)
     with tempfile.TemporaryDirectory() as folder:
         write_streams(Path(folder) / "flight", streams)
-        return view_of(simulator, load_flight(Path(folder) / "flight", simulator.aircraft, None, "flu"))
+        return residual_model_of(simulator, load_gap_flight(Path(folder) / "flight", simulator.aircraft, None, "flu"))
 
 
 if __name__ == "__main__":

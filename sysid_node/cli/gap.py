@@ -51,12 +51,13 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Diagnoses and writes."""
     from sysid_node.gap.diagnose import diagnose  # noqa: PLC0415  # JAX takes its time
-    from sysid_node.gap.flightdata.gap_flight import load_flight  # noqa: PLC0415
+    from sysid_node.gap.flightdata.gap_flight import load_gap_flight  # noqa: PLC0415
     from sysid_node.report.pages.gap_page import opening_text  # noqa: PLC0415
 
     aircraft, topics = load_aircraft(args.aircraft), topic_names(args.topic)
     flights, holdouts = (
-        [load_flight(path, aircraft, topics, args.body_frame) for path in paths] for paths in (args.bags, args.holdout)
+        [load_gap_flight(path, aircraft, topics, args.body_frame) for path in paths]
+        for paths in (args.bags, args.holdout)
     )
     with _progress(quiet=args.quiet) as progress:
         found = diagnose(aircraft, flights, holdouts, progress, keep=args.out / "unfinished")
@@ -102,7 +103,7 @@ def corrected(found: Diagnosis) -> Aircraft:
     from dataclasses import replace  # noqa: PLC0415
 
     fit = found.attribution.corrected
-    names, point = fit.views[0].simulator.names, fit.points[0]
+    names, point = fit.models[0].simulator.names, fit.points[0]
     derivatives = {
         n: replace(d, value=float(d.value + point[names.index(f"derivative_error.{n}")]))
         for n, d in found.aircraft.derivatives.items()
@@ -113,7 +114,7 @@ def corrected(found: Diagnosis) -> Aircraft:
 def effect_options(found: Diagnosis) -> list[str]:
     """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
     fit = found.attribution.corrected
-    simulator = fit.views[0].simulator
+    simulator = fit.models[0].simulator
     options = []
     for cause in found.attribution.causes:
         indices = cause.candidate.entries

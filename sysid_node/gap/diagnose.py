@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.estimation.checkpoint import Steps
+from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.predictive_density import Evidence, carried
-from sysid_node.gap.flightdata.gap_flight import RATE, Flight
-from sysid_node.gap.flightdata.manoeuvre_window import manoeuvre_of
-from sysid_node.gap.residuals.admissibility import admitted, require_others
-from sysid_node.gap.residuals.air_motion import gusts_of
-from sysid_node.gap.residuals.build import view_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.predictive_density import Evidence, transferred_parameters
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight
+from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
+from sysid_node.gap.residuals.admissibility import require_admissible, require_distinct_flights
+from sysid_node.gap.residuals.air_motion import gust_speed
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import Progress
 from sysid_node.gap.selection.confusion import Confusion, confusion_of
 from sysid_node.gap.selection.forward_selection import Attribution, attribute
@@ -31,7 +31,7 @@ from sysid_node.sim import Simulator
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found. ``views`` are the flights on which the gap is measured, with the evidence there."""
+    """What was found. ``models`` are the flights on which the gap is measured, with the evidence there."""
 
     aircraft: Aircraft
     verdict: str
@@ -40,7 +40,7 @@ class Diagnosis:
     where: list[dict[str, Any]]
     attribution: Attribution
     shape: Shape | None
-    views: tuple[View, ...]
+    models: tuple[ResidualModel, ...]
     base: Evidence
     final: Evidence
     next_flight: str
@@ -56,8 +56,8 @@ class Diagnosis:
 
 def diagnose(
     aircraft: Aircraft,
-    flights: Sequence[Flight],
-    holdouts: Sequence[Flight],
+    flights: Sequence[GapFlight],
+    holdouts: Sequence[GapFlight],
     progress: Progress = lambda s, t: None,
     keep: Path | None = None,
 ) -> Diagnosis:
@@ -68,26 +68,26 @@ def diagnose(
     Raises InputError: an aircraft file without tolerances or of another aircraft, a held-out flight that is also
     fitted, a flight in which nothing moves.
     """
-    require_others(flights, holdouts)
+    require_distinct_flights(flights, holdouts)
     progress(0.0, "reading the flights as forces and moments")
     if len(flights) == 1 and not holdouts:
-        flights = [manoeuvre_of(flights[0], aircraft.control_symbols)]
-    simulator = Simulator(aircraft, RATE)
-    views = [admitted(view_of(simulator, flight)) for flight in flights]
-    unseen = [admitted(view_of(simulator, flight)) for flight in holdouts]
-    nuisances, *own = (nuisances_of(aircraft, view, (*views, *unseen)) for view in (views[0], *unseen))
-    steps = Steps.of(keep, views)
-    attribution = attribute(views, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
+        flights = [cut_to_manoeuvre(flights[0], aircraft.control_symbols)]
+    simulator = Simulator(aircraft, ANALYSIS_RATE)
+    models = [require_admissible(residual_model_of(simulator, flight)) for flight in flights]
+    unseen = [require_admissible(residual_model_of(simulator, flight)) for flight in holdouts]
+    nuisances, *own = (nuisances_of(aircraft, model, (*models, *unseen)) for model in (models[0], *unseen))
+    steps = Checkpoint.of(keep, models)
+    attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
     progress(0.92, "the gap on flight not fitted")
-    attribution, checked = settled(attribution, views, unseen, own)
-    verdict = verdict_of(views, attribution, checked)
+    attribution, checked = settled(attribution, models, unseen, own)
+    verdict = verdict_of(models, attribution, checked)
     progress(0.95, "short flights beside the flight, and what to fly next")
-    found = localisation.where(attribution, [v.residual(simulator.neutral()) for v in views])
-    air = max(gusts_of(v, carried(attribution.corrected, v)) for v in (*views, *unseen))
+    found = localisation.where(attribution, [v.residual(simulator.neutral()) for v in models])
+    air = max(gust_speed(v, transferred_parameters(attribution.corrected, v)) for v in (*models, *unseen))
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(
         aircraft, verdict, checked.gap, checked.flown, found, attribution,
-        localisation.missing(attribution), checked.views, checked.base, checked.final, flight, bool(holdouts),
+        localisation.missing(attribution), checked.models, checked.base, checked.final, flight, bool(holdouts),
         confusion_of(attribution.base, attribution.trials), air,
     )  # fmt: skip

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.estimation.fit import Fit
-from sysid_node.gap.instruments.liml import unbiased
+from sysid_node.gap.estimation.fit import CandidateFit
+from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.validation.simulation_error import WINDOW
@@ -26,11 +26,11 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "gap": {
             **_gap(found.size),
             "measured_by": "short_flights" if found.flown else "forces_and_kinematics",
-            "window_s": WINDOW if found.flown else found.views[0].windows.length,
+            "window_s": WINDOW if found.flown else found.models[0].windows.length,
             "held_out": found.held_out,
-            "forces_and_kinematics": {**_gap(found.gap), "window_s": found.views[0].windows.length},
+            "forces_and_kinematics": {**_gap(found.gap), "window_s": found.models[0].windows.length},
         },
-        "air_motion": found.air_motion if found.views[0].axes[len(COEFFICIENTS) :].any() else None,
+        "air_motion": found.air_motion if found.models[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
         "doubted": [_doubted(cause) for cause in attribution.doubted],
@@ -92,16 +92,16 @@ def _doubted(cause: Cause) -> dict[str, Any]:
     return {
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
-        "parameters": parameters(unbiased(cause.fit), cause),
+        "parameters": parameters(liml_estimate(cause.fit), cause),
         "probability": cause.probability,
         "indistinguishable_from": named(cause),
         "grounds": {"share": cause.share, **asdict(cause.grounds)},
     }
 
 
-def parameters(fit: Fit, cause: Cause) -> dict[str, list[float]]:
+def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
     """Value and standard error of each of a cause's parameters, in the simulator's units."""
-    simulator, places = fit.views[0].simulator, {index: place for place, index in enumerate(fit.indices)}
+    simulator, places = fit.models[0].simulator, {index: place for place, index in enumerate(fit.indices)}
     own = cause.candidate.indices
     if not own:
         ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]

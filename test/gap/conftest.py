@@ -8,9 +8,9 @@ from gap_flights import fly
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.flightdata.gap_flight import Flight
-from sysid_node.gap.residuals.build import view_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.flightdata.gap_flight import GapFlight
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import Simulator
 
 Effects = Mapping[str, Mapping[str, float]]
@@ -22,18 +22,18 @@ def aircraft() -> Aircraft:
 
 
 @pytest.fixture(scope="session")
-def make_flight(aircraft: Aircraft) -> Callable[..., Flight]:
+def make_flight(aircraft: Aircraft) -> Callable[..., GapFlight]:
     return lambda effects, **conditions: fly(aircraft, effects, **conditions)
 
 
 @pytest.fixture(scope="session")
-def plain(aircraft: Aircraft) -> Flight:
+def plain(aircraft: Aircraft) -> GapFlight:
     return fly(aircraft, {}, seed=1)
 
 
 @pytest.fixture(scope="session")
-def plain_view(aircraft: Aircraft, plain: Flight) -> View:
-    return view_of(Simulator(aircraft, 50.0), plain)
+def plain_model(aircraft: Aircraft, plain: GapFlight) -> ResidualModel:
+    return residual_model_of(Simulator(aircraft, 50.0), plain)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
-from sysid_node.gap.flightdata.gap_flight import Flight, complete
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import Recorder
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
@@ -27,7 +27,7 @@ def fly(
     turbulence: str = "none",
     manoeuvre: list[str] | None = None,
     duration: float = 26.0,
-) -> Flight:
+) -> GapFlight:
     """A flight of these effects at the hands of the autopilot, 3-2-1-1 on each surface in turn."""
     simulator = Simulator(aircraft, RATE)
     deflections = np.zeros((round(duration * RATE) + 1, 4))
@@ -36,4 +36,4 @@ def fly(
         deflections[:, :3] = plan.surfaces()
     sortie = fly_sortie(simulator, deflections, Conditions(effects, turbulence=turbulence, seed=seed))
     record = flight_record(aircraft, Recorder(100.0, 100.0, 100.0).record(sortie), 0.2)
-    return complete(aircraft, Flight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))
+    return completed_flight(aircraft, GapFlight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))

@@ -41,8 +41,8 @@ def test_the_gap_closes_on_flight_held_out(lagging) -> None:
 
 
 def test_effects_that_surely_leave_a_part_of_the_gap_open_do_not_explain_it(lagging) -> None:
-    check = Check(lagging.views, lagging.base, lagging.final, lagging.gap)
-    assert verdict_of(lagging.views, lagging.attribution, check) == "explained"
+    check = Check(lagging.models, lagging.base, lagging.final, lagging.gap)
+    assert verdict_of(lagging.models, lagging.attribution, check) == "explained"
     floor = lagging.flown.noise_floor
     for after, ci95, verdict in [
         (2.0 * floor, (72.0, 88.0), "unknown_effect"),
@@ -50,19 +50,19 @@ def test_effects_that_surely_leave_a_part_of_the_gap_open_do_not_explain_it(lagg
         (1.2 * floor, (72.0, 88.0), "explained"),  # chance leaves as much
     ]:
         check.__dict__["flown"] = replace(lagging.flown, after=after, ci95=ci95)
-        assert verdict_of(lagging.views, lagging.attribution, check) == verdict
+        assert verdict_of(lagging.models, lagging.attribution, check) == verdict
 
 
 def test_what_sampling_leaves_is_what_its_standard_deviation_of_a_delay_leaves(lagging) -> None:
     """Truth: the prediction itself, its commands and air data moved by 1 / sqrt(12) of a sample, without a slope."""
     fit = lagging.attribution.chosen.fit
-    (view,), (point,) = fit.views, fit.points
+    (model,), (point,) = fit.models, fit.points
     shifted = np.zeros(6)
     for clock in ("actuator_stamp_delay.delay", "air_data_delay.delay"):
         late = point.copy()
-        late[view.simulator.names.index(clock)] += 0.01 / np.sqrt(12.0)  # s
-        shifted += np.sum(np.abs(view.predicted(late) - view.predicted(point))[:, 1:, :6] ** 2, axis=(0, 1))
-    motion = np.sum(np.abs(view.measured)[:, 1:, :6] ** 2, axis=(0, 1))
+        late[model.simulator.names.index(clock)] += 0.01 / np.sqrt(12.0)  # s
+        shifted += np.sum(np.abs(model.predicted(late) - model.predicted(point))[:, 1:, :6] ** 2, axis=(0, 1))
+    motion = np.sum(np.abs(model.measured)[:, 1:, :6] ** 2, axis=(0, 1))
     np.testing.assert_allclose(_sampling(fit)[:6], shifted / motion, rtol=0.2)
 
 
@@ -115,10 +115,10 @@ def test_a_flight_in_which_nothing_moves_is_said(aircraft) -> None:
         diagnose(aircraft, [fly(aircraft, {}, seed=8, manoeuvre=[])], [])
 
 
-def test_a_gap_lies_where_the_signal_departs_that_goes_with_it(plain_view) -> None:
+def test_a_gap_lies_where_the_signal_departs_that_goes_with_it(plain_model) -> None:
     """Truth: power in proportion to how far the aileron, and nothing else as closely, departs in each window."""
-    aileron = plain_view.record["da"]
-    away = np.array([np.abs(aileron[w] - aileron.mean()).max() for w in plain_view.windows.slices])
-    ((name, (low, high)),) = _regime(plain_view, away**2).items()
-    piece = aileron[plain_view.windows.slices[int(away.argmax())]]
+    aileron = plain_model.record["da"]
+    away = np.array([np.abs(aileron[w] - aileron.mean()).max() for w in plain_model.windows.slices])
+    ((name, (low, high)),) = _regime(plain_model, away**2).items()
+    piece = aileron[plain_model.windows.slices[int(away.argmax())]]
     assert (name, low, high) == ("da", piece.min(), piece.max())

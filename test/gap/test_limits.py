@@ -8,18 +8,26 @@ from gap_flights import fly
 from scipy.optimize import lsq_linear
 
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import Fit, Projected, blank, bounded, linearised, polish, with_candidates
+from sysid_node.gap.estimation.fit import (
+    CandidateFit,
+    VariableProjection,
+    bounded_least_squares,
+    converged,
+    linearised,
+    unfitted,
+    with_candidates,
+)
 from sysid_node.gap.estimation.nuisances import LIMIT, nuisances_of
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.sim import Simulator
 
 
 @pytest.fixture(scope="module")
-def shifted(aircraft) -> Fit:
+def shifted(aircraft) -> CandidateFit:
     """A centre of gravity far off, which unlimited derivatives would pass off as a Cm_alpha."""
-    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"cg_shift": {"x": 0.06}}, seed=13))
-    nuisances = nuisances_of(aircraft, view)
-    return polish(with_candidates(blank([view], nuisances), [], nuisances, ()))
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {"cg_shift": {"x": 0.06}}, seed=13))
+    nuisances = nuisances_of(aircraft, model)
+    return converged(with_candidates(unfitted([model], nuisances), [], nuisances, ()))
 
 
 def test_none_is_beyond_its_limit_and_some_stand_at_it(shifted) -> None:
@@ -40,7 +48,7 @@ def test_priors_cost_what_they_say(shifted) -> None:
 
 
 def test_a_wider_prior_has_its_price(shifted) -> None:
-    names = shifted.views[0].simulator.names
+    names = shifted.models[0].simulator.names
     own = tuple(i for i, name in enumerate(names) if name.startswith("derivative_error.Cm_"))
     wide = shifted.nuisances.without(frozenset({"derivative_error"}), names, own)
     moved = np.isin(wide.indices, own)
@@ -50,7 +58,7 @@ def test_a_wider_prior_has_its_price(shifted) -> None:
 
 
 def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
-    names = shifted.views[0].simulator.names
+    names = shifted.models[0].simulator.names
     kept = shifted.nuisances.without(frozenset({"command_delay"}), names)
     left = {names[i] for i in kept.indices}
     assert "actuator_stamp_delay.delay" not in left and "air_data_delay.delay" in left
@@ -58,8 +66,8 @@ def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("size", [1e200, np.inf, np.nan])
-def test_a_prediction_that_grew_without_end_is_no_explanation(aircraft, plain_view, size) -> None:
-    problem = Projected(linearised(blank([plain_view], nuisances_of(aircraft, plain_view))))
+def test_a_prediction_that_grew_without_end_is_no_explanation(aircraft, plain_model, size) -> None:
+    problem = VariableProjection(linearised(unfitted([plain_model], nuisances_of(aircraft, plain_model))))
     rows = problem.residual(np.zeros(0))
     assert np.isfinite(problem.deviance(rows))
     rows[3] = size
@@ -72,17 +80,17 @@ def test_the_step_between_bounds_is_the_best_there(random: np.random.Generator, 
     root = np.eye(6) + 0.2 * random.standard_normal((6, 6))
     target = random.standard_normal(6)
     best = lsq_linear(root, target, (-limit, limit)).x
-    ours = bounded(root.T @ root, root.T @ target, np.full(6, -limit), np.full(6, limit))
+    ours = bounded_least_squares(root.T @ root, root.T @ target, np.full(6, -limit), np.full(6, limit))
     np.testing.assert_allclose(ours, best, atol=1e-6)
 
 
 def test_what_a_nuisance_at_its_limit_holds_is_given_back(aircraft) -> None:
     """Truth: the bias that was flown. Values that move alone, the nuisance at its limit, creep."""
-    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"actuator_bias": {"elevator": -0.06}}, seed=21))
-    nuisances = nuisances_of(aircraft, view)
-    (bias,) = (c for c in candidates_of(view.simulator, [view]) if c.effect == "actuator_bias")
-    fit = with_candidates(polish(blank([view], nuisances)), [bias], nuisances, [0.0, 0.0, 0.0])
-    cm, limit = (nuisances.indices.index(view.simulator.names.index("derivative_error.Cm_0")), nuisances.limit)
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {"actuator_bias": {"elevator": -0.06}}, seed=21))
+    nuisances = nuisances_of(aircraft, model)
+    (bias,) = (c for c in candidates_of(model.simulator, [model]) if c.effect == "actuator_bias")
+    fit = with_candidates(converged(unfitted([model], nuisances)), [bias], nuisances, [0.0, 0.0, 0.0])
+    cm, limit = (nuisances.indices.index(model.simulator.names.index("derivative_error.Cm_0")), nuisances.limit)
     stuck = [point.copy() for point in fit.points]
     stuck[0][nuisances.indices[cm]] = limit[cm]
-    assert polish(replace(fit, points=tuple(stuck))).values[0] == pytest.approx(-0.06, rel=0.1)
+    assert converged(replace(fit, points=tuple(stuck))).values[0] == pytest.approx(-0.06, rel=0.1)

@@ -13,12 +13,12 @@ from itertools import product
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.nuisances import WIDENED
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import EFFECTS, Simulator
 
 #: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
-UNSEEN = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
+UNOBSERVABLE = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 
 #: Effects of instruments that a flight without vanes has not, or shows by its airspeed alone; and the IMU's lateness,
 #: as all but the airspeed comes from it then: what it does, the commands' does (``belief``).
@@ -34,12 +34,12 @@ _HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural
 PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
 
 #: Effects of one time, whose fingerprint turns with its size.
-TIMES = frozenset(
+TIME_EFFECTS = frozenset(
     {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
 )
 
 #: Of these, the ones by which the response comes later than the commands: each is a rival of the others, always.
-BETWEEN = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
+RESPONSE_DELAYS = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
 
 #: Of these, stamps: no message is stamped before what it tells of. Early ones would let the three clocks stand for one
 #: another: commands and air data that are late by themselves would be an early IMU and air data less late.
@@ -55,7 +55,7 @@ _JAMMED = 0.95
 _RINGING, _STIFFEST = ("structural_mode", "frequency"), 3.0
 
 #: How much larger than its plausible scale a parameter may well be (1 sigma of its prior).
-GENEROUS = 3.0
+PRIOR_WIDTH = 3.0
 
 
 @dataclass(frozen=True)
@@ -79,21 +79,21 @@ class Candidate:
         return EFFECTS[self.effect].station
 
 
-def candidates_of(simulator: Simulator, views: Sequence[View]) -> list[Candidate]:
+def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list[Candidate]:
     """All effects that these flights could show."""
     found: list[Candidate] = []
-    length = max(view.windows.starts[-1] + view.windows.length for view in views)
-    unseen = UNSEEN | (_OF_VANES if any(view.flight.inferred for view in views) else frozenset())
-    unseen |= frozenset() if all(view.flight.metered for view in views) else _OF_THRUST
+    length = max(model.windows.starts[-1] + model.windows.length for model in models)
+    unseen = UNOBSERVABLE | (_OF_VANES if any(model.flight.inferred for model in models) else frozenset())
+    unseen |= frozenset() if all(model.flight.metered for model in models) else _OF_THRUST
     for effect in EFFECTS:
         if effect in unseen:
             continue
-        if effect == WIDENED:
+        if effect == DERIVATIVE_ERROR:
             found += _per_coefficient(simulator)
         elif effect in PER_CONTROL:
             found += _per_control(simulator, effect, length)
         else:
-            found.append(_whole(simulator, views, effect))
+            found.append(_whole(simulator, models, effect))
     return found
 
 
@@ -111,37 +111,39 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
 def prior(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     """Centre and 1-sigma of the prior of these entries; an onset may be at any time."""
     parameters = [simulator.parameters[i][1] for i in indices]
-    sigma = [100.0 if p.name == "onset" else GENEROUS * simulator.scales[i]
+    sigma = [100.0 if p.name == "onset" else PRIOR_WIDTH * simulator.scales[i]
              for i, p in zip(indices, parameters, strict=True)]  # fmt: skip
     return np.array([p.neutral for p in parameters]), np.array(sigma)
 
 
-def _whole(simulator: Simulator, views: Sequence[View], effect: str) -> Candidate:
+def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> Candidate:
     """An effect with all its free parameters together."""
     table = [(i, p) for i, (e, p) in enumerate(simulator.parameters)
              if e == effect and f"{e}.{p.name}" not in _HELD]  # fmt: skip
-    shaped = dict(_shapes(simulator, views, effect))
+    shaped = dict(_shapes(simulator, models, effect))
     values = [
         shaped.get(p.name, (float(np.clip(p.neutral + 0.3 * simulator.scales[i], p.lower, p.upper)),)) for i, p in table
     ]
     return Candidate(effect, effect, tuple(i for i, _ in table), tuple(product(*values)))
 
 
-def _shapes(simulator: Simulator, views: Sequence[View], effect: str) -> Iterator[tuple[str, tuple[float, ...]]]:
+def _shapes(
+    simulator: Simulator, models: Sequence[ResidualModel], effect: str
+) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Start values of parameters whose fingerprint depends on them."""
     if effect == "stall_separation":
-        highest = max(float(view.record["alpha"].max()) for view in views)
+        highest = max(float(model.record["alpha"].max()) for model in models)
         yield "alpha_star", tuple(np.clip([highest - 0.06, highest - 0.01, highest + 0.05], 0.06, 0.9).tolist())
         yield "depth", (0.8,)
         yield from (("a1", (20.0,)), ("CD_X", (0.1,)), ("Cm_X", (-0.05,)))
     if effect == "actuator_rate_limit":
         speed = max(float(np.abs(np.diff(v.commands[:, :-1], axis=0)).max()) * v.simulator.rate
-                    for v in views)  # fmt: skip
+                    for v in models)  # fmt: skip
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
         # mostly one control has it; a start that gives it to all of them looks worse than none
         yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
-    if effect in TIMES:
+    if effect in TIME_EFFECTS:
         name = "delay" if effect.endswith("delay") else "time_constant"
         yield name, (0.02, 0.07, 0.2)
     if effect == "structural_mode":
@@ -155,9 +157,12 @@ def _per_coefficient(simulator: Simulator) -> list[Candidate]:
     by_coefficient: dict[str, list[int]] = {}
     for i, (effect, parameter) in enumerate(simulator.parameters):
         known = simulator.aircraft.derivatives.get(parameter.name)
-        if effect == WIDENED and known is not None and known.tolerance:
+        if effect == DERIVATIVE_ERROR and known is not None and known.tolerance:
             by_coefficient.setdefault(parameter.name.partition("_")[0], []).append(i)
-    return [Candidate(WIDENED, f"{WIDENED} of {c}", (), ((),), tuple(own)) for c, own in by_coefficient.items()]
+    return [
+        Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {c}", (), ((),), tuple(own))
+        for c, own in by_coefficient.items()
+    ]
 
 
 def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:

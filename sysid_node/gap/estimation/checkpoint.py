@@ -14,28 +14,28 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid_node.gap.estimation.fit import Fit, linearised, polish
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.fit import CandidateFit, converged, linearised
+from sysid_node.gap.residuals.residual_model import ResidualModel
 
 
 @dataclass(frozen=True)
-class Steps:
+class Checkpoint:
     """A folder of finished steps, or None to keep nothing; ``digest`` tells the flights and the aircraft."""
 
     folder: Path | None = None
     digest: str = ""
-    done: dict[str, Fit] = field(default_factory=dict)  # what was fitted in this run
+    done: dict[str, CandidateFit] = field(default_factory=dict)  # what was fitted in this run
 
     @classmethod
-    def of(cls, folder: Path | None, views: Sequence[View]) -> Steps:
+    def of(cls, folder: Path | None, models: Sequence[ResidualModel]) -> Checkpoint:
         """Those of these flights."""
-        text = hashlib.sha256(repr(views[0].simulator.aircraft).encode())
-        for view in views:
-            text.update(np.ascontiguousarray(view.series).tobytes())
-            text.update(np.ascontiguousarray(view.commands).tobytes())
+        text = hashlib.sha256(repr(models[0].simulator.aircraft).encode())
+        for model in models:
+            text.update(np.ascontiguousarray(model.series).tobytes())
+            text.update(np.ascontiguousarray(model.commands).tobytes())
         return cls(folder, text.hexdigest())
 
-    def polished(self, fit: Fit) -> Fit:
+    def polished(self, fit: CandidateFit) -> CandidateFit:
         """The fit polished, or as it was when this was done before."""
         key = self._key("fit", fit)
         if key not in self.done:
@@ -43,13 +43,13 @@ class Steps:
             if path is not None and path.exists():
                 self.done[key] = _restored(path, fit)
             else:
-                self.done[key] = polish(fit)
+                self.done[key] = converged(fit)
                 if path is not None:
                     _store(path, self.done[key])
         return self.done[key]
 
     def table(
-        self, fit: Fit, names: Sequence[str], work: Callable[[], dict[str, list[float]]]
+        self, fit: CandidateFit, names: Sequence[str], work: Callable[[], dict[str, list[float]]]
     ) -> dict[str, list[float]]:
         """Numbers by these names that were worked out about a fit, or as they were before."""
         path = self._path(self._key("+".join(["table", *names]), fit), "json")
@@ -73,7 +73,7 @@ class Steps:
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
 
-    def _key(self, kind: str, fit: Fit) -> str:
+    def _key(self, kind: str, fit: CandidateFit) -> str:
         key = hashlib.sha256((self.digest + kind + "+".join(c.label for c in fit.candidates)).encode())
         for array in (*fit.points, *fit.power, fit.nuisances.sigma):
             key.update(np.ascontiguousarray(array).tobytes())
@@ -86,13 +86,13 @@ class Steps:
         return self.folder / f"{self.digest[:12]}-{key[:24]}.{suffix}"
 
 
-def _restored(path: Path, fit: Fit) -> Fit:
+def _restored(path: Path, fit: CandidateFit) -> CandidateFit:
     with np.load(path) as kept:
-        points, power = (tuple(kept[f"{kind}{i}"] for i in range(len(fit.views))) for kind in ("point", "power"))
+        points, power = (tuple(kept[f"{kind}{i}"] for i in range(len(fit.models))) for kind in ("point", "power"))
     return linearised(replace(fit, points=points, power=power))
 
 
-def _store(path: Path, fit: Fit) -> None:
+def _store(path: Path, fit: CandidateFit) -> None:
     kinds = {"point": fit.points, "power": fit.power}
     arrays = {f"{kind}{i}": array for kind, of in kinds.items() for i, array in enumerate(of)}
     partial = path.with_suffix(".part.npz")

@@ -20,8 +20,8 @@ from scipy.optimize import least_squares, lsq_linear
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate, bounds, prior
 from sysid_node.gap.estimation.nuisances import Nuisances
-from sysid_node.gap.residuals.residual_model import CHANNELS, View
-from sysid_node.gap.residuals.windowed_spectra import SHARE, Complex, Windows
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex, Windows
 
 #: Weighted residual beyond which a prediction has grown without end.
 _ENDLESS = 1e100
@@ -46,10 +46,10 @@ _EVALUATIONS = 12
 
 
 @dataclass(frozen=True)
-class Fit:
+class CandidateFit:
     """Candidates fitted to flights. Unknowns: their parameters, shared nuisances, then each flight's own."""
 
-    views: tuple[View, ...]
+    models: tuple[ResidualModel, ...]
     candidates: tuple[Candidate, ...]
     nuisances: Nuisances
     points: tuple[Array, ...]  # (P,) all parameters by flight, nuisances included
@@ -85,7 +85,7 @@ class Fit:
     @property
     def sizing(self) -> NDArray[np.bool_]:
         """Which of the candidates' parameters are sizes; the others (an onset, an angle) only shape an effect."""
-        return np.array([self.views[0].simulator.parameters[i][1].switch for i in self.indices], bool)
+        return np.array([self.models[0].simulator.parameters[i][1].switch for i in self.indices], bool)
 
     @property
     def effects(self) -> frozenset[str]:
@@ -107,7 +107,7 @@ class Fit:
     def stacked(self) -> tuple[Array, Array, Array]:
         """Values (about neutral, which is zero for all), 1-sigma and limits of all flights' nuisances."""
         _, shared, own = self.sizes
-        now, sigma, limit = (np.ones(shared + len(self.views) * own) for _ in range(3))
+        now, sigma, limit = (np.ones(shared + len(self.models) * own) for _ in range(3))
         for i, point in enumerate(self.points):
             places = _places(self.nuisances, i)
             now[places] = point[list(self.nuisances.indices)]
@@ -118,14 +118,14 @@ class Fit:
     def prior_information(self) -> Array:
         """Of all unknowns (unknowns, unknowns), before any flight."""
         _, spread, _ = self.stacked
-        _, sigma = prior(self.views[0].simulator, self.indices)
+        _, sigma = prior(self.models[0].simulator, self.indices)
         return np.diag(np.concatenate([sigma, spread]) ** -2.0)
 
     @property
     def prior_score(self) -> float:
         """Log probability of where everything stands under its prior, up to a constant: nats, zero at best."""
         now, sigma, _ = self.stacked
-        centre, own = prior(self.views[0].simulator, self.indices)
+        centre, own = prior(self.models[0].simulator, self.indices)
         far = float(np.sum((now / sigma) ** 2) + np.sum(((self.values - centre) / own) ** 2))
         return -0.5 * far - self.nuisances.widened
 
@@ -138,7 +138,7 @@ class Fit:
 
 def weights(windows: Windows, power: Array) -> Array:
     """Weights (2 L, 12) of real and imaginary parts; the mean has no imaginary part."""
-    w = np.sqrt(2.0 * SHARE / power)
+    w = np.sqrt(2.0 * INDEPENDENT_SHARE / power)
     w[0] *= np.sqrt(0.5)
     imaginary = w.copy()
     imaginary[0] = 0.0
@@ -160,24 +160,26 @@ def amplitudes(rows: Array, weight: Array) -> Complex:
     return np.asarray(raw[:, 0] + 1j * raw[:, 1])
 
 
-def residual_power(view: View, residual: Complex) -> Array:
+def residual_power(model: ResidualModel, residual: Complex) -> Array:
     """Power (L, 12) of a residual (W, L, 12), smoothed by band, at least the sensors' noise."""
-    power = view.windows.smoothed((np.abs(residual) ** 2).mean(axis=0))
-    return np.where(view.axes, np.maximum(power, view.noise), 1.0)
+    power = model.windows.smoothed((np.abs(residual) ** 2).mean(axis=0))
+    return np.where(model.axes, np.maximum(power, model.noise), 1.0)
 
 
-def blank(views: Sequence[View], nuisances: Nuisances) -> Fit:
+def unfitted(models: Sequence[ResidualModel], nuisances: Nuisances) -> CandidateFit:
     """Nothing blamed, nothing fitted yet."""
-    points = tuple(view.simulator.neutral() for view in views)
-    power = tuple(residual_power(v, v.residual(p)) for v, p in zip(views, points, strict=True))
-    return Fit(tuple(views), (), nuisances, points, power)
+    points = tuple(model.simulator.neutral() for model in models)
+    power = tuple(residual_power(v, v.residual(p)) for v, p in zip(models, points, strict=True))
+    return CandidateFit(tuple(models), (), nuisances, points, power)
 
 
-def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisances, start: Sequence[float]) -> Fit:
+def with_candidates(
+    fit: CandidateFit, candidates: Sequence[Candidate], nuisances: Nuisances, start: Sequence[float]
+) -> CandidateFit:
     """Another set of candidates about where this fit stands; those it did not have at ``start``,
     all else neutral."""
-    view = fit.views[0]
-    names, neutral = view.simulator.names, view.simulator.neutral()
+    model = fit.models[0]
+    names, neutral = model.simulator.names, model.simulator.neutral()
     widened = tuple(i for c in candidates for i in c.widened)
     kept = nuisances.without(frozenset(c.effect for c in candidates), names, widened)
     old, chosen = set(fit.indices), {i for c in candidates for i in c.indices}
@@ -193,7 +195,7 @@ def with_candidates(fit: Fit, candidates: Sequence[Candidate], nuisances: Nuisan
                    information=None, cost=np.inf)  # fmt: skip
 
 
-def polish(fit: Fit, rounds: int = _ROUNDS) -> Fit:
+def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
     """The fit with everything it can move moved, and its weights those of its own residual.
 
     Weights and nuisances of one round may throw the next one back: the likeliest counts.
@@ -201,10 +203,10 @@ def polish(fit: Fit, rounds: int = _ROUNDS) -> Fit:
     best, least, last = fit, np.inf, np.inf
     for _ in range(rounds):
         fit = _one_round(fit)
-        residuals = [v.residual(p) for v, p in zip(fit.views, fit.points, strict=True)]
-        fit = replace(fit, power=tuple(residual_power(v, r) for v, r in zip(fit.views, residuals, strict=True)))
+        residuals = [v.residual(p) for v, p in zip(fit.models, fit.points, strict=True)]
+        fit = replace(fit, power=tuple(residual_power(v, r) for v, r in zip(fit.models, residuals, strict=True)))
         raw = ((np.abs(residual) ** 2).mean(axis=0) for residual in residuals)
-        deviance = sum(_deviance(v, p) for v, p in zip(fit.views, raw, strict=True)) - 2.0 * fit.prior_score
+        deviance = sum(_deviance(v, p) for v, p in zip(fit.models, raw, strict=True)) - 2.0 * fit.prior_score
         if not deviance >= least:
             best, least = fit, deviance
         if not abs(deviance - last) >= _SETTLED:
@@ -213,23 +215,23 @@ def polish(fit: Fit, rounds: int = _ROUNDS) -> Fit:
     return linearised(best)
 
 
-def _deviance(view: View, power: Array) -> float:
+def _deviance(model: ResidualModel, power: Array) -> float:
     """Minus twice the log probability, up to a constant, of a remainder of power (L, 12), as of its own spectrum."""
-    floor = np.where(view.axes, np.maximum(view.windows.smoothed(power), view.noise), 1.0)
+    floor = np.where(model.axes, np.maximum(model.windows.smoothed(power), model.noise), 1.0)
     lines = np.ones((power.shape[0], 1))
     lines[0] = 0.5
-    return 2.0 * SHARE * view.windows.count * float(np.sum(lines * (np.log(floor) + power / floor)))
+    return 2.0 * INDEPENDENT_SHARE * model.windows.count * float(np.sum(lines * (np.log(floor) + power / floor)))
 
 
-def _one_round(fit: Fit) -> Fit:
-    problem = Projected(fit)
+def _one_round(fit: CandidateFit) -> CandidateFit:
+    problem = VariableProjection(fit)
     values = fit.values
     if values.size:
-        low, high = bounds(fit.views[0].simulator, fit.indices)
+        low, high = bounds(fit.models[0].simulator, fit.indices)
         start = np.clip(problem.together(values, low, high), low + 1e-9, high - 1e-9)
         if not np.isfinite(problem.ahead(start)).all():
             raise np.linalg.LinAlgError("the prediction grows without end")  # as slopes that do
-        scale = fit.views[0].simulator.scales[list(fit.indices)]
+        scale = fit.models[0].simulator.scales[list(fit.indices)]
         solution = least_squares(
             problem.ahead, start, problem.jacobian, bounds=(low, high), x_scale=scale, max_nfev=_EVALUATIONS,
             ftol=1e-4, xtol=1e-4, gtol=1e-6,
@@ -238,7 +240,7 @@ def _one_round(fit: Fit) -> Fit:
     return replace(fit, points=problem.points(values))
 
 
-class Projected:
+class VariableProjection:
     """What is left of the residual at the candidates' parameters when the nuisances do their best.
 
     Nuisances that would go beyond their limits at the fit's values are put there and stay: an active set, found anew
@@ -246,18 +248,18 @@ class Projected:
     normal equations are sound however little the flight says of some.
     """
 
-    def __init__(self, fit: Fit) -> None:
-        self.fit, self.weights = fit, [weights(v.windows, p) for v, p in zip(fit.views, fit.power, strict=True)]
+    def __init__(self, fit: CandidateFit) -> None:
+        self.fit, self.weights = fit, [weights(v.windows, p) for v, p in zip(fit.models, fit.power, strict=True)]
         own = list(fit.nuisances.indices)
         blocks = []
-        for i, (view, point, weight) in enumerate(zip(fit.views, fit.points, self.weights, strict=True)):
-            slopes = real_rows(view.slopes(point, own), weight)
-            blocks.append(_placed(slopes.reshape(-1, len(own)), fit.nuisances, i, len(fit.views)))
+        for i, (model, point, weight) in enumerate(zip(fit.models, fit.points, self.weights, strict=True)):
+            slopes = real_rows(model.slopes(point, own), weight)
+            blocks.append(_placed(slopes.reshape(-1, len(own)), fit.nuisances, i, len(fit.models)))
         self.now, self.spread, self.limit = fit.stacked
         self.matrix = np.vstack([*(block * self.spread for block in blocks), np.eye(self.now.size)])
         self.gram = self.matrix.T @ self.matrix
         self.indices = list(fit.indices)
-        self.centre, self.sigma = prior(fit.views[0].simulator, fit.indices)
+        self.centre, self.sigma = prior(fit.models[0].simulator, fit.indices)
         self._kept = (b"", np.empty((0, 0)))
         self._settle(np.ones(self.now.size, bool), np.zeros(self.now.size))
         self._bind(fit.values)
@@ -304,10 +306,12 @@ class Projected:
             return values
         before, here = (self.free, self.shift), self.deviance(self.residual(values))
         limit, now = self.limit / self.spread, self.now / self.spread
-        step = bounded(gram, right, np.append(-limit - now, low - values), np.append(limit - now, high - values))
-        moved = now + step[: now.size]
-        beyond = np.abs(moved) > limit * (1.0 - _AT_LIMIT)
-        self._settle(~beyond, np.where(beyond, np.sign(moved) * self.limit - self.now, 0.0))
+        step = bounded_least_squares(
+            gram, right, np.append(-limit - now, low - values), np.append(limit - now, high - values)
+        )
+        stepped = now + step[: now.size]
+        beyond = np.abs(stepped) > limit * (1.0 - _AT_LIMIT)
+        self._settle(~beyond, np.where(beyond, np.sign(stepped) * self.limit - self.now, 0.0))
         there = values + step[now.size :]
         if self.deviance(self.residual(there)) < here:
             return there
@@ -319,20 +323,20 @@ class Projected:
         free, step = np.ones(right.size, bool), np.zeros(right.size)
         free[: self.now.size], step[: self.now.size] = self.free, self.shift / self.spread
         step[free] = cho_solve(cho_factor(gram[np.ix_(free, free)]), (right - gram[:, ~free] @ step[~free])[free])
-        moved = self.now + self.spread * step[: self.now.size]
-        pull = np.sign(moved) * (right - gram @ step)[: self.now.size]
-        return bool((pull[~self.free] >= 0.0).all() and (np.abs(moved) <= self.limit * (1.0 + _AT_LIMIT)).all())
+        stepped = self.now + self.spread * step[: self.now.size]
+        pull = np.sign(stepped) * (right - gram @ step)[: self.now.size]
+        return bool((pull[~self.free] >= 0.0).all() and (np.abs(stepped) <= self.limit * (1.0 + _AT_LIMIT)).all())
 
-    def looking(self, candidate: Candidate) -> Projected:
+    def looking(self, candidate: Candidate) -> VariableProjection:
         """The same nuisances but for those that the candidate is or replaces; its parameters move with the others."""
-        other, names = copy(self), self.fit.views[0].simulator.names
+        other, names = copy(self), self.fit.models[0].simulator.names
         other.indices = [*self.fit.indices, *candidate.indices]
-        other.centre, other.sigma = prior(self.fit.views[0].simulator, other.indices)
+        other.centre, other.sigma = prior(self.fit.models[0].simulator, other.indices)
         nuisances = self.fit.nuisances
         kept = nuisances.without(frozenset({candidate.effect}), names).indices
         own = np.isin(nuisances.indices, candidate.indices)  # now a parameter that moves: from where the others start
         gone, neutral = (np.zeros(self.now.size, bool) for _ in range(2))
-        for flight in range(len(self.fit.views)):
+        for flight in range(len(self.fit.models)):
             places = _places(nuisances, flight)
             gone[places] |= own | ~np.isin(nuisances.indices, kept)
             neutral[places] |= ~own
@@ -343,10 +347,10 @@ class Projected:
     def _rows(self, values: Array) -> Array:
         """Weighted residuals of all flights at these values, nuisances where they are, then the nuisances' priors."""
         rows = []
-        for view, point, weight in zip(self.fit.views, self.fit.points, self.weights, strict=True):
+        for model, point, weight in zip(self.fit.models, self.fit.points, self.weights, strict=True):
             there = point.copy()
             there[self.indices] = values
-            rows.append(real_rows(view.residual(there), weight).ravel())
+            rows.append(real_rows(model.residual(there), weight).ravel())
         return np.concatenate([*rows, -self.now / self.spread]) - self.moved_rows
 
     def residual(self, values: Array) -> Array:
@@ -371,10 +375,10 @@ class Projected:
     def _columns(self, values: Array) -> Array:
         """Weighted slopes (R, values) of what is expected with respect to the values, nuisances held."""
         blocks = []
-        for view, point, weight in zip(self.fit.views, self.fit.points, self.weights, strict=True):
+        for model, point, weight in zip(self.fit.models, self.fit.points, self.weights, strict=True):
             there = point.copy()
             there[self.indices] = values
-            blocks.append(real_rows(view.slopes(there, self.indices), weight).reshape(-1, values.size))
+            blocks.append(real_rows(model.slopes(there, self.indices), weight).reshape(-1, values.size))
         return np.vstack([*blocks, np.zeros((self.now.size, values.size))])
 
     def deviance(self, rows: Array) -> float:
@@ -385,23 +389,25 @@ class Projected:
         """
         if not np.abs(rows).max(initial=0.0) < _ENDLESS:
             return np.inf
-        data = sum(view.windows.count * weight.size for view, weight in zip(self.fit.views, self.weights, strict=True))
+        data = sum(
+            model.windows.count * weight.size for model, weight in zip(self.fit.models, self.weights, strict=True)
+        )
         total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.nuisances.widened, 0
-        for view, weight in zip(self.fit.views, self.weights, strict=True):
-            shape = (view.windows.count, weight.size)
+        for model, weight in zip(self.fit.models, self.weights, strict=True):
+            shape = (model.windows.count, weight.size)
             own = rows[first : first + shape[0] * shape[1]].reshape(shape)
             first += own.size
-            total += _deviance(view, np.mean(np.abs(amplitudes(own, weight)) ** 2, axis=0))
+            total += _deviance(model, np.mean(np.abs(amplitudes(own, weight)) ** 2, axis=0))
         return total
 
     def points(self, values: Array) -> tuple[Array, ...]:
         """All parameters by flight, with the nuisances' best at these values."""
-        moved = np.clip(self.now + self._step(values), -self.limit, self.limit)
+        stepped = np.clip(self.now + self._step(values), -self.limit, self.limit)
         points = []
         for i, point in enumerate(self.fit.points):
             fresh = point.copy()
             fresh[self.indices] = values
-            fresh[list(self.fit.nuisances.indices)] = moved[_places(self.fit.nuisances, i)]
+            fresh[list(self.fit.nuisances.indices)] = stepped[_places(self.fit.nuisances, i)]
             points.append(fresh)
         return tuple(points)
 
@@ -424,10 +430,10 @@ def _placed(slopes: Array, nuisances: Nuisances, flight: int, flights: int) -> A
     return wide
 
 
-def moved(fit: Fit, step: Array) -> Fit:
+def stepped(fit: CandidateFit, step: Array) -> CandidateFit:
     """The fit with all unknowns a step (unknowns,) on, the candidates' within their bounds."""
     chosen = list(fit.indices)
-    low, high = bounds(fit.views[0].simulator, chosen)
+    low, high = bounds(fit.models[0].simulator, chosen)
     own, limit, points = list(fit.nuisances.indices), fit.nuisances.limit, []
     for i, point in enumerate(fit.points):
         fresh = point.copy()
@@ -437,19 +443,19 @@ def moved(fit: Fit, step: Array) -> Fit:
     return replace(fit, points=tuple(points))
 
 
-def linearised(fit: Fit) -> Fit:
+def linearised(fit: CandidateFit) -> CandidateFit:
     """The fit with its residual, slopes and information where it stands, for evidence and errors.
 
     An onset has no slope but at the very moment: what it has there would make all others as uncertain as it is.
     """
     own, chosen = list(fit.nuisances.indices), list(fit.indices)
     rows, slopes = [], []
-    for i, (view, point, power) in enumerate(zip(fit.views, fit.points, fit.power, strict=True)):
-        weight = weights(view.windows, power)
-        raw = real_rows(view.slopes(point, [*chosen, *own]), weight)
-        raw[..., onsets(fit)] = 0.0
-        rows.append(real_rows(view.residual(point), weight))
-        wide = _placed(raw[..., len(chosen) :].reshape(-1, len(own)), fit.nuisances, i, len(fit.views))
+    for i, (model, point, power) in enumerate(zip(fit.models, fit.points, fit.power, strict=True)):
+        weight = weights(model.windows, power)
+        raw = real_rows(model.slopes(point, [*chosen, *own]), weight)
+        raw[..., onset_places(fit)] = 0.0
+        rows.append(real_rows(model.residual(point), weight))
+        wide = _placed(raw[..., len(chosen) :].reshape(-1, len(own)), fit.nuisances, i, len(fit.models))
         slopes.append(np.concatenate([raw[..., : len(chosen)], wide.reshape(*raw.shape[:2], -1)], axis=2))
     information = fit.prior_information
     for block in slopes:
@@ -459,23 +465,23 @@ def linearised(fit: Fit) -> Fit:
     return replace(fit, rows=tuple(rows), slopes=tuple(slopes), information=information, cost=cost)
 
 
-def onsets(fit: Fit) -> list[int]:
+def onset_places(fit: CandidateFit) -> list[int]:
     """Places of the times at which something begins, among the unknowns."""
-    return [k for k, i in enumerate(fit.indices) if fit.views[0].simulator.parameters[i][1].name == "onset"]
+    return [k for k, i in enumerate(fit.indices) if fit.models[0].simulator.parameters[i][1].name == "onset"]
 
 
-def room(fit: Fit) -> tuple[Array, Array]:
+def step_limits(fit: CandidateFit) -> tuple[Array, Array]:
     """Least and greatest step of each unknown within its limits; what only shapes an effect stays.
 
     Part of a flight may say nothing of an onset, and a linear step would then lead anywhere.
     """
-    low, high = bounds(fit.views[0].simulator, fit.indices)
+    low, high = bounds(fit.models[0].simulator, fit.indices)
     now, _, limit = fit.stacked
     least, greatest = (np.where(fit.sizing, end - fit.values, 0.0) for end in (low, high))
     return np.append(least, -limit - now), np.append(greatest, limit - now)
 
 
-def bounded(information: Array, right: Array, low: Array, high: Array) -> Array:
+def bounded_least_squares(information: Array, right: Array, low: Array, high: Array) -> Array:
     """The step (unknowns,) of least squares, information @ step = right, between bounds."""
     spread = np.diag(information) ** -0.5
     root = _root(information * np.outer(spread, spread))

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.residuals.residual_model import ResidualModel
 
 #: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a prior so much wider.
-WIDENED, WIDER = "derivative_error", 5.0
+DERIVATIVE_ERROR, WIDENING = "derivative_error", 5.0
 
 #: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
 LIMIT = 3.0
@@ -60,21 +60,21 @@ class Nuisances:
 
     def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
         """Those that do not belong to these effects; the priors of some are widened."""
-        gone = {e for e in effects if e != WIDENED}
+        gone = {e for e in effects if e != DERIVATIVE_ERROR}
         gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
-        wide = np.where(np.isin(self.indices, widened), WIDER, 1.0)
+        wide = np.where(np.isin(self.indices, widened), WIDENING, 1.0)
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
         more = self.widened + float(np.log(wide[keep]).sum())
         return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
 
 
-def nuisances_of(aircraft: Aircraft, view: View, others: Sequence[View] = ()) -> Nuisances:
+def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[ResidualModel] = ()) -> Nuisances:
     """Of one of an aircraft's flights: the same ones for all that are looked at together, by its own rates.
 
     Raises InputError where the aircraft's file has no tolerances.
     """
-    every = (view, *others)
+    every = (model, *others)
     tolerances = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
     if not tolerances:
         raise InputError(
@@ -86,21 +86,21 @@ def nuisances_of(aircraft: Aircraft, view: View, others: Sequence[View] = ()) ->
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
-    sigma |= {f"vane_bias.{angle}": _INFERRED for angle in view.flight.inferred}
-    if any(gusty(v) for v in every):
+    sigma |= {f"vane_bias.{angle}": _INFERRED for angle in model.flight.inferred}
+    if any(is_gusty(v) for v in every):
         sigma |= _turning_air(aircraft)
     limit = {name: LIMIT * s for name, s in sigma.items()}
-    for clock, rate in zip(CLOCKS, (view.flight.actuator_rate, view.flight.air_rate), strict=True):
+    for clock, rate in zip(CLOCKS, (model.flight.actuator_rate, model.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
-    names = view.simulator.names
+    names = model.simulator.names
     shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *CLOCKS)) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
 
 
-def gusty(view: View) -> bool:
+def is_gusty(model: ResidualModel) -> bool:
     """Whether the air moves across the flight path by enough to count."""
-    return bool(view.gusts >= _GUSTY * view.record["V"].mean())
+    return bool(model.gusts >= _GUSTY * model.record["V"].mean())
 
 
 def _turning_air(aircraft: Aircraft) -> dict[str, float]:

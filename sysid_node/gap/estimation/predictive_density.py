@@ -19,18 +19,18 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.fit import (
-    Fit,
+    CandidateFit,
     amplitudes,
     linearised,
-    moved,
     real_rows,
     residual_power,
     solve,
+    stepped,
     weights,
 )
-from sysid_node.gap.estimation.nuisances import WIDENED, Nuisances
-from sysid_node.gap.residuals.residual_model import CHANNELS, View
-from sysid_node.gap.residuals.windowed_spectra import SHARE, Complex
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, Nuisances
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 
 #: Draws of the Bayesian bootstrap.
 _DRAWS = 2000
@@ -49,7 +49,7 @@ class Evidence:
 
     scores: Array
     residuals: tuple[Complex, ...]
-    views: tuple[View, ...]
+    models: tuple[ResidualModel, ...]
     points: tuple[tuple[Array, ...], ...]
 
     @property
@@ -58,17 +58,17 @@ class Evidence:
         return float(self.scores.sum())
 
 
-def groups_of(view: View) -> list[NDArray[np.intp]]:
+def window_groups(model: ResidualModel) -> list[NDArray[np.intp]]:
     """Indices of the windows of each group, neighbours together."""
-    return list(np.array_split(np.arange(view.windows.count), min(_GROUPS, max(view.windows.count // 2, 1))))
+    return list(np.array_split(np.arange(model.windows.count), min(_GROUPS, max(model.windows.count // 2, 1))))
 
 
-def beside(group: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+def with_neighbours(group: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     """A group of windows with those that overlap it, of so many."""
     return np.arange(max(group[0] - 1, 0), min(group[-1] + 2, count))
 
 
-def cross_validated(fit: Fit) -> Evidence:
+def cross_validated_evidence(fit: CandidateFit) -> Evidence:
     """Each group of windows predicted from the others of the same flights; windows that overlap it stand aside."""
     assert fit.information is not None
     scores: list[float] = []
@@ -77,44 +77,44 @@ def cross_validated(fit: Fit) -> Evidence:
     grams = [np.einsum("wru,wrv->wuv", J * fit.loose, J * fit.loose, optimize=True) for J in fit.slopes]
     whole = [gram.sum(axis=0) for gram in grams]
     elsewhere = [fit.prior_information + sum(w for k, w in enumerate(whole) if k != i) for i in range(len(whole))]
-    for i, (view, power, rows, full) in enumerate(zip(fit.views, fit.power, fit.rows, fit.slopes, strict=True)):
+    for i, (model, power, rows, full) in enumerate(zip(fit.models, fit.power, fit.rows, fit.slopes, strict=True)):
         slopes = full * fit.loose
-        residual = amplitudes(rows, weights(view.windows, power))
+        residual = amplitudes(rows, weights(model.windows, power))
         unseen, steps = residual.copy(), []
-        for group in groups_of(view):
-            aside = beside(group, view.windows.count)
-            others = np.setdiff1d(np.arange(view.windows.count), aside)
+        for group in window_groups(model):
+            aside = with_neighbours(group, model.windows.count)
+            others = np.setdiff1d(np.arange(model.windows.count), aside)
             J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
             information = elsewhere[i] + grams[i][others].sum(axis=0)
             step = -solve(information, J.T @ r)
             steps.append(step)
-            own_power = residual_power(view, residual[others]) if others.size > 2 else power
-            score, part = _predictive(view, power, own_power, rows[group], slopes[group], step, information)
+            own_power = residual_power(model, residual[others]) if others.size > 2 else power
+            score, part = _predictive(model, power, own_power, rows[group], slopes[group], step, information)
             scores.append(score)
             unseen[group] = part
         residuals.append(unseen)
-        points.append(tuple(written(fit, moved(fit, step).points[i]) for step in steps))
-    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.views, tuple(points))
+        points.append(tuple(exported_parameters(fit, stepped(fit, step).points[i]) for step in steps))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.models, tuple(points))
 
 
-def judged(fit: Fit, unseen: Sequence[View], nuisances: Sequence[Nuisances]) -> Evidence:
+def competing_evidence(fit: CandidateFit, unseen: Sequence[ResidualModel], nuisances: Sequence[Nuisances]) -> Evidence:
     """Evidence by which explanations compete: parts of the flights fitted, each predicted from the rest, and flights
     held out. Nothing is fitted to the latter, but they have a say in what is blamed."""
-    own = cross_validated(fit)
+    own = cross_validated_evidence(fit)
     if not unseen:
         return own
-    theirs = held_out(fit, unseen, nuisances)
+    theirs = held_out_evidence(fit, unseen, nuisances)
     scores = [part.scores - fit.prior_score / part.scores.size for part in (own, theirs)]
     both = np.concatenate(scores)
     return Evidence(
         both + fit.prior_score / both.size,
         own.residuals + theirs.residuals,
-        own.views + theirs.views,
+        own.models + theirs.models,
         own.points + theirs.points,
     )
 
 
-def _without_shapes(fit: Fit) -> Array:
+def _without_shapes(fit: CandidateFit) -> Array:
     """The information with what only shapes an effect (an onset, an angle) held where the fit put it.
 
     The data of a few windows may say nothing about such a parameter, and a linear step would then lead anywhere.
@@ -126,33 +126,33 @@ def _without_shapes(fit: Fit) -> Array:
     return np.asarray(information)
 
 
-def held_out(fit: Fit, views: Sequence[View], nuisances: Sequence[Nuisances]) -> Evidence:
+def held_out_evidence(fit: CandidateFit, models: Sequence[ResidualModel], nuisances: Sequence[Nuisances]) -> Evidence:
     """Flights that the fit has not seen: its parameters and shared nuisances hold, biases and clocks are their own."""
     chosen, shared, _ = fit.sizes
     known = np.linalg.inv(_without_shapes(fit))[: chosen + shared, : chosen + shared]
     scores: list[float] = []
     residuals: list[Complex] = []
     points: list[tuple[Array, ...]] = []
-    for view, theirs in zip(views, nuisances, strict=True):
-        kept = theirs.without(fit.effects, view.simulator.names, fit.widened)
-        point = carried(fit, view)
-        power = np.maximum(_train_power(fit, view), view.noise)
-        power = np.where(view.axes, power, 1.0)
-        weight = weights(view.windows, power)
+    for model, theirs in zip(models, nuisances, strict=True):
+        kept = theirs.without(fit.effects, model.simulator.names, fit.widened)
+        point = transferred_parameters(fit, model)
+        power = np.maximum(_train_power(fit, model), model.noise)
+        power = np.where(model.axes, power, 1.0)
+        weight = weights(model.windows, power)
         order = [*fit.indices, *_ordered(kept)]
-        rows = real_rows(view.residual(point), weight)
-        slopes = real_rows(view.slopes(point, order), weight)
+        rows = real_rows(model.residual(point), weight)
+        slopes = real_rows(model.slopes(point, order), weight)
         slopes[..., : chosen + shared] *= fit.loose[: chosen + shared]
         sigma = np.concatenate([kept.sigma[~kept.shared]])
         information = np.zeros((len(order), len(order)))
         information[: chosen + shared, : chosen + shared] = np.linalg.inv(known)
         information[chosen + shared :, chosen + shared :] = np.diag(sigma**-2.0)
-        for group in groups_of(view):
-            score, _ = _predictive(view, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
+        for group in window_groups(model):
+            score, _ = _predictive(model, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
             scores.append(score)
-        residuals.append(view.residual(point))
-        points.append((written(fit, point),) * len(groups_of(view)))
-    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(views), tuple(points))
+        residuals.append(model.residual(point))
+        points.append((exported_parameters(fit, point),) * len(window_groups(model)))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(models), tuple(points))
 
 
 def _ordered(nuisances: Nuisances) -> list[int]:
@@ -161,43 +161,43 @@ def _ordered(nuisances: Nuisances) -> list[int]:
     return [*indices[nuisances.shared].tolist(), *indices[~nuisances.shared].tolist()]
 
 
-def carried(fit: Fit, view: View) -> Array:
+def transferred_parameters(fit: CandidateFit, model: ResidualModel) -> Array:
     """The parameters of a flight not seen: what is shared from the fit, its own nuisances neutral."""
-    point = view.simulator.neutral()
+    point = model.simulator.neutral()
     shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-    carried = [*fit.indices, *shared]
-    point[carried] = fit.points[0][carried]
+    transferred_parameters = [*fit.indices, *shared]
+    point[transferred_parameters] = fit.points[0][transferred_parameters]
     return np.asarray(point)
 
 
-def upon(fit: Fit, view: View, nuisances: Nuisances) -> Fit:
+def fit_on_other_flight(fit: CandidateFit, model: ResidualModel, nuisances: Nuisances) -> CandidateFit:
     """The fit as it stands on a flight that it has not seen, all unknowns and their priors about there."""
-    kept = nuisances.without(fit.effects, view.simulator.names, fit.widened)
-    point = carried(fit, view)
-    power = residual_power(view, view.residual(point))
-    return linearised(replace(fit, views=(view,), nuisances=kept, points=(point,), power=(power,)))
+    kept = nuisances.without(fit.effects, model.simulator.names, fit.widened)
+    point = transferred_parameters(fit, model)
+    power = residual_power(model, model.residual(point))
+    return linearised(replace(fit, models=(model,), nuisances=kept, points=(point,), power=(power,)))
 
 
-def written(fit: Fit, point: Array) -> Array:
+def exported_parameters(fit: CandidateFit, point: Array) -> Array:
     """The parameters (P,) of the model that is handed on: the nuisances neutral but for the derivatives' errors."""
-    simulator, kept = fit.views[0].simulator, point.copy()
-    own = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != WIDENED]
+    simulator, kept = fit.models[0].simulator, point.copy()
+    own = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != DERIVATIVE_ERROR]
     kept[own] = simulator.neutral()[own]
     return np.asarray(kept)
 
 
-def _train_power(fit: Fit, view: View) -> Array:
+def _train_power(fit: CandidateFit, model: ResidualModel) -> Array:
     """Mean residual power of the flights fitted, at the lines of another."""
-    lines = view.windows.frequencies
+    lines = model.windows.frequencies
     total = np.zeros((lines.size, len(CHANNELS)))
-    for known, power in zip(fit.views, fit.power, strict=True):
+    for known, power in zip(fit.models, fit.power, strict=True):
         own = known.windows.frequencies
         total += np.column_stack([np.interp(lines, own, power[:, axis]) for axis in range(len(CHANNELS))])
-    return np.asarray(total / len(fit.views))
+    return np.asarray(total / len(fit.models))
 
 
 def _predictive(
-    view: View, power: Array, own_power: Array, rows: Array, slopes: Array, step: Array, information: Array
+    model: ResidualModel, power: Array, own_power: Array, rows: Array, slopes: Array, step: Array, information: Array
 ) -> tuple[float, Complex]:
     """Log probability of a group's rows, and its residual (w, L, 12), after a step of the unknowns.
 
@@ -215,9 +215,9 @@ def _predictive(
     _, after = np.linalg.slogdet(gained)
     lines = np.ones(power.shape[0])
     lines[0] = 0.5
-    spread = SHARE * rows.shape[0] * float(np.sum(lines[:, None] * np.log(own_power) * view.axes))
+    spread = INDEPENDENT_SHARE * rows.shape[0] * float(np.sum(lines[:, None] * np.log(own_power) * model.axes))
     score = -spread - 0.5 * float(scaled @ scaled) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
-    return score, amplitudes(change, weights(view.windows, power))
+    return score, amplitudes(change, weights(model.windows, power))
 
 
 def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:

@@ -24,12 +24,14 @@ _NEEDED = ("ax", "ay", "az", "p", "q", "r", "V", "rho")
 _LONGEST_STEP = 0.5  # s
 
 
-def lacking(record: FlightRecord) -> tuple[str, ...]:
+def missing_flow_angles(record: FlightRecord) -> tuple[str, ...]:
     """The flow angles of which a record has not one value."""
     return tuple(name for name in ANGLES if not record.measured(name))
 
 
-def with_angles(aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...], source: str) -> FlightRecord:
+def with_inferred_angles(
+    aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...], source: str
+) -> FlightRecord:
     """The record with these angles inferred, as long as it was. Raises InputError where they cannot be."""
     absent = [name for name in _NEEDED if not np.isfinite(record[name]).all()]
     if absent:

@@ -19,23 +19,23 @@ from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs import READERS, read_log
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import flow_angles as inferred
-from sysid_node.gap.flightdata.thrust import unmetered, with_thrust
+from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
 
 #: Rate at which forces are predicted (Hz): six times the highest line that is compared, and more.
-RATE = 50.0
+ANALYSIS_RATE = 50.0
 
 #: Corner of the zero-phase low-pass before samples are thinned to ``RATE``, Hz. Flat to 6 Hz; commands pass it too,
 #: so that a linear chain is compared with itself.
 _CORNER = 11.0
 
 #: Shortest flight that can be compared, s: three windows that hold a short period each.
-SHORTEST = 6.0
+SHORTEST_FLIGHT = 6.0
 
 _LATERAL = ("ay", "p", "r", "beta")
 
 
 @dataclass(frozen=True)
-class Flight:
+class GapFlight:
     """A record, and how often each topic was sampled (Hz), which says how much noise lies in the band."""
 
     record: FlightRecord
@@ -50,20 +50,20 @@ class Flight:
     metered: bool = True  # whether thrust is known, or else is what the file's drag leaves of the forward force
 
 
-def load_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> Flight:
+def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
     """A flight of a bag or a log. Raises InputError: unreadable, lacking a signal, too short."""
     if path.suffix.lower() in READERS:
         record = read_log(path)
         rate = 1.0 / float(np.median(np.diff(record.time)))
-        return complete(aircraft, Flight(record, rate, rate, rate, source=str(path)))
+        return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     streams = read_streams(path, topics, frame)
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     record = flight_record(aircraft, streams, 0.2)
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
-    return complete(aircraft, Flight(record, rates[0], rates[1], rates[2], source=str(path)))
+    return completed_flight(aircraft, GapFlight(record, rates[0], rates[1], rates[2], source=str(path)))
 
 
-def complete(aircraft: Aircraft, flight: Flight) -> Flight:
+def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with the lateral signals, where all are absent, as zeros, and a thrust where nobody metered it.
 
     Raises InputError where a signal is missing.
@@ -72,7 +72,7 @@ def complete(aircraft: Aircraft, flight: Flight) -> Flight:
     return _with_thrust(aircraft, _with_lateral(aircraft, flight))
 
 
-def _with_lateral(aircraft: Aircraft, flight: Flight) -> Flight:
+def _with_lateral(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     record = flight.record
     longitudinal = ("ax", "az", "q", "V", "alpha", "rho", *aircraft.control_symbols)
     needed = [*longitudinal, *(["thrust"] if aircraft.throttle and record.measured("thrust") else [])]
@@ -82,8 +82,10 @@ def _with_lateral(aircraft: Aircraft, flight: Flight) -> Flight:
     missing = [name for name in absent if name not in fillable]
     if missing:
         raise InputError(f"{flight.source}: no complete {', '.join(missing)}; the gap cannot be measured without")
-    if record.duration < SHORTEST:
-        raise InputError(f"{flight.source}: {record.duration:.1f} s of flight; the gap needs {SHORTEST:g} s or more")
+    if record.duration < SHORTEST_FLIGHT:
+        raise InputError(
+            f"{flight.source}: {record.duration:.1f} s of flight; the gap needs {SHORTEST_FLIGHT:g} s or more"
+        )
     if lateral:
         return replace(flight, record=record)
     filled = (*(n for n in _LATERAL if not np.isfinite(record[n]).all()), *fillable)
@@ -91,19 +93,21 @@ def _with_lateral(aircraft: Aircraft, flight: Flight) -> Flight:
     return replace(flight, record=replace(record, columns=columns), lateral=False, filled=filled)
 
 
-def _with_thrust(aircraft: Aircraft, flight: Flight) -> Flight:
+def _with_thrust(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with a thrust that keeps its airspeed, where the aircraft has an engine that nobody metered."""
-    if not unmetered(aircraft, flight.record):
+    if not thrust_missing(aircraft, flight.record):
         return flight
-    return replace(flight, record=with_thrust(aircraft, flight.record), metered=False)
+    return replace(flight, record=with_inferred_thrust(aircraft, flight.record), metered=False)
 
 
-def _with_flow_angles(aircraft: Aircraft, flight: Flight) -> Flight:
+def _with_flow_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with the flow angles that its aircraft has no vane for, where the six inertial instruments tell."""
-    angles = inferred.lacking(flight.record)
+    angles = inferred.missing_flow_angles(flight.record)
     if not angles or not all(np.isfinite(flight.record[name]).all() for name in ("ay", "p", "r")):
         return flight
-    return replace(flight, record=inferred.with_angles(aircraft, flight.record, angles, flight.source), inferred=angles)
+    return replace(
+        flight, record=inferred.with_inferred_angles(aircraft, flight.record, angles, flight.source), inferred=angles
+    )
 
 
 def _first_run(record: FlightRecord) -> FlightRecord:
@@ -117,7 +121,7 @@ def _first_run(record: FlightRecord) -> FlightRecord:
     return FlightRecord(time, columns, record.name, record.start_ns, record.rejected)
 
 
-def thinned(flight: Flight, rate: float = RATE) -> FlightRecord:
+def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:
     """The flight at ``rate``, low-passed with zero phase, and the gyroscopes' rates of change added.
 
     Columns ``p_rate q_rate r_rate`` (rad/s^2) are fourth-order central differences before the low-pass.

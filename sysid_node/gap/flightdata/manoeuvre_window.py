@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.flightdata.gap_flight import RATE, SHORTEST, Flight, thinned
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, SHORTEST_FLIGHT, GapFlight, resampled
 
 #: What belongs to a manoeuvre before and after its steps, s: trim, and the modes that it leaves ringing.
 _BEFORE, _AFTER = 2.0, 5.0
@@ -26,23 +26,23 @@ _PART = 0.4
 _SUDDEN = 8.0
 
 
-def sudden(commands: Array) -> Array:
+def step_changes(commands: Array) -> Array:
     """Changes (N, controls) of commands from sample to sample, zero where they are no faster than usual."""
     changes = np.diff(commands, axis=0, prepend=commands[:1])
     return np.where(np.abs(changes) > _SUDDEN * np.median(np.abs(changes), axis=0), changes, 0.0)
 
 
-def manoeuvre_of(flight: Flight, controls: tuple[str, ...]) -> Flight:
+def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     """The flight's only manoeuvre, where there is one and it is a small part of the flight; else the flight."""
-    record = thinned(flight)
+    record = resampled(flight)
     moved = [name for name in (*controls, *(["thrust"] if flight.metered else [])) if name in record.columns]
-    steps = sudden(np.column_stack([record[name] for name in moved])) ** 2
+    steps = step_changes(np.column_stack([record[name] for name in moved])) ** 2
     power = (steps / np.maximum(steps.sum(axis=0), 1e-300)).sum(axis=1).cumsum()
     if not power[-1] > 0.0:
         return flight
     aside = 0.5 * (1.0 - _MOST)
-    first, last = np.searchsorted(power / power[-1], [aside, 1.0 - aside]) / RATE
-    begin, end = max(first - _BEFORE, 0.0), min(max(last + _AFTER, first - _BEFORE + SHORTEST), record.duration)
+    first, last = np.searchsorted(power / power[-1], [aside, 1.0 - aside]) / ANALYSIS_RATE
+    begin, end = max(first - _BEFORE, 0.0), min(max(last + _AFTER, first - _BEFORE + SHORTEST_FLIGHT), record.duration)
     if end - begin > _PART * record.duration:
         return flight
     return replace(flight, record=_between(flight.record, begin, end), left_out=flight.record.duration - (end - begin))

@@ -15,15 +15,15 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.record import Array, FlightRecord
 
 #: What shows nothing then: the channel of forces, and the readings of short flights.
-CHANNEL, READINGS = "CD", frozenset({"ax", "V"})
+THRUST_CHANNEL, THRUST_READINGS = "CD", frozenset({"ax", "V"})
 
 
-def unmetered(aircraft: Aircraft, record: FlightRecord) -> bool:
+def thrust_missing(aircraft: Aircraft, record: FlightRecord) -> bool:
     """Whether an aircraft with an engine has a record without one value of thrust."""
     return aircraft.throttle is not None and not record.measured("thrust")
 
 
-def with_thrust(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
+def with_inferred_thrust(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
     """The record with the thrust (N) that the file's lift and drag leave; may be negative, as the drag is a belief.
 
     The accelerometer is taken as at the centre of gravity and the flow as at the probe: what that is off by is forward.

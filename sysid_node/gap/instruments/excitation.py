@@ -8,10 +8,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.nuisances import gusty
-from sysid_node.gap.flightdata.manoeuvre_window import sudden
-from sysid_node.gap.residuals.air_motion import calm_of
-from sysid_node.gap.residuals.residual_model import COEFFICIENTS, View
+from sysid_node.gap.estimation.nuisances import is_gusty
+from sysid_node.gap.flightdata.manoeuvre_window import step_changes
+from sysid_node.gap.residuals.air_motion import with_longest_memory
+from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 
 #: Time after which a step is forgotten, s.
 _MEMORY = 3.0
@@ -30,59 +30,59 @@ _RIDGE = 1e-3
 
 
 @dataclass(frozen=True)
-class Given:
+class ExternalExcitation:
     """Signals (N, m) of what was done to the commands deliberately; ``steps`` are those that owe nothing to gusts."""
 
     all: Array
     steps: Array
 
 
-def deliberate(view: View) -> Given:
+def external_excitation(model: ResidualModel) -> ExternalExcitation:
     """Where surfaces step: their steps, forgotten after some seconds; between them an autopilot moves them with the
     gusts. Where none steps (a multisine), the commands themselves, unless the weather moves them."""
-    commands = view.commands
+    commands = model.commands
     changes = np.diff(commands, axis=0, prepend=commands[:1])
-    decay = np.exp(-view.simulator.step / _MEMORY)
-    steps = lfilter([1.0], [1.0, -decay], sudden(commands), axis=0)
+    decay = np.exp(-model.simulator.step / _MEMORY)
+    steps = lfilter([1.0], [1.0, -decay], step_changes(commands), axis=0)
     usual = lfilter([1.0], [1.0, -decay], changes, axis=0)
     stepped = steps.std(axis=0) > _STEPPED * usual.std(axis=0)
     if stepped[:-1].any():
-        return Given(steps[:, stepped], steps[:, stepped])
-    if driven_by_weather(view):
-        return Given(commands[:, :0], commands[:, :0])
+        return ExternalExcitation(steps[:, stepped], steps[:, stepped])
+    if driven_by_gusts(model):
+        return ExternalExcitation(commands[:, :0], commands[:, :0])
     surfaces = commands[:, :-1] - commands[:, :-1].mean(axis=0)
-    return Given(np.concatenate([surfaces, steps[:, stepped]], axis=1), steps[:, stepped])
+    return ExternalExcitation(np.concatenate([surfaces, steps[:, stepped]], axis=1), steps[:, stepped])
 
 
-def purposeful(view: View) -> bool:
+def externally_excited(model: ResidualModel) -> bool:
     """Whether the flight shows what the aircraft does of itself: still air, or commands that are not the weather's."""
-    return not gusty(view) or bool(deliberate(view).all.size)
+    return not is_gusty(model) or bool(external_excitation(model).all.size)
 
 
-def driven_by_weather(view: View) -> bool:
+def driven_by_gusts(model: ResidualModel) -> bool:
     """Whether the air's motion foretells most of what the surfaces do: an autopilot that answers to gusts.
 
     From the motion of the last seconds, as the vanes show it beyond the inertial instruments, half of the flight
     foretold by the other; the median of the surfaces, for rolling gusts move no vane.
     """
-    if not gusty(view):
+    if not is_gusty(model):
         return False
-    air, surfaces = _air(view), view.commands[:, :-1]
+    air, surfaces = _air(model), model.commands[:, :-1]
     surfaces = surfaces[:, surfaces.std(axis=0) > 0.0]
     if not air.shape[1] or not surfaces.shape[1]:
         return False
-    rate = view.simulator.rate
+    rate = model.simulator.rate
     longest, grain = round(_ANSWER * rate), max(round(_GRAIN * rate), 1)
     lagged = np.column_stack([np.roll(air, lag, axis=0) for lag in range(0, longest, grain)])[longest:]
     return bool(np.median(_foretold(lagged - lagged.mean(axis=0), surfaces[longest:])) > _DRIVEN)
 
 
-def _air(view: View) -> Array:
+def _air(model: ResidualModel) -> Array:
     """Motion of the air (N, up to 3), of airspeed and flow angles, as a long memory shows it."""
     first = len(COEFFICIENTS)
-    shown = first + np.flatnonzero(view.axes[first : first + 3])
-    calm = calm_of(view)
-    return np.asarray((view.series - calm.predicted_series(view.simulator.neutral()))[:, shown])
+    shown = first + np.flatnonzero(model.axes[first : first + 3])
+    calm = with_longest_memory(model)
+    return np.asarray((model.series - calm.predicted_series(model.simulator.neutral()))[:, shown])
 
 
 def _foretold(causes: Array, series: Array) -> Array:

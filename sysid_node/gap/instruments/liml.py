@@ -16,26 +16,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import Fit, linearised, moved
-from sysid_node.gap.estimation.nuisances import gusty
-from sysid_node.gap.instruments.overidentification import Equations, equations, priors, within_limits
-from sysid_node.gap.residuals.windowed_spectra import SHARE
+from sysid_node.gap.estimation.fit import CandidateFit, linearised, stepped
+from sysid_node.gap.estimation.nuisances import is_gusty
+from sysid_node.gap.instruments.overidentification import MomentEquations, limited_step, moment_equations, prior_terms
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE
 
 #: Rounds of k and the step by turns; a tenth changes nothing that matters.
 _ROUNDS = 10
 
 
-def unbiased(fit: Fit) -> Fit:
+def liml_estimate(fit: CandidateFit) -> CandidateFit:
     """The fit as the instruments have it where the air moves; in still air least squares has no bias, and errs less."""
-    return instrumented(instrumented(fit)) if any(gusty(view) for view in fit.views) else fit
+    return k_class_step(k_class_step(fit)) if any(is_gusty(model) for model in fit.models) else fit
 
 
-def instrumented(fit: Fit) -> Fit:
+def k_class_step(fit: CandidateFit) -> CandidateFit:
     """The fit with its unknowns as the instruments have them; its information is the inverse of their covariance.
 
     One Gauss-Newton step from where the fit stands, and everything linearised there.
     """
-    seen = equations(fit, fit.power)
+    seen = moment_equations(fit, fit.power)
     channels = _channels(seen)
     step, corrected = _solved(fit, seen, channels)
     scores = seen.information.copy()  # their covariance: Bekker's, without third and fourth moments
@@ -43,28 +43,28 @@ def instrumented(fit: Fit) -> Fit:
         beyond, excess = channel.scatter(step), channel.excess(step)
         scores += (beyond - 1.0) * channel.coherent[:-1, :-1] + beyond * excess**2 * channel.rest[:-1, :-1]
     information = corrected.information @ np.linalg.solve(scores, corrected.information)
-    return replace(linearised(moved(fit, step)), information=0.5 * (information + information.T))
+    return replace(linearised(stepped(fit, step)), information=0.5 * (information + information.T))
 
 
-def responses(fit: Fit) -> list[Array]:
+def influence(fit: CandidateFit) -> list[Array]:
     """By flight (W, unknowns): how far each window alone moves the unknowns of a fit as ``unbiased`` leaves it."""
-    if not any(gusty(view) for view in fit.views):
+    if not any(is_gusty(model) for model in fit.models):
         return [np.einsum("wru,wr->wu", J, r) @ fit.covariance for J, r in zip(fit.slopes, fit.rows, strict=True)]
-    known, information = telling(fit)
+    known, information = moment_weights(fit)
     scores = (np.einsum("wru,wr->wu", K, r) for K, r in zip(known, fit.rows, strict=True))
     return [np.linalg.solve(information, score.T).T for score in scores]
 
 
-def telling(fit: Fit) -> tuple[Sequence[Array], Array]:
+def moment_weights(fit: CandidateFit) -> tuple[Sequence[Array], Array]:
     """What multiplies the remainder in the equations that a fit as ``unbiased`` leaves it solves, and their matrix.
 
     By flight (W, R, unknowns): the slopes in still air; in moving air, what of them the instruments see, less chance's
     share, and the slopes of the means.
     """
-    if not any(gusty(view) for view in fit.views):
+    if not any(is_gusty(model) for model in fit.models):
         assert fit.information is not None
         return fit.slopes, fit.information
-    seen = equations(fit, fit.power)
+    seen = moment_equations(fit, fit.power)
     channels = _channels(seen)
     step, corrected = _solved(fit, seen, channels)
     found, order = [], iter(channels)
@@ -79,13 +79,13 @@ def telling(fit: Fit) -> tuple[Sequence[Array], Array]:
     return found, corrected.information
 
 
-def _solved(fit: Fit, seen: Equations, channels: Sequence[_Channel]) -> tuple[Array, Equations]:
+def _solved(fit: CandidateFit, seen: MomentEquations, channels: Sequence[_Channel]) -> tuple[Array, MomentEquations]:
     """The step (unknowns,), and the equations that it solves."""
-    precision, _ = priors(fit)
-    step, corrected = within_limits(seen, fit), seen
+    precision, _ = prior_terms(fit)
+    step, corrected = limited_step(seen, fit), seen
     for _ in range(_ROUNDS):
         corrected = _without_chance(seen, channels, step, precision)
-        step = within_limits(corrected, fit)
+        step = limited_step(corrected, fit)
     return step, corrected
 
 
@@ -112,7 +112,7 @@ class _Channel:
         return float(direction @ self.coherent @ direction), float(direction @ self.rest @ direction)
 
 
-def _channels(seen: Equations) -> list[_Channel]:
+def _channels(seen: MomentEquations) -> list[_Channel]:
     """Those on which there are instruments, flight by flight."""
     found = []
     for basis, rows, slopes in zip(seen.basis, seen.rows, seen.slopes, strict=True):
@@ -121,22 +121,24 @@ def _channels(seen: Equations) -> list[_Channel]:
             own, count = table[:, :, axis].reshape(-1, table.shape[3]), directions.shape[1]
             along = directions.T @ own
             coherent = along.T @ along
-            others = max(SHARE * np.count_nonzero(own.any(axis=1)) - count, 1.0)
+            others = max(INDEPENDENT_SHARE * np.count_nonzero(own.any(axis=1)) - count, 1.0)
             found.append(_Channel(coherent, own.T @ own - coherent, count, others))
     return found
 
 
-def _without_chance(seen: Equations, channels: Sequence[_Channel], step: Array, precision: Array) -> Equations:
+def _without_chance(
+    seen: MomentEquations, channels: Sequence[_Channel], step: Array, precision: Array
+) -> MomentEquations:
     """The equations without what the instruments see by chance; never less is known than before the flight."""
     information, right = seen.information.copy(), seen.right.copy()
     for channel in channels:
         excess = channel.excess(step)
         information -= excess * channel.rest[:-1, :-1]
         right -= excess * channel.rest[:-1, -1]
-    return replace(seen, information=sound(information, precision), right=right)
+    return replace(seen, information=at_least_prior(information, precision), right=right)
 
 
-def sound(information: Array, precision: Array) -> Array:
+def at_least_prior(information: Array, precision: Array) -> Array:
     """Information (unknowns, unknowns) that is in no direction less than that of the priors (unknowns,)."""
     unit = precision**-0.5
     scaled = information * np.outer(unit, unit)

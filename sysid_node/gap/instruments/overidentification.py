@@ -19,15 +19,23 @@ from scipy.signal import bilinear, lfilter
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import prior
-from sysid_node.gap.estimation.fit import Fit, amplitudes, bounded, real_rows, residual_power, room, weights
+from sysid_node.gap.estimation.fit import (
+    CandidateFit,
+    amplitudes,
+    bounded_least_squares,
+    real_rows,
+    residual_power,
+    step_limits,
+    weights,
+)
 from sysid_node.gap.estimation.nuisances import Nuisances
-from sysid_node.gap.estimation.predictive_density import upon
-from sysid_node.gap.instruments.excitation import deliberate
-from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS, View
-from sysid_node.gap.residuals.windowed_spectra import SHARE, Complex
+from sysid_node.gap.estimation.predictive_density import fit_on_other_flight
+from sysid_node.gap.instruments.excitation import external_excitation
+from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS, ResidualModel
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 
 #: Standard deviations above chance below which coherence is taken as chance.
-CHANCE = 4.0
+CHANCE_DEVIATIONS = 4.0
 
 #: Time constants through which commands act, s; zero is directly.
 _LAGS = (0.0, 0.06, 0.2, 0.6)
@@ -36,11 +44,11 @@ _LAGS = (0.0, 0.06, 0.2, 0.6)
 _RINGING, _DAMPING = (0.6, 0.9, 1.35, 2.0, 3.0), 0.2
 
 #: Signals (N, M) for forces and moments, and for air data and attitude, of zero mean and unit spread; or none.
-Instruments = Callable[[View], tuple[Array, Array]]
+Instruments = Callable[[ResidualModel], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
-class Structure:
+class OveridentificationTest:
     """By coefficient (12,): power coherent with what was done, less chance's, and all power, in noise levels."""
 
     beyond: Array
@@ -69,32 +77,43 @@ class Structure:
         return np.asarray(self.coherent / np.maximum(self.total, 1e-300))
 
 
-def structure_left(fit: Fit, unseen: Sequence[View] = (), own: Sequence[Nuisances] = ()) -> Structure:
+def pooled_overidentification(
+    fit: CandidateFit, unseen: Sequence[ResidualModel] = (), own: Sequence[Nuisances] = ()
+) -> OveridentificationTest:
     """Of a fit's remainder, and of that on flights held out, with what is allowed for in each.
 
     By channel as ``instruments`` see it, or ``ringing`` where that sees more and beyond chance. A flight on which no
     numbers come of the fit is left out.
     """
-    there = [fit, *(upon(fit, view, theirs) for view, theirs in zip(unseen, own, strict=True))]
+    there = [fit, *(fit_on_other_flight(fit, model, theirs) for model, theirs in zip(unseen, own, strict=True))]
     fits = [f for f in there if f.information is not None and np.isfinite(f.information).all()]
-    usual, rings = (pooled([structure_of(f, weighed_anew(f, by), by) for f in fits]) for by in (instruments, ringing))
-    more = rings.deviations > np.maximum(usual.deviations, CHANCE)
-    found = {f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(Structure)}
-    return Structure(**found)
+    usual, rings = (
+        pooled([overidentification_of(f, reweighted(f, by), by) for f in fits])
+        for by in (gust_free_instruments, resonator_instruments)
+    )
+    more = rings.deviations > np.maximum(usual.deviations, CHANCE_DEVIATIONS)
+    found = {
+        f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(OveridentificationTest)
+    }
+    return OveridentificationTest(**found)
 
 
-def pooled(parts: Sequence[Structure]) -> Structure:
+def pooled(parts: Sequence[OveridentificationTest]) -> OveridentificationTest:
     """Structure of several flights: what is in all of them adds up, chance does not."""
-    beyond, total, chance, noise = (np.array([getattr(part, f.name) for part in parts]) for f in fields(Structure))
+    beyond, total, chance, noise = (
+        np.array([getattr(part, f.name) for part in parts]) for f in fields(OveridentificationTest)
+    )
     weight = chance**2 / (chance**2).sum(axis=0)
-    return Structure(beyond.sum(axis=0), total.sum(axis=0), np.sqrt((chance**2).sum(axis=0)),
+    return OveridentificationTest(beyond.sum(axis=0), total.sum(axis=0), np.sqrt((chance**2).sum(axis=0)),
                      (weight * noise).sum(axis=0))  # fmt: skip
 
 
-def structure_of(fit: Fit, like: Fit | None = None, by: Instruments | None = None) -> Structure:
+def overidentification_of(
+    fit: CandidateFit, like: CandidateFit | None = None, by: Instruments | None = None
+) -> OveridentificationTest:
     """Of a fit's remainder; noise levels are those of ``like``, so that remainders of several fits compare."""
-    seen = equations(fit, (like or fit).power, by or instruments)
-    step = within_limits(seen, fit)
+    seen = moment_equations(fit, (like or fit).power, by or gust_free_instruments)
+    step = limited_step(seen, fit)
     coherent, total, size, others = (np.zeros(len(CHANNELS)) for _ in range(4))
     for U, r, J in zip(seen.basis, seen.rows, seen.slopes, strict=True):
         left = r - J @ step
@@ -103,29 +122,29 @@ def structure_of(fit: Fit, like: Fit | None = None, by: Instruments | None = Non
             coherent[axis] += float(np.sum((directions.T @ series) ** 2))
             total[axis] += float(np.sum(series**2))
             size[axis] += directions.shape[1]
-            others[axis] += SHARE * np.count_nonzero(series) - directions.shape[1]
+            others[axis] += INDEPENDENT_SHARE * np.count_nonzero(series) - directions.shape[1]
     noise = np.maximum((total - coherent) / np.maximum(others, 1.0), 1.0)
-    return Structure(coherent - size, total, np.sqrt(2.0 * np.maximum(size, 1.0)), noise)
+    return OveridentificationTest(coherent - size, total, np.sqrt(2.0 * np.maximum(size, 1.0)), noise)
 
 
-def weighed_anew(fit: Fit, by: Instruments) -> Fit:
+def reweighted(fit: CandidateFit, by: Instruments) -> CandidateFit:
     """The fit with the power of what the instruments' own estimate leaves, for the weights of a second step.
 
     Least squares leaves too little where it passed gusts off as derivatives: what a sharp step then leaves at other
     frequencies would stand out of noise that is too low there (Hansen (1982): the covariance must be that at the true
     parameters).
     """
-    seen, powers = equations(fit, fit.power, by), []
-    step = within_limits(seen, fit)
-    for view, power, r, J in zip(fit.views, fit.power, seen.rows, seen.slopes, strict=True):
-        anew = residual_power(view, amplitudes((r - J @ step).reshape(len(r), -1), _weights(view, power)))
+    seen, powers = moment_equations(fit, fit.power, by), []
+    step = limited_step(seen, fit)
+    for model, power, r, J in zip(fit.models, fit.power, seen.rows, seen.slopes, strict=True):
+        anew = residual_power(model, amplitudes((r - J @ step).reshape(len(r), -1), _weights(model, power)))
         anew[0] = power[0]
         powers.append(anew)
     return replace(fit, power=tuple(powers))
 
 
 @dataclass(frozen=True)
-class Equations:
+class MomentEquations:
     """What the instruments see of a fit: a sum of squares, quadratic in the step of all unknowns, priors included.
 
     ``constant - 2 right . step + step . information step``; without means in ``rows`` (W, 2 L, 12) and ``slopes``
@@ -140,13 +159,15 @@ class Equations:
     constant: float
 
 
-def equations(fit: Fit, powers: tuple[Array, ...], by: Instruments | None = None, *, whole: bool = False) -> Equations:
+def moment_equations(
+    fit: CandidateFit, powers: tuple[Array, ...], by: Instruments | None = None, *, whole: bool = False
+) -> MomentEquations:
     """Those of a fit about where it stands, in noise of these powers (L, 12) by flight.
 
     ``whole``: with all of air data and attitude, whatever the instruments see of them.
     """
-    basis, rows, slopes = _seen(fit, powers, by or instruments)
-    precision, pull = priors(fit)
+    basis, rows, slopes = _seen(fit, powers, by or gust_free_instruments)
+    precision, pull = prior_terms(fit)
     information, right, constant = np.diag(precision), -precision * pull, float(precision @ pull**2)
     parts = [
         (directions.T @ r[:, :, axis].ravel(), directions.T @ J[:, :, axis].reshape(-1, J.shape[3]))
@@ -161,15 +182,15 @@ def equations(fit: Fit, powers: tuple[Array, ...], by: Instruments | None = None
         information += seen.T @ seen
         right += seen.T @ series
         constant += float(series @ series)
-    return Equations(basis, rows, slopes, information, right, constant)
+    return MomentEquations(basis, rows, slopes, information, right, constant)
 
 
-def within_limits(seen: Equations, fit: Fit) -> Array:
+def limited_step(seen: MomentEquations, fit: CandidateFit) -> Array:
     """The step (unknowns,) of least squares that leaves every unknown within its limits."""
-    return bounded(seen.information, seen.right, *room(fit))
+    return bounded_least_squares(seen.information, seen.right, *step_limits(fit))
 
 
-def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
+def _means(fit: CandidateFit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
     """Means by flight, from which gusts average out: residuals (W 12,) and slopes (W 12, unknowns)."""
     for power, own_power, r, J in zip(powers, fit.power, fit.rows, fit.slopes, strict=True):
         ratio = np.sqrt(own_power[0] / power[0])
@@ -179,40 +200,40 @@ def _means(fit: Fit, powers: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]
 
 
 def _seen(
-    fit: Fit, powers: tuple[Array, ...], by: Instruments
+    fit: CandidateFit, powers: tuple[Array, ...], by: Instruments
 ) -> tuple[list[dict[int, Array]], list[Array], list[Array]]:
     """By flight: the instruments' directions, residuals (W, 2 L, 12), slopes (W, 2 L, 12, unknowns), without means."""
     basis, rows, slopes = [], [], []
-    for view, power, own_power, r, J in zip(fit.views, powers, fit.power, fit.rows, fit.slopes, strict=True):
-        weight = _weights(view, power)
-        own = weights(view.windows, own_power)
+    for model, power, own_power, r, J in zip(fit.models, powers, fit.power, fit.rows, fit.slopes, strict=True):
+        weight = _weights(model, power)
+        own = weights(model.windows, own_power)
         ratio = np.where(own > 0, weight / np.where(own > 0, own, 1.0), 0.0).ravel()
         rows.append((r * ratio).reshape(r.shape[0], -1, len(CHANNELS)))
         slopes.append((J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2]))
         key = by.__name__.encode() + weight.tobytes()
-        basis.append(view.lately(key, partial(_basis, view, weight, by)))
+        basis.append(model.lately(key, partial(_basis, model, weight, by)))
     return basis, rows, slopes
 
 
-def _weights(view: View, power: Array) -> Array:
+def _weights(model: ResidualModel, power: Array) -> Array:
     """``weights`` (2 L, 12) without those of means."""
-    weight = weights(view.windows, power)
-    weight[[0, view.windows.frequencies.size]] = 0.0
+    weight = weights(model.windows, power)
+    weight[[0, model.windows.frequencies.size]] = 0.0
     return weight
 
 
-def priors(fit: Fit) -> tuple[Array, Array]:
+def prior_terms(fit: CandidateFit) -> tuple[Array, Array]:
     """Precision of each unknown's prior, and how far the fit is from the prior's centre."""
     now, spread, _ = fit.stacked
-    centre, sigma = prior(fit.views[0].simulator, fit.indices)
+    centre, sigma = prior(fit.models[0].simulator, fit.indices)
     return np.concatenate([sigma, spread]) ** -2.0, np.concatenate([fit.values - centre, now])
 
 
-def _basis(view: View, weight: Array, by: Instruments) -> dict[int, Array]:
+def _basis(model: ResidualModel, weight: Array, by: Instruments) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by coefficient that was measured."""
-    tables = view.once(f"spectra by {by.__name__}", lambda: _spectra(view, by))
+    tables = model.once(f"spectra by {by.__name__}", lambda: _spectra(model, by))
     found = {}
-    for axis in np.flatnonzero(view.axes):
+    for axis in np.flatnonzero(model.axes):
         spectra = tables[0 if axis < len(COEFFICIENTS) else 1]
         if not spectra.size:
             continue
@@ -224,71 +245,71 @@ def _basis(view: View, weight: Array, by: Instruments) -> dict[int, Array]:
     return found
 
 
-def _spectra(view: View, by: Instruments) -> list[Complex]:
+def _spectra(model: ResidualModel, by: Instruments) -> list[Complex]:
     """Instruments by window and line, each (W, L, M); empty where there are none."""
-    return [view.windows.transform(t) if t.size else np.empty((0, 0, 0), complex) for t in by(view)]
+    return [model.windows.transform(t) if t.size else np.empty((0, 0, 0), complex) for t in by(model)]
 
 
-def instruments(view: View) -> tuple[Array, Array]:
+def gust_free_instruments(model: ResidualModel) -> tuple[Array, Array]:
     """What owes nothing to rotating gusts; and what owes nothing to gusts of any kind, which are in all air data."""
-    given, late = deliberate(view), _late(view)
+    given, late = external_excitation(model), _late(model)
     if not given.all.size:
         return _NONE
-    moved = {n: view.record[n] - view.record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
+    moved = {n: model.record[n] - model.record[n].mean() for n in ("alpha", "beta", "V", "p", "q", "r")}
     flow = [moved["alpha"] ** 2, np.abs(moved["beta"]), moved["V"] * moved["alpha"]]
     aging = [late * series for series in moved.values()]
-    return _standard([*_foretelling(view, given.all), *flow, *aging]), _standard(_shaped(view, given.steps))
+    return _standard([*_foretelling(model, given.all), *flow, *aging]), _standard(_shaped(model, given.steps))
 
 
-def commands(view: View) -> tuple[Array, Array]:
+def command_instruments(model: ResidualModel) -> tuple[Array, Array]:
     """Of ``instruments`` those of commands alone.
 
     What holds the motion owes nothing to gusts on average, but what the air does in one flight is coherent with it.
     """
-    given = deliberate(view)
+    given = external_excitation(model)
     if not given.all.size:
         return _NONE
-    return _standard(_foretelling(view, given.all)), _standard(_shaped(view, given.steps))
+    return _standard(_foretelling(model, given.all)), _standard(_shaped(model, given.steps))
 
 
-def ringing(view: View) -> tuple[Array, Array]:
+def resonator_instruments(model: ResidualModel) -> tuple[Array, Array]:
     """Commands through resonators: what swings on after a manoeuvre by a motion of its own, as fuel or a load does.
 
     Lags do not foretell it. Kautz functions (Wahlberg (1994), IEEE Trans. Automatic Control 39(6)).
     """
-    given = deliberate(view)
+    given = external_excitation(model)
     if not given.all.size:
         return _NONE
-    both = [[*signals.T, *_rung(view, signals)] for signals in (given.all, given.steps)]
+    both = [[*signals.T, *_rung(model, signals)] for signals in (given.all, given.steps)]
     return _standard(both[0]), _standard(both[1])
 
 
 _NONE = (np.empty((0, 0)), np.empty((0, 0)))
 
 
-def _late(view: View) -> Array:
+def _late(model: ResidualModel) -> Array:
     """Time about the flight's middle, s: weather that does not change averages out of what is weighted by it."""
-    return np.asarray(view.record.time - view.record.time.mean())
+    return np.asarray(model.record.time - model.record.time.mean())
 
 
-def _foretelling(view: View, given: Array) -> list[Array]:
+def _foretelling(model: ResidualModel, given: Array) -> list[Array]:
     """Signals (N, m) shaped, and weighted by time."""
-    return [*_shaped(view, given), *(_late(view) * series for series in given.T)]
+    return [*_shaped(model, given), *(_late(model) * series for series in given.T)]
 
 
-def _rung(view: View, given: Array) -> list[Array]:
+def _rung(model: ResidualModel, given: Array) -> list[Array]:
     """Signals (N, m) through each resonator, where it is and how fast it moves."""
     found = []
     for omega in 2.0 * np.pi * np.array(_RINGING):
         for top in ([omega**2], [omega, 0.0]):
-            b, a = bilinear(top, [1.0, 2.0 * _DAMPING * omega, omega**2], view.simulator.rate)
+            b, a = bilinear(top, [1.0, 2.0 * _DAMPING * omega, omega**2], model.simulator.rate)
             found += [lfilter(b, a, series) for series in given.T]
     return found
 
 
-def _shaped(view: View, given: Array) -> list[Array]:
+def _shaped(model: ResidualModel, given: Array) -> list[Array]:
     """Signals (N, m) through lags, and their squares and cubes."""
-    columns = [_lagged(series, lag, view.simulator.step) for series in given.T for lag in _LAGS]
+    columns = [_lagged(series, lag, model.simulator.step) for series in given.T for lag in _LAGS]
     return [*columns, *(series**power for series in given.T for power in (2, 3))]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
-from sysid_node.gap.flightdata.gap_flight import Flight
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.flightdata.gap_flight import GapFlight
+from sysid_node.gap.residuals.residual_model import ResidualModel
 
 #: Travel below which no surface counts as moved, rad.
 _TRAVEL = 0.004
@@ -22,7 +22,7 @@ _LIFT, _VANE = 2.5, 0.1
 _STALLING = 0.15
 
 
-def require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> None:
+def require_distinct_flights(flights: Sequence[GapFlight], holdouts: Sequence[GapFlight]) -> None:
     """Raises InputError where a held-out flight is one of those that are fitted."""
     for held in holdouts:
         for flight in flights:
@@ -35,34 +35,34 @@ def require_others(flights: Sequence[Flight], holdouts: Sequence[Flight]) -> Non
                 )
 
 
-def admitted(view: View) -> View:
+def require_admissible(model: ResidualModel) -> ResidualModel:
     """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
-    commands = view.commands[:, :-1]
+    commands = model.commands[:, :-1]
     travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
     if (travel < _TRAVEL).all():
         raise InputError(
-            f"{view.flight.source}: no control surface moves by more than {travel.max():.2g} rad; fly a manoeuvre "
+            f"{model.flight.source}: no control surface moves by more than {travel.max():.2g} rad; fly a manoeuvre "
             "(sysid excite designs one)"
         )
-    lift, expected = view.series[:, 0].mean(), view.predicted_series(view.simulator.neutral())[:, 0].mean()
-    slope = view.simulator.aircraft.derivatives.get("CL_alpha")
-    by_a_vane = slope is not None and abs(lift - expected) < _VANE * slope.value and not view.flight.inferred
-    stalled = lift < expected and not view.flight.inferred and view.record["alpha"].mean() > _STALLING
+    lift, expected = model.series[:, 0].mean(), model.predicted_series(model.simulator.neutral())[:, 0].mean()
+    slope = model.simulator.aircraft.derivatives.get("CL_alpha")
+    by_a_vane = slope is not None and abs(lift - expected) < _VANE * slope.value and not model.flight.inferred
+    stalled = lift < expected and not model.flight.inferred and model.record["alpha"].mean() > _STALLING
     if not (1.0 / _LIFT < lift / expected < _LIFT or by_a_vane or stalled):
         raise InputError(
-            f"{view.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
-            f"{view.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "
-            f"another aircraft's flight{_or_imu(view)}?"
+            f"{model.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
+            f"{model.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "
+            f"another aircraft's flight{_or_imu(model)}?"
         )
-    return view
+    return model
 
 
-def _or_imu(view: View) -> str:
+def _or_imu(model: ResidualModel) -> str:
     """What else may be wrong where flow angles are inferred."""
-    return ", or an IMU far off, from which its flow angles are inferred" if view.flight.inferred else ""
+    return ", or an IMU far off, from which its flow angles are inferred" if model.flight.inferred else ""
 
 
-def excitation(view: View) -> Array:
+def signal_to_noise(model: ResidualModel) -> Array:
     """Power over the sensors' noise, by coefficient that was measured."""
-    power = (np.abs(view.measured[:, 1:]) ** 2).mean(axis=0).sum(axis=0)
-    return np.asarray((power / view.noise[1:].sum(axis=0))[view.axes])
+    power = (np.abs(model.measured[:, 1:]) ** 2).mean(axis=0).sum(axis=0)
+    return np.asarray((power / model.noise[1:].sum(axis=0))[model.axes])

@@ -97,7 +97,7 @@ def reconstruct(
 ) -> Scalar:
     """Readings (N, 6), columns ``READINGS``, that parameters (P,) expect, each from the samples before it; pure."""
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
-    samples = undone(chain, motion)
+    samples = corrected_motion(chain, motion)
     first = jax.tree.map(lambda series: series[0], samples)
     flow = _at_probe(chain, first.velocity, first.rates)
     start = _State(first.velocity, first.attitude, flow, flow)
@@ -110,7 +110,7 @@ def reconstruct(
     return jnp.concatenate([shift_cubic(air, late_air), shift_cubic(attitude, late_imu)], axis=1)
 
 
-def undone(chain: Chain, motion: Motion) -> Sample:
+def corrected_motion(chain: Chain, motion: Motion) -> Sample:
     """The motion (N,) that the readings tell of, at the time of the samples."""
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
@@ -134,7 +134,7 @@ def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
     What gusts do, only the vanes show: without a memory they are followed at every sample. In still air their noise
     would pass for motion: in a regressor it makes derivatives seem smaller, the more so the less the aircraft moves.
     """
-    samples = undone(chain, motion)
+    samples = corrected_motion(chain, motion)
     moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
     velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
     _, alpha_rate, _ = _rates_of_flow(velocity, rate)

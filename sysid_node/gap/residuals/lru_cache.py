@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 _Value = TypeVar("_Value")
 
 
-class Recent(Generic[_Value]):
+class LruCache(Generic[_Value]):
     """The ``size`` values by key that were asked for last; others are forgotten."""
 
     def __init__(self, size: int) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.flightdata.gap_flight import Flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.flight_path_reconstruction import (
     READINGS,
     Flow,
@@ -27,7 +27,7 @@ from sysid_node.gap.residuals.flight_path_reconstruction import (
     motion_of,
     reconstruct,
 )
-from sysid_node.gap.residuals.lru_cache import Recent
+from sysid_node.gap.residuals.lru_cache import LruCache
 from sysid_node.gap.residuals.windowed_spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator
 from sysid_node.sim.body import Vector
@@ -43,7 +43,7 @@ CHANNELS = (*COEFFICIENTS, *READINGS)
 _FORCES, _READINGS = slice(len(COEFFICIENTS)), slice(len(COEFFICIENTS), None)
 
 #: Longest memory of the observer of the air, s.
-LONGEST = 4.0
+LONGEST_MEMORY = 4.0
 
 #: Directions in which a prediction is differentiated at once: as many as most effects have parameters, or as many as
 #: there are biases and clocks.
@@ -66,23 +66,23 @@ Channels = Sequence[Scalar]
 Expected = Callable[..., Channels]
 
 
-class Memory(NamedTuple):
+class ObserverMemory(NamedTuple):
     """How long what the inertial instruments tell of the air's motion is remembered, s."""
 
     observer: Scalar | float  # before the air data are believed
     vane: Scalar | float  # before the rate of alpha follows the vane; zero: at once
 
 
-class Given(NamedTuple):
+class PredictionInputs(NamedTuple):
     """All that a prediction takes from a flight."""
 
     signals: Signals  # padded
     motion: Motion | None  # padded; None without attitude
-    memory: Memory
+    memory: ObserverMemory
     step: Scalar  # s
 
 
-def _flow(layout: Layout, model: Model, theta: Parameters, _: Scalar, given: Given) -> Flow | None:
+def _flow(layout: Layout, model: Model, theta: Parameters, _: Scalar, given: PredictionInputs) -> Flow | None:
     """The flow by the inertial instruments, which ``kinematic`` parameters alone move; none without attitude."""
     if given.motion is None:
         return None
@@ -92,7 +92,7 @@ def _flow(layout: Layout, model: Model, theta: Parameters, _: Scalar, given: Giv
 
 @partial(jax.jit, static_argnums=0)  # traced once for all that it is part of
 def _forces_in(
-    layout: Layout, model: Model, theta: Parameters, acting: Scalar, given: Given, flow: Flow | None
+    layout: Layout, model: Model, theta: Parameters, acting: Scalar, given: PredictionInputs, flow: Flow | None
 ) -> Channels:
     """Coefficients that parameters (P,) expect in a flow that is known; ``acting`` (P,) as ``predict`` has it."""
     signals = given.signals
@@ -103,7 +103,7 @@ def _forces_in(
 
 @partial(jax.jit, static_argnums=0)
 def _readings(
-    layout: Layout, model: Model, theta: Parameters, _: Scalar, given: Given, __: Flow | None = None
+    layout: Layout, model: Model, theta: Parameters, _: Scalar, given: PredictionInputs, __: Flow | None = None
 ) -> Channels:
     """Air data and attitude that parameters (P,) expect; nothing without attitude."""
     if given.motion is None:
@@ -112,7 +112,7 @@ def _readings(
 
 
 def _channels(
-    layout: Layout, model: Model, theta: Parameters, acting: Scalar, given: Given, _: Flow | None
+    layout: Layout, model: Model, theta: Parameters, acting: Scalar, given: PredictionInputs, _: Flow | None
 ) -> Channels:
     """All of them, where the parameters move the flow, too."""
     forces = _forces_in(layout, model, theta, acting, given, _flow(layout, model, theta, acting, given))
@@ -133,7 +133,7 @@ def _changes(
     theta: Scalar,
     acting: Scalar,
     directions: Scalar,
-    given: Given,
+    given: PredictionInputs,
     flow: Flow | None,
 ) -> tuple[Channels, Channels]:
     """What is expected (N,) by channel, and d expected along directions (K, M) of what may ``move`` it: (N, K)."""
@@ -155,7 +155,7 @@ def _changes(
 
 @kept(1)
 def _changes_by_derivative(
-    layout: Layout, model: Model, theta: Scalar, acting: Scalar, given: Given, flow: Flow | None
+    layout: Layout, model: Model, theta: Scalar, acting: Scalar, given: PredictionInputs, flow: Flow | None
 ) -> Channels:
     """d coefficients / d each of the file's derivatives, (N, D) each.
 
@@ -177,25 +177,27 @@ _ACCELERATIONS = (("ax", "ay", "az"), ("p_rate", "q_rate", "r_rate"))
 
 
 @dataclass(frozen=True)
-class View:
+class ResidualModel:
     """One flight, W windows of L lines, twelve ``CHANNELS``."""
 
     simulator: Simulator
-    flight: Flight
+    flight: GapFlight
     record: FlightRecord  # at the analysis rate
-    given: Given
+    given: PredictionInputs
     windows: Windows
     series: Array  # (N, 12) as measured
     measured: Complex  # (W, L, 12)
     noise: Array  # (L, 12) power that the sensors' noise leaves in measured minus predicted
     axes: NDArray[np.bool_]  # (12,): what was measured
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, as the aircraft file has it
-    _forces: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
-    _slopes: Recent[Complex] = field(default_factory=lambda: Recent(_SLOPES), init=False, repr=False, compare=False)
-    _flows: Recent[Flow | None] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
-    _lately: Recent[Any] = field(default_factory=lambda: Recent(_LATELY), init=False, repr=False, compare=False)
+    _forces: LruCache[Complex] = field(default_factory=lambda: LruCache(_KEPT), init=False, repr=False, compare=False)
+    _slopes: LruCache[Complex] = field(default_factory=lambda: LruCache(_SLOPES), init=False, repr=False, compare=False)
+    _flows: LruCache[Flow | None] = field(
+        default_factory=lambda: LruCache(_KEPT), init=False, repr=False, compare=False
+    )
+    _lately: LruCache[Any] = field(default_factory=lambda: LruCache(_LATELY), init=False, repr=False, compare=False)
     _once: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
-    _readings: Recent[Complex] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False, compare=False)
+    _readings: LruCache[Complex] = field(default_factory=lambda: LruCache(_KEPT), init=False, repr=False, compare=False)
 
     def once(self, name: str, work: Callable[[], _Kept]) -> _Kept:
         """What follows from this view alone, by name: worked out once."""
@@ -211,7 +213,7 @@ class View:
 
     def programs(self) -> Iterator[Callable[[], object]]:
         """What calls each of the programs of slopes, which take their time to load or to compile, once."""
-        neutral, motion = self.simulator.neutral(), kinematic(self.simulator.layout)
+        neutral, motion = self.simulator.neutral(), kinematic_parameters(self.simulator.layout)
         other = _moving(_forces_in, self.simulator.layout)[:1]
         yield partial(self._slopes_along, _channels, neutral, motion[:_WIDE])
         yield partial(self._slopes_along, _channels, neutral, motion[:1])
@@ -231,7 +233,7 @@ class View:
         """The same by window and line, (W, L, 12)."""
         known = self._forces.get(theta.tobytes())
         forces = self.windows.transform(self._series(_forces_in, theta)) if known is None else known
-        key = theta[kinematic(self.simulator.layout)].tobytes()
+        key = theta[kinematic_parameters(self.simulator.layout)].tobytes()
         readings = self._readings.get(key)
         if readings is None:
             readings = self._readings.keep(key, self.windows.transform(self._series(_readings, theta)))
@@ -250,12 +252,17 @@ class View:
     def slopes_of_readings(self, theta: Array, indices: list[int]) -> Complex:
         """d predicted air data and attitude / d parameters of these indices, (W, L, 6, K)."""
         slopes = np.zeros((*self.measured.shape, len(indices)), complex)
-        self._fill(slopes, theta, indices, [k for k, i in enumerate(indices) if i in kinematic(self.simulator.layout)])
+        self._fill(
+            slopes,
+            theta,
+            indices,
+            [k for k, i in enumerate(indices) if i in kinematic_parameters(self.simulator.layout)],
+        )
         return slopes[:, :, len(COEFFICIENTS) :]
 
     def _slopes_of(self, theta: Array, indices: list[int]) -> Complex:
         slopes = np.zeros((*self.measured.shape, len(indices)), complex)
-        layout, motion, forces = self.simulator.layout, kinematic(self.simulator.layout), len(COEFFICIENTS)
+        layout, motion, forces = self.simulator.layout, kinematic_parameters(self.simulator.layout), len(COEFFICIENTS)
         own = {self.simulator.names.index(f"derivative_error.{n}"): d for d, n in enumerate(layout.derivatives)}
         linear, moving = ([k for k, index in enumerate(indices) if index in some] for some in (own, motion))
         if linear:
@@ -274,7 +281,7 @@ class View:
 
     def _flow(self, theta: Array) -> Flow | None:
         """The flow at parameters (P,), as long as none moves it."""
-        key = theta[kinematic(self.simulator.layout)].tobytes()
+        key = theta[kinematic_parameters(self.simulator.layout)].tobytes()
         known = self._flows.get(key)
         return self._flows.keep(key, self._at(_flow, theta)) if known is None else known
 
@@ -311,7 +318,7 @@ class View:
 
     def _keep(self, theta: Array, series: Array) -> None:
         """Forces (N, 6), or all channels (N, 12), that are expected at parameters (P,)."""
-        motion = theta[kinematic(self.simulator.layout)].tobytes()
+        motion = theta[kinematic_parameters(self.simulator.layout)].tobytes()
         for known, key, channels in ((self._forces, theta.tobytes(), _FORCES), (self._readings, motion, _READINGS)):
             if series[:, channels].size and known.get(key) is None:
                 known.keep(key, self.windows.transform(series[:, channels]))
@@ -322,7 +329,7 @@ _ELSEWHERE = frozenset({"actuator_stamp_delay", "sensor_noise"})
 
 
 @cache
-def kinematic(layout: Layout) -> list[int]:
+def kinematic_parameters(layout: Layout) -> list[int]:
     """Entries of the parameter vector that kinematics depend on: clocks, instruments, and where they are."""
     return [
         i
@@ -334,7 +341,7 @@ def kinematic(layout: Layout) -> list[int]:
 @cache
 def _moving(expected: Expected, layout: Layout) -> list[int]:
     """Entries of the parameter vector that what is expected is differentiated by."""
-    motion = kinematic(layout)
+    motion = kinematic_parameters(layout)
     return [i for i in range(len(parameters.table(layout))) if i not in motion] if expected is _forces_in else motion
 
 
@@ -343,20 +350,22 @@ def _lanes(places: list[int], most: int) -> Iterator[list[int]]:
     return (places[first : first + most] for first in range(0, len(places), most))
 
 
-def bare(
+def noiseless_model(
     simulator: Simulator,
-    flight: Flight,
+    flight: GapFlight,
     record: FlightRecord,
     windows: Windows,
     axes: NDArray[np.bool_],
-    memory: Memory,
-) -> View:
+    memory: ObserverMemory,
+) -> ResidualModel:
     """A view that does not know its noise."""
     given, series = _given(simulator, record, memory)
-    return View(simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes)
+    return ResidualModel(
+        simulator, flight, record, given, windows, series, windows.transform(series), np.ones((1, 12)), axes
+    )
 
 
-def _given(simulator: Simulator, record: FlightRecord, memory: Memory) -> tuple[Given, Array]:
+def _given(simulator: Simulator, record: FlightRecord, memory: ObserverMemory) -> tuple[PredictionInputs, Array]:
     """What a prediction needs, padded, and the measured channels (N, 12)."""
     signals, short = signals_of(simulator, record), -len(record) % _BLOCK
     motion = motion_of(record)
@@ -365,7 +374,7 @@ def _given(simulator: Simulator, record: FlightRecord, memory: Memory) -> tuple[
     forces = _table(_reduced(simulator.model, signals, Accelerations(*shown)), len(record))
     read = jnp.zeros((len(shown), len(READINGS))) if motion is None else jnp.hstack([motion.air, motion.attitude])
     readings = np.asarray(read)[: len(record)]
-    given = Given(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
+    given = PredictionInputs(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
     return given, np.concatenate([forces, readings], axis=1)
 
 
@@ -380,4 +389,12 @@ def _padded(series: Scalar | Array, short: int) -> Scalar:
     return jnp.pad(jnp.asarray(series), [(0, short)] + [(0, 0)] * (series.ndim - 1), mode="edge")
 
 
-__all__ = ["CHANNELS", "COEFFICIENTS", "LONGEST", "Memory", "View", "bare", "kinematic"]
+__all__ = [
+    "CHANNELS",
+    "COEFFICIENTS",
+    "LONGEST_MEMORY",
+    "ObserverMemory",
+    "ResidualModel",
+    "kinematic_parameters",
+    "noiseless_model",
+]

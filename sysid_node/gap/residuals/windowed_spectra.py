@@ -20,19 +20,19 @@ Complex = NDArray[np.complex128]
 LENGTH = 8.0
 
 #: Lengths of a window that fit into the shortest flight.
-LEAST = 3.0
+LEAST_WINDOWS = 3.0
 
 #: What is left out at either end of a flight, s: late signals are made up there, by holding the first or last sample.
-EDGE = 0.25
+MARGIN = 0.25
 
 #: Highest line, Hz: beyond it, vanes and rigid-body dynamics have little to say.
-HIGHEST = 4.0
+HIGHEST_FREQUENCY = 4.0
 
 #: What each coefficient counts of an independent one.
-SHARE = 0.5
+INDEPENDENT_SHARE = 0.5
 
 #: Edges of the bands in which the residual's power is smoothed, Hz; the mean is a band of its own.
-EDGES = (0.0, 0.06, 0.3, 0.6, 1.0, 1.6, 2.4, HIGHEST + 0.1)
+BAND_EDGES = (0.0, 0.06, 0.3, 0.6, 1.0, 1.6, 2.4, HIGHEST_FREQUENCY + 0.1)
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,16 @@ class Windows:
     @classmethod
     def over(cls, samples: int, rate: float, length: float = LENGTH) -> Windows:
         """As many of about this length as fill so many samples without their ends."""
-        first = round(EDGE * rate)
+        first = round(MARGIN * rate)
         inner = samples - 2 * first
-        halves = max(2, round(2.0 * inner / min(length * rate, inner / LEAST)))
+        halves = max(2, round(2.0 * inner / min(length * rate, inner / LEAST_WINDOWS)))
         return cls(rate, 2 * (inner // halves), halves - 1, first)
 
     @property
     def frequencies(self) -> Array:
         """Lines (L,), Hz, from zero."""
         step = self.rate / self.size
-        lines: Array = np.asarray(np.arange(int(HIGHEST / step + 1e-9) + 1) * step, dtype=np.float64)
+        lines: Array = np.asarray(np.arange(int(HIGHEST_FREQUENCY / step + 1e-9) + 1) * step, dtype=np.float64)
         return lines
 
     @property
@@ -78,7 +78,7 @@ class Windows:
     @property
     def bands(self) -> NDArray[np.intp]:
         """Band of each line (L,)."""
-        return np.searchsorted(np.array(EDGES), self.frequencies, side="right") - 1
+        return np.searchsorted(np.array(BAND_EDGES), self.frequencies, side="right") - 1
 
     def transform(self, series: Array) -> Complex:
         """Amplitudes (W, L, ...) of a series (N, ...); the variance of white noise passes as it is per sample."""

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.candidates import TIMES
-from sysid_node.gap.estimation.fit import Fit, Projected, with_candidates
-from sysid_node.gap.estimation.nuisances import gusty
+from sysid_node.gap.estimation.candidates import TIME_EFFECTS
+from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, with_candidates
+from sysid_node.gap.estimation.nuisances import is_gusty
 from sysid_node.gap.estimation.predictive_density import Evidence, probabilities
-from sysid_node.gap.instruments.bayes_factor import advantage
-from sysid_node.gap.instruments.overidentification import structure_of
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
+from sysid_node.gap.instruments.overidentification import overidentification_of
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.candidate_fitter import Trial
@@ -59,7 +59,7 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     matters = _matters_in_gusts(without, trial) if _in_gusts(trial) else _matters(without, trial)
     if not np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)):
         return False
-    return advantage(trial.fit, without.fit) > _SURELY + _MANY
+    return log_bayes_factor(trial.fit, without.fit) > _SURELY + _MANY
 
 
 def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
@@ -71,7 +71,7 @@ def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
 
 def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     """The same, of forces and moments by what of the remainder is structure: the rest is weather."""
-    before, after = structure_of(without.fit, trial.fit), structure_of(trial.fit)
+    before, after = overidentification_of(without.fit, trial.fit), overidentification_of(trial.fit)
     scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
     gone = before.coherent - after.coherent
     structured = (gone > MATERIAL * before.coherent) & (gone * scale > NOTICED**2 * _motion(trial))
@@ -92,11 +92,11 @@ def _power_of_means(evidence: Evidence) -> Array:
 
 def _motion(trial: Trial) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
-    return np.asarray(sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.views))
+    return np.asarray(sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.models))
 
 
 def _in_gusts(trial: Trial) -> bool:
-    return any(gusty(view) for view in trial.fit.views)
+    return any(is_gusty(model) for model in trial.fit.models)
 
 
 def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
@@ -108,25 +108,25 @@ def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
     kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
     lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
     try:
-        points = Projected(lacking).points(lacking.values)
+        points = VariableProjection(lacking).points(lacking.values)
     except np.linalg.LinAlgError:
         return np.full(len(CHANNELS), np.inf)
     back, now, whole = (_powers(trial.fit, some) for some in (points, trial.fit.points, base.fit.points))
     return np.asarray(np.max((back - now) / np.maximum(whole, 1e-300), axis=0))
 
 
-def _powers(fit: Fit, points: Sequence[Array]) -> Array:
+def _powers(fit: CandidateFit, points: Sequence[Array]) -> Array:
     """Power (2, 12) that parameters leave of the flights, and without the means, beside which all else may be small."""
-    residuals = [view.residual(point) for view, point in zip(fit.views, points, strict=True)]
+    residuals = [model.residual(point) for model, point in zip(fit.models, points, strict=True)]
     swinging = [np.concatenate([0.0 * r[:, :1], r[:, 1:]], axis=1) for r in residuals]
     return np.array([sum(power_of(r) for r in some) for some in (residuals, swinging)])
 
 
 def _trifling(trial: Trial) -> bool:
     """Whether what was added is a time within one sample of the slowest topic: a matter of sampling."""
-    if trial.added is None or trial.added.effect not in TIMES:
+    if trial.added is None or trial.added.effect not in TIME_EFFECTS:
         return False
-    slowest = min(min(v.flight.actuator_rate, v.flight.air_rate) for v in trial.fit.views)
+    slowest = min(min(v.flight.actuator_rate, v.flight.air_rate) for v in trial.fit.models)
     return bool(abs(trial.fit.points[0][trial.added.indices[0]]) < 1.0 / slowest)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid_node.gap.estimation.candidates import BETWEEN, Candidate
-from sysid_node.gap.instruments.bayes_factor import advantage
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import accepted
 from sysid_node.gap.selection.candidate_fitter import Trial, Trier
 
@@ -61,7 +61,7 @@ def _place(
     rest = [c for c in pool if c.effect not in without.fit.effects]
     looks = trier.looks_upon([without], rest, lambda s, t: None)
     likely = looks[:_RIVALS] if others else []
-    late = [(t, look) for t, look in looks[len(likely) :] if {look[1].effect, candidate.effect} <= BETWEEN]
+    late = [(t, look) for t, look in looks[len(likely) :] if {look[1].effect, candidate.effect} <= RESPONSE_DELAYS]
     rivals = {t.added.label: t for _, t in trier.finish([*likely, *late], lambda s, t: None) if t.added}
     known = {} if others else {t.added.label: t for t in first if t.added}
     return Place(candidate, without, tuple({**known, **rivals}.values()))
@@ -75,6 +75,6 @@ def _replacement(base: Trial, chosen: Trial, places: Sequence[Place], barred: fr
         return max(needless, key=lambda trial: trial.evidence.total)
     new = [(p, t) for p in places for t in p.rivals if t.added is None or t.added.label not in barred]
     rivals = [t for p, t in new if accepted(base, p.without, t)]
-    ahead = {id(t): t.evidence.total - chosen.evidence.total + advantage(t.fit, chosen.fit) for t in rivals}
+    ahead = {id(t): t.evidence.total - chosen.evidence.total + log_bayes_factor(t.fit, chosen.fit) for t in rivals}
     best = max(rivals, key=lambda trial: ahead[id(trial)], default=None)
     return best if best is not None and ahead[id(best)] > _CLEARLY else None

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid_node.gap.estimation.nuisances import WIDENED
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.selection.misspecification import Adequacy
 
 #: Effects that work through the file's own derivatives, as other values of these: together they bend to much that is
 #: something else.
-PLIABLE = frozenset({WIDENED, "inertia_error", "mass_error", "cg_shift"})
+PLIABLE = frozenset({DERIVATIVE_ERROR, "inertia_error", "mass_error", "cg_shift"})
 
 #: Weights of a constant, of the logarithm of the nats, and of pliability (bench/gap_credence.py).
 WEIGHTS = (-4.02, 1.18, -1.12)

@@ -12,11 +12,11 @@ from typing import TypeVar
 import numpy as np
 
 from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate, bounds
-from sysid_node.gap.estimation.checkpoint import Steps
-from sysid_node.gap.estimation.fit import Fit, Projected, with_candidates
+from sysid_node.gap.estimation.checkpoint import Checkpoint
+from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, with_candidates
 from sysid_node.gap.estimation.nuisances import Nuisances
-from sysid_node.gap.estimation.predictive_density import Evidence, judged
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.predictive_density import Evidence, competing_evidence
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.onset import sought
 
 #: Of these, as many of one effect: it may act on several controls or coefficients.
@@ -35,7 +35,7 @@ _Result = TypeVar("_Result")
 class Trial:
     """A set of candidates fitted, and its evidence; ``added`` is what it has more than what it was tried upon."""
 
-    fit: Fit
+    fit: CandidateFit
     evidence: Evidence
     added: Candidate | None = None
 
@@ -45,13 +45,13 @@ class Trier:
     """Fits sets of candidates, the nuisances always along."""
 
     nuisances: Nuisances
-    steps: Steps
-    unseen: Sequence[View] = ()  # flights held out, and what is allowed for in each
+    steps: Checkpoint
+    unseen: Sequence[ResidualModel] = ()  # flights held out, and what is allowed for in each
     own: Sequence[Nuisances] = ()
     known: dict[frozenset[str], Trial] = field(default_factory=dict)  # by the labels of the set
     seen: dict[frozenset[str], dict[str, Look]] = field(default_factory=dict)  # upon such a set, by label
 
-    def trial(self, fit: Fit, candidates: Sequence[Candidate], look: Look | None = None) -> Trial:
+    def trial(self, fit: CandidateFit, candidates: Sequence[Candidate], look: Look | None = None) -> Trial:
         """A set of candidates fitted from where another fit stands; what is added to the set starts at its look."""
         _, added, start = look or (0.0, None, ())
         wanted = [*candidates, *([added] if added else [])]
@@ -60,7 +60,7 @@ class Trier:
             done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
             if added is not None and (moved := sought(done, added)) is not done:
                 done = self.steps.polished(moved)
-            self.known[labels] = Trial(done, judged(done, self.unseen, self.own))
+            self.known[labels] = Trial(done, competing_evidence(done, self.unseen, self.own))
         return replace(self.known[labels], added=added)
 
     def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
@@ -69,7 +69,7 @@ class Trier:
         fresh = [c for c in candidates if c.label not in seen]
 
         def work() -> dict[str, list[float]]:
-            problem = Projected(current.fit)
+            problem = VariableProjection(current.fit)
             looks = _spread(
                 lambda candidate: _first_look_or_none(current.fit, problem, candidate),
                 fresh,
@@ -166,7 +166,7 @@ def _spread(
     return done
 
 
-def _first_look_or_none(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
+def _first_look_or_none(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Look:
     """The first look; infinitely much is left where no numbers come of it."""
     try:
         return _first_look(fit, problem, candidate)
@@ -174,16 +174,16 @@ def _first_look_or_none(fit: Fit, problem: Projected, candidate: Candidate) -> L
         return np.inf, candidate, candidate.starts[0]
 
 
-def _first_look(fit: Fit, problem: Projected, candidate: Candidate) -> Look:
+def _first_look(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Look:
     """What is left after one Gauss-Newton step from the best start, of the candidate and of all that is known so far.
 
     What is known so far must be let move along: alone it has bent to hold the other's share, and would hide it.
     """
     if not candidate.indices:
         widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
-        problem = Projected(widened)
+        problem = VariableProjection(widened)
         return problem.deviance(problem.residual(widened.values)), candidate, ()
-    low, high = bounds(fit.views[0].simulator, (*fit.indices, *candidate.indices))
+    low, high = bounds(fit.models[0].simulator, (*fit.indices, *candidate.indices))
     best: Look = (np.inf, candidate, candidate.starts[0])
     look = problem.looking(candidate)
     for start in candidate.starts:

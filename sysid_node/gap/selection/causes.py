@@ -9,9 +9,9 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.estimation.fit import Fit
+from sysid_node.gap.estimation.fit import CandidateFit
 from sysid_node.gap.estimation.predictive_density import probabilities
-from sysid_node.gap.instruments.bayes_factor import advantage
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import accepted, power_left
 from sysid_node.gap.selection.alternatives import Place, refined
 from sysid_node.gap.selection.calibration import LIKELY, Grounds, prior
@@ -34,7 +34,7 @@ class Cause:
     taken: Array  # power (12,) that it takes away on flight not fitted, the other causes given
     alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
     grounds: Grounds
-    fit: Fit  # of the explanation that it was part of when it was weighed
+    fit: CandidateFit  # of the explanation that it was part of when it was weighed
     rivals: tuple[Trial, ...]  # what was tried in its stead
     without: Trial  # the explanation without it
     made_way: bool = False  # for a rival that can be believed
@@ -80,7 +80,7 @@ def believed(
 
 def _beside_its_twin(cause: Cause, chosen: Trial) -> Cause:
     """Without vanes a late IMU does what late commands do: each is as likely."""
-    inferred = any(view.flight.inferred for view in chosen.fit.views)
+    inferred = any(model.flight.inferred for model in chosen.fit.models)
     if not inferred or cause.candidate.effect not in _COMMANDS_CLOCK:
         return cause
     half = 0.5 * cause.share
@@ -100,7 +100,7 @@ def _instead(base: Trial, place: Place, cause: Cause, barred: frozenset[str]) ->
 def _grounds(trial: Trial, without: Trial, candidate: Candidate | None) -> Grounds:
     """What speaks for a candidate that a trial has more than another."""
     assert candidate is not None
-    return Grounds.of(candidate.effect, advantage(trial.fit, without.fit), adequacy_of(trial.fit, candidate))
+    return Grounds.of(candidate.effect, log_bayes_factor(trial.fit, without.fit), adequacy_of(trial.fit, candidate))
 
 
 def _cause(trier: Trier, chosen: Trial, place: Place, barred: frozenset[str]) -> Cause:
@@ -138,7 +138,7 @@ def _shares(sets: Sequence[Trial], others: Sequence[Trial]) -> Array:
     """
     predicted = probabilities([t.evidence.scores for t in (*sets, *others)])
     best = int(np.argmax(predicted[: len(sets)]))
-    ahead = np.array([advantage(sets[best].fit, t.fit) for t in others])
+    ahead = np.array([log_bayes_factor(sets[best].fit, t.fit) for t in others])
     foretold = np.zeros(predicted.size)
     lead = min(float(ahead.min(initial=0.0)), 0.0)
     foretold[best], foretold[len(sets) :] = np.exp(lead), np.exp(lead - ahead)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import Fit, real_rows, weights
+from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
 from sysid_node.gap.selection.candidate_fitter import Trial
 
 
@@ -28,10 +28,10 @@ def confusion_of(base: Trial, trials: Sequence[Trial]) -> Confusion:
     return Confusion(tuple(t.added.label for t in trials if t.added), table @ table.T)
 
 
-def _rows(fit: Fit, like: Fit) -> Array:
+def _rows(fit: CandidateFit, like: CandidateFit) -> Array:
     """What a fit leaves, weighted as another's remainder."""
     pieces = [
-        real_rows(view.residual(point), weights(view.windows, power)).ravel()
-        for view, point, power in zip(fit.views, fit.points, like.power, strict=True)
+        real_rows(model.residual(point), weights(model.windows, power)).ravel()
+        for model, point, power in zip(fit.models, fit.points, like.power, strict=True)
     ]
     return np.concatenate(pieces)

@@ -10,14 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from sysid_node.gap.estimation.candidates import BETWEEN, candidates_of
-from sysid_node.gap.estimation.checkpoint import Steps
-from sysid_node.gap.estimation.fit import Fit, blank, linearised
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, candidates_of
+from sysid_node.gap.estimation.checkpoint import Checkpoint
+from sysid_node.gap.estimation.fit import CandidateFit, linearised, unfitted
 from sysid_node.gap.estimation.nuisances import Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
-from sysid_node.gap.instruments.liml import unbiased
-from sysid_node.gap.instruments.overidentification import Structure, structure_left, structure_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.instruments.liml import liml_estimate
+from sysid_node.gap.instruments.overidentification import (
+    OveridentificationTest,
+    overidentification_of,
+    pooled_overidentification,
+)
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import accepted, likelier
 from sysid_node.gap.selection.candidate_fitter import Progress, Trial, Trier, likeliest, narrowed
 from sysid_node.gap.selection.causes import Cause, believed
@@ -33,16 +37,16 @@ class Attribution:
 
     base: Trial  # nuisances only
     chosen: Trial
-    corrected: Fit  # chosen, its unknowns as gusts do not bias them
-    before: Structure  # of what the nuisances leave
-    left: Structure  # of what the chosen effects leave
+    corrected: CandidateFit  # chosen, its unknowns as gusts do not bias them
+    before: OveridentificationTest  # of what the nuisances leave
+    left: OveridentificationTest  # of what the chosen effects leave
     causes: tuple[Cause, ...]
     doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
     table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     trials: tuple[Trial, ...] = field(default=())  # of the first stage
-    unseen: tuple[View, ...] = ()  # flights held out, and what is allowed for in each
+    unseen: tuple[ResidualModel, ...] = ()  # flights held out, and what is allowed for in each
     own: tuple[Nuisances, ...] = ()
-    beside: Fit | None = None  # what the sizes are from, where the corrected fit has the file's derivatives
+    beside: CandidateFit | None = None  # what the sizes are from, where the corrected fit has the file's derivatives
 
     @property
     def filed(self) -> bool:
@@ -50,18 +54,18 @@ class Attribution:
         return self.beside is not None
 
     @property
-    def sized(self) -> Fit:
+    def sized(self) -> CandidateFit:
         """The fit that sizes and their errors are from."""
         return self.beside or self.corrected
 
     def as_filed(self) -> Attribution:
         """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
-        neutral = tuple(view.simulator.neutral() for view in self.base.fit.views)
+        neutral = tuple(model.simulator.neutral() for model in self.base.fit.models)
         return replace(self, corrected=linearised(replace(self.base.fit, points=neutral)))
 
     def beside_the_file(self) -> Attribution:
         """The causes beside the file's own derivatives: where those that were fitted predict worse."""
-        fit, neutral = self.corrected, self.corrected.views[0].simulator.neutral()
+        fit, neutral = self.corrected, self.corrected.models[0].simulator.neutral()
         own, points = [*fit.indices, *fit.widened], tuple(neutral.copy() for _ in fit.points)
         for point, found in zip(points, fit.points, strict=True):
             point[own] = found[own]
@@ -76,28 +80,28 @@ class Attribution:
         """Without the cause that is the least probable."""
         weakest = min(self.causes, key=lambda cause: cause.probability)
         fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
-        return replace(self, chosen=weakest.without, corrected=unbiased(fit), beside=None,
-                       left=structure_left(fit, self.unseen, self.own), causes=causes)  # fmt: skip
+        return replace(self, chosen=weakest.without, corrected=liml_estimate(fit), beside=None,
+                       left=pooled_overidentification(fit, self.unseen, self.own), causes=causes)  # fmt: skip
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
-        corrected = unbiased(self.base.fit)
+        corrected = liml_estimate(self.base.fit)
         return replace(self, chosen=self.base, corrected=corrected, beside=None,
-                       left=structure_left(self.base.fit, self.unseen, self.own), causes=())  # fmt: skip
+                       left=pooled_overidentification(self.base.fit, self.unseen, self.own), causes=())  # fmt: skip
 
 
 def attribute(
-    views: Sequence[View],
+    models: Sequence[ResidualModel],
     nuisances: Nuisances,
     progress: Progress,
-    steps: Steps | None = None,
-    unseen: Sequence[View] = (),
+    steps: Checkpoint | None = None,
+    unseen: Sequence[ResidualModel] = (),
     own: Sequence[Nuisances] = (),
 ) -> Attribution:
     """Fits everything that has to be, and chooses; flights held out, with ``own`` nuisances, have a say but no fit."""
-    candidates, trier = candidates_of(views[0].simulator, views), Trier(nuisances, steps or Steps(), unseen, own)
+    candidates, trier = candidates_of(models[0].simulator, models), Trier(nuisances, steps or Checkpoint(), unseen, own)
     progress(0.0, "derivatives within their tolerances")
-    base = trier.trial(blank(views, nuisances), [])
+    base = trier.trial(unfitted(models, nuisances), [])
     chosen, stages, frontier = base, [], [base]
     for count, (width, most) in enumerate(_STAGES):
         looks = trier.looks_upon(frontier[:width], candidates, _share_of(progress, count))
@@ -109,10 +113,10 @@ def attribute(
             break
         chosen, frontier = better[0], better
     progress(0.8, "whether another effect would do as well")
-    late = [candidate for candidate in candidates if candidate.effect in BETWEEN]
+    late = [candidate for candidate in candidates if candidate.effect in RESPONSE_DELAYS]
     chosen, causes, doubted = believed(trier, base, chosen, stages, late)
-    before, left = structure_of(base.fit, chosen.fit), structure_left(chosen.fit, unseen, own)
-    ranked, corrected = _ranked(base, stages[0]), unbiased(chosen.fit)
+    before, left = overidentification_of(base.fit, chosen.fit), pooled_overidentification(chosen.fit, unseen, own)
+    ranked, corrected = _ranked(base, stages[0]), liml_estimate(chosen.fit)
     found = Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
     return replace(found, unseen=tuple(unseen), own=tuple(own))
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.estimation.fit import Fit, real_rows, weights
-from sysid_node.gap.residuals.residual_model import CHANNELS, View
+from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 
 #: Power of a contribution to a channel, in noise levels, below which nothing can be said of it.
 _SEEN = 20.0
@@ -34,19 +34,19 @@ class Adequacy:
     deviations: Array  # how many standard deviations that lies above chance
 
 
-def adequacy_of(fit: Fit, candidate: Candidate) -> Adequacy:
+def adequacy_of(fit: CandidateFit, candidate: Candidate) -> Adequacy:
     """Of one of a fit's candidates, over its flights, all its unknowns left free to move."""
     done, found, size = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     assert fit.information is not None
-    for view, point, power, rows, slopes in zip(fit.views, fit.points, fit.power, fit.rows, fit.slopes, strict=True):
-        weight = weights(view.windows, power)
-        weight[[0, view.windows.frequencies.size]] = 0.0  # without means
+    for model, point, power, rows, slopes in zip(fit.models, fit.points, fit.power, fit.rows, fit.slopes, strict=True):
+        weight = weights(model.windows, power)
+        weight[[0, model.windows.frequencies.size]] = 0.0  # without means
         parts = rows.reshape(rows.shape[0], -1, len(CHANNELS))
         unknowns = slopes.reshape(*parts.shape, slopes.shape[2])
-        contribution = _contribution(view, point, candidate)
-        for axis in np.flatnonzero(view.axes & (contribution.std(axis=0) > 0.0)):
+        contribution = _contribution(model, point, candidate)
+        for axis in np.flatnonzero(model.axes & (contribution.std(axis=0) > 0.0)):
             own, kept = contribution[:, axis], (weight[:, axis] > 0.0)
-            whole, *added = (_rows(view, x, weight[:, axis]) for x in (own, *_modulated(own, view.record.time)))
+            whole, *added = (_rows(model, x, weight[:, axis]) for x in (own, *_modulated(own, model.record.time)))
             if whole @ whole < _SEEN:
                 continue
             J = (unknowns[:, :, axis] * kept[:, None]).reshape(-1, slopes.shape[2])
@@ -57,11 +57,11 @@ def adequacy_of(fit: Fit, candidate: Candidate) -> Adequacy:
     return Adequacy(done, np.maximum(beyond, 0.0), beyond / np.sqrt(2.0 * np.maximum(size, 1.0)))
 
 
-def _contribution(view: View, point: Array, candidate: Candidate) -> Array:
+def _contribution(model: ResidualModel, point: Array, candidate: Candidate) -> Array:
     """What the candidate adds to the channels (N, 12)."""
     without, entries = point.copy(), list(candidate.entries)
-    without[entries] = view.simulator.neutral()[entries]
-    return view.predicted_series(point) - view.predicted_series(without)
+    without[entries] = model.simulator.neutral()[entries]
+    return model.predicted_series(point) - model.predicted_series(without)
 
 
 def _modulated(own: Array, time: Array) -> list[Array]:
@@ -70,9 +70,9 @@ def _modulated(own: Array, time: Array) -> list[Array]:
     return [np.abs(swing), own * np.abs(own) / own.std(), own * late / late.std()]
 
 
-def _rows(view: View, series: Array, weight: Array) -> Array:
+def _rows(model: ResidualModel, series: Array, weight: Array) -> Array:
     """A series (N,) as weighted real rows (R,) of one channel."""
-    return real_rows(view.windows.transform(series[:, None]), weight[:, None]).ravel()
+    return real_rows(model.windows.transform(series[:, None]), weight[:, None]).ravel()
 
 
 def _explained(added: Array, remainder: Array, slopes: Array, information: Array) -> float:

@@ -12,9 +12,9 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate, bounds
-from sysid_node.gap.estimation.fit import Fit, Projected, linearised
-from sysid_node.gap.estimation.nuisances import gusty
-from sysid_node.gap.instruments.overidentification import commands, equations, within_limits
+from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, linearised
+from sysid_node.gap.estimation.nuisances import is_gusty
+from sysid_node.gap.instruments.overidentification import command_instruments, limited_step, moment_equations
 
 #: Steps between times that are tried, s, and how far about the best the finer ones reach, s.
 _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
@@ -23,15 +23,15 @@ _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
 _GRAIN = 0.5
 
 
-def sought(fit: Fit, candidate: Candidate) -> Fit:
+def sought(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     """The fit with the onset of one of its candidates where it leaves least; as it was where that is best."""
-    names = fit.views[0].simulator.names
+    names = fit.models[0].simulator.names
     places = [fit.indices.index(i) for i in candidate.indices if names[i].endswith(".onset")]
     if not places:
         return fit
-    problem, place = Projected(fit), places[0]
+    problem, place = VariableProjection(fit), places[0]
     best = (problem.deviance(problem.residual(fit.values)), fit.values)
-    end = max(float(view.record.duration) for view in fit.views)
+    end = max(float(model.record.duration) for model in fit.models)
     best = _best(problem, best, place, np.arange(0.0, end, _COARSE))
     best = _best(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
     values = best[1]
@@ -43,48 +43,48 @@ def sought(fit: Fit, candidate: Candidate) -> Fit:
     return replace(fit, points=points)
 
 
-def uncertainty(fit: Fit, place: int) -> float:
+def uncertainty(fit: CandidateFit, place: int) -> float:
     """How far (s, rms) the time at this place of the values may be from where it stands, by all times' likelihood.
 
     A surface that rests tells nothing of when it failed, but that it did before it moved again; in moving air, at rest
     is what only an autopilot moves, for it moves it with the gusts.
     """
-    moving = any(gusty(view) for view in fit.views)
+    moving = any(is_gusty(model) for model in fit.models)
     grain = _COARSE if moving else _GRAIN
-    times = np.arange(0.0, max(float(view.record.duration) for view in fit.views), grain)
+    times = np.arange(0.0, max(float(model.record.duration) for model in fit.models), grain)
     if moving:
         deviance = np.array([_foretold(fit, place, float(time)) for time in times])
     else:
-        problem = Projected(fit)
+        problem = VariableProjection(fit)
         deviance = np.array([_at(problem, fit.values, place, float(time))[0] for time in times])
     weight = np.exp(-0.5 * (deviance - deviance.min()))
     return float(np.sqrt(np.average((times - fit.values[place]) ** 2, weights=weight) + grain**2 / 12.0))
 
 
-def _foretold(fit: Fit, place: int, time: float) -> float:
+def _foretold(fit: CandidateFit, place: int, time: float) -> float:
     """What of the remainder the commands foretell with an onset at a time, all else at its best, in noise levels."""
     points = tuple(point.copy() for point in fit.points)
     for point in points:
         point[fit.indices[place]] = time
     there = linearised(replace(fit, points=points))
-    seen = equations(there, fit.power, commands)
-    step = within_limits(seen, there)
+    seen = moment_equations(there, fit.power, command_instruments)
+    step = limited_step(seen, there)
     return float(seen.constant - 2.0 * seen.right @ step + step @ seen.information @ step)
 
 
-def _best(problem: Projected, known: tuple[float, Array], place: int, times: Array) -> tuple[float, Array]:
+def _best(problem: VariableProjection, known: tuple[float, Array], place: int, times: Array) -> tuple[float, Array]:
     """The deviance and parameters of the best of these times, or what is known so far."""
     tried = (_at(problem, known[1], place, float(time)) for time in times)
     return min((known, *tried), key=lambda pair: pair[0])
 
 
-def _at(problem: Projected, values: Array, place: int, time: float) -> tuple[float, Array]:
+def _at(problem: VariableProjection, values: Array, place: int, time: float) -> tuple[float, Array]:
     """Deviance with an onset at a time, and the parameters after one Gauss-Newton step of all others."""
     there = values.copy()
     there[place] = time
     slopes = problem.jacobian(there)
     slopes[:, place] = 0.0
-    low, high = bounds(problem.fit.views[0].simulator, problem.indices)
+    low, high = bounds(problem.fit.models[0].simulator, problem.indices)
     stepped = np.clip(there + np.linalg.lstsq(slopes, -problem.residual(there), rcond=None)[0], low, high)
     stepped[place] = time
     return min(((problem.deviance(problem.residual(v)), v) for v in (there, stepped)), key=lambda pair: pair[0])

@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from sysid_node.gap.estimation.nuisances import Nuisances
-from sysid_node.gap.estimation.predictive_density import Evidence, groups_of, held_out
-from sysid_node.gap.instruments.liml import unbiased
-from sysid_node.gap.instruments.overidentification import Structure
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.predictive_density import Evidence, held_out_evidence, window_groups
+from sysid_node.gap.instruments.liml import liml_estimate
+from sysid_node.gap.instruments.overidentification import OveridentificationTest
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation import spectral_error
 from sysid_node.gap.validation.kfold import parted
@@ -23,9 +23,9 @@ from sysid_node.gap.validation.spectral_error import Gap
 
 @dataclass(frozen=True)
 class Check:
-    """Evidence of the derivatives alone and of the whole explanation, and the gap, on ``views``."""
+    """Evidence of the derivatives alone and of the whole explanation, and the gap, on ``models``."""
 
-    views: tuple[View, ...]
+    models: tuple[ResidualModel, ...]
     base: Evidence
     final: Evidence
     gap: Gap  # of forces, moments and kinematics by frequency
@@ -41,28 +41,30 @@ class Check:
         """By either measure."""
         return [self.gap, *([self.flown] if self.flown else [])]
 
-    def as_filed(self, left: Structure) -> Check:
+    def as_filed(self, left: OveridentificationTest) -> Check:
         """The same of the aircraft file as it is."""
-        before = tuple(v.residual(v.simulator.neutral()) for v in self.views)
-        filed = tuple((v.simulator.neutral(),) * len(groups_of(v)) for v in self.views)
+        before = tuple(v.residual(v.simulator.neutral()) for v in self.models)
+        filed = tuple((v.simulator.neutral(),) * len(window_groups(v)) for v in self.models)
         base = replace(self.base, residuals=before, points=filed)
-        return replace(self, base=base, final=base, gap=spectral_error.gap_of(self.views, before, base, base, left))
+        return replace(self, base=base, final=base, gap=spectral_error.gap_of(self.models, before, base, base, left))
 
 
-def check(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> Check:
+def check(attribution: Attribution, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]) -> Check:
     """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
     if unseen:
-        base, final = (held_out(f, unseen, own) for f in (unbiased(attribution.base.fit), attribution.corrected))
+        base, final = (
+            held_out_evidence(f, unseen, own) for f in (liml_estimate(attribution.base.fit), attribution.corrected)
+        )
     else:
-        base = parted(attribution.base.evidence, unbiased(attribution.base.fit))
+        base = parted(attribution.base.evidence, liml_estimate(attribution.base.fit))
         final = parted(attribution.chosen.evidence, attribution.corrected, filed=attribution.filed)
-    views = base.views
-    before = [v.residual(v.simulator.neutral()) for v in views]
-    return Check(views, base, final, spectral_error.gap_of(views, before, base, final, attribution.left))
+    models = base.models
+    before = [v.residual(v.simulator.neutral()) for v in models]
+    return Check(models, base, final, spectral_error.gap_of(models, before, base, final, attribution.left))
 
 
 def settled(
-    attribution: Attribution, views: Sequence[View], unseen: Sequence[View], own: Sequence[Nuisances]
+    attribution: Attribution, models: Sequence[ResidualModel], unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
     """What flight not fitted leaves of an explanation.
 
@@ -72,7 +74,7 @@ def settled(
     frequency.)
     """
     with ThreadPoolExecutor(1) as pool:
-        weather = pool.submit(foreseen, [*views, *unseen])
+        weather = pool.submit(foreseen, [*models, *unseen])
         attribution, checked = _standing(attribution, unseen, own)
     if weather.result():
         attribution = attribution.without_causes().as_filed()
@@ -83,7 +85,9 @@ def settled(
     return attribution, checked
 
 
-def _standing(attribution: Attribution, unseen: Sequence[View], own: Sequence[Nuisances]) -> tuple[Attribution, Check]:
+def _standing(
+    attribution: Attribution, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
+) -> tuple[Attribution, Check]:
     """What of an explanation stands, and what flight not fitted says of it.
 
     The first that predicts better: all causes; the same with sizes as least squares has them; without the least
@@ -119,7 +123,7 @@ def _better(checked: Check) -> bool:
 
 
 def _beside_the_file(
-    attribution: Attribution, checked: Check, unseen: Sequence[View], own: Sequence[Nuisances]
+    attribution: Attribution, checked: Check, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
     """The causes beside the file's own derivatives, where these do better than the derivatives that were fitted."""
     explanation = attribution.beside_the_file()
@@ -129,6 +133,6 @@ def _beside_the_file(
         return attribution, checked
     if not found.gaps[-1].after < checked.gaps[-1].after:
         return attribution, checked
-    before, filed = [v.residual(v.simulator.neutral()) for v in found.views], found.as_filed(attribution.left)
-    gap = spectral_error.gap_of(found.views, before, filed.base, found.final, attribution.left)
+    before, filed = [v.residual(v.simulator.neutral()) for v in found.models], found.as_filed(attribution.left)
+    gap = spectral_error.gap_of(found.models, before, filed.base, found.final, attribution.left)
     return explanation, replace(found, base=replace(filed.base, scores=found.base.scores), gap=gap)

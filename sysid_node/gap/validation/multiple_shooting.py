@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.residuals.flight_path_reconstruction import Motion, Sample, rates_of_change, undone
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.residuals.flight_path_reconstruction import Motion, Sample, corrected_motion, rates_of_change
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import body as rigid
 from sysid_node.sim.body import Vector
 from sysid_node.sim.flying.rollout import Carry, Pilot, advance, begin
@@ -68,7 +68,7 @@ class Beside(NamedTuple):
 def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Beside:
     """The simulator of parameters (P,) beside a flight; pure."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
-    samples = undone(chain, course.motion)
+    samples = corrected_motion(chain, course.motion)
     arriving = command.arrive(chain.effects, course.commands, step)
     air = _air(samples, course.begins, step)
     gusts = jnp.concatenate([air + course.moving, course.turning], axis=1)
@@ -137,9 +137,9 @@ def _previous(series: Scalar) -> Scalar:
     return jnp.concatenate([series[:1], series[:-1]])
 
 
-def course_of(view: View, size: int) -> Course:
+def course_of(model: ResidualModel, size: int) -> Course:
     """A view's flight, begun anew every ``size`` samples; padded as the view's signals are."""
-    given = view.given
+    given = model.given
     altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
     begins = jnp.arange(altitude.size) % size == 0
     still = jnp.zeros((altitude.size, 3))
@@ -147,17 +147,17 @@ def course_of(view: View, size: int) -> Course:
     return Course(given.motion, given.signals.commands, altitude, still, still, begins)
 
 
-def beside(view: View, theta: Array, course: Course) -> tuple[Array, Array, Array]:
+def beside(model: ResidualModel, theta: Array, course: Course) -> tuple[Array, Array, Array]:
     """Simulated (N, 12), measured (N, 12) and the air's motion (N, 3), as ``Beside`` has them, for parameters (P,)."""
-    s, samples = view.simulator, len(view.record)
+    s, samples = model.simulator, len(model.record)
     flown = fly(s.layout, s.model, jnp.asarray(theta), course, jnp.asarray(s.step))
     simulated, measured, air = (np.asarray(series)[:samples] for series in flown)
     return simulated, measured, air
 
 
-def off(view: View, theta: Array, course: Course) -> Array:
+def off(model: ResidualModel, theta: Array, course: Course) -> Array:
     """Measured minus simulated (N, 12); angles within half a turn."""
-    simulated, measured, _ = beside(view, theta, course)
+    simulated, measured, _ = beside(model, theta, course)
     error: Array = measured - simulated
     error[:, _ANGLES] = (error[:, _ANGLES] + np.pi) % (2.0 * np.pi) - np.pi
     return error

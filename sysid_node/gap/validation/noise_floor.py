@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.flightdata.gap_flight import thinned
-from sysid_node.gap.residuals.build import noisier
+from sysid_node.gap.flightdata.gap_flight import resampled
+from sysid_node.gap.residuals.build import with_added_noise
 from sysid_node.gap.residuals.flight_path_reconstruction import Motion
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.multiple_shooting import Course, beside, off
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import Dryden
@@ -33,45 +33,45 @@ _HEIGHT = 100.0
 _CLOCKS = ("imu_delay.delay", "air_data_delay.delay")
 
 
-def unavoidable(view: View, theta: Array, course: Course, seed: int = 0) -> Iterator[tuple[Array, Array]]:
+def unavoidable(model: ResidualModel, theta: Array, course: Course, seed: int = 0) -> Iterator[tuple[Array, Array]]:
     """Errors (N, 12) of a few flights of parameters (P,), and the sensors' noise (N, 12) that was added."""
     random, prompt = np.random.default_rng(seed), theta.copy()
-    prompt[[view.simulator.names.index(name) for name in _CLOCKS]] = 0.0
-    _, _, shown = beside(view, theta, course)
+    prompt[[model.simulator.names.index(name) for name in _CLOCKS]] = 0.0
+    _, _, shown = beside(model, theta, course)
     for _ in range(_REALISATIONS):
-        again = thinned(noisier(view, random), view.simulator.rate)
-        added = {n: values - view.record[n] for n, values in again.columns.items()}
-        noise = np.column_stack([added.get(name, np.zeros(len(view.record))) for name in OUTPUTS])
-        moving, turning = _hidden_air(view, course, shown, noise, random)
-        own, _, _ = beside(view, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning)))
-        yield off(view, prompt, _recorded(view, course, own - _unseen(view, moving) + noise, added)), noise
+        again = resampled(with_added_noise(model, random), model.simulator.rate)
+        added = {n: values - model.record[n] for n, values in again.columns.items()}
+        noise = np.column_stack([added.get(name, np.zeros(len(model.record))) for name in OUTPUTS])
+        moving, turning = _hidden_air(model, course, shown, noise, random)
+        own, _, _ = beside(model, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning)))
+        yield off(model, prompt, _recorded(model, course, own - _unseen(model, moving) + noise, added)), noise
 
 
 def _hidden_air(
-    view: View, course: Course, shown: Array, noise: Array, random: np.random.Generator
+    model: ResidualModel, course: Course, shown: Array, noise: Array, random: np.random.Generator
 ) -> tuple[Array, Array]:
     """Velocity (m/s) and rotation (rad/s) of the air, (N, 3) each along body axes, that the air data do not show.
 
     Turbulence (``sim.dryden``) as strong as the air data show that there is, (N, 3) m/s. What counts is motion within a
     short flight: slower air does not turn. The air data's noise moves no air.
     """
-    model, speed = Dryden.at(_HEIGHT, view.simulator.aircraft.geometry.b), float(view.record["V"].mean())
-    gusts = model.realisation(course.altitude.size, view.simulator.rate, speed, random)
+    dryden, speed = Dryden.at(_HEIGHT, model.simulator.aircraft.geometry.b), float(model.record["V"].mean())
+    gusts = dryden.realisation(course.altitude.size, model.simulator.rate, speed, random)
     begins = np.asarray(course.begins)
     origin = np.maximum.accumulate(np.where(begins, np.arange(begins.size), 0))
-    seen = slice(0, 1) if view.flight.inferred else slice(1, 3)
+    seen = slice(0, 1) if model.flight.inferred else slice(1, 3)
     usual = _power((gusts - gusts[origin])[:, seen])
     read = noise[:, [OUTPUTS.index(name) for name in ("V", "beta", "alpha")]] * [1.0, speed, speed]
     moved = max(_power(shown[:, seen]) - _power((read - read[origin[: len(read)]])[:, seen]), 0.0)
     gusts *= np.sqrt(moved / usual)
-    across = [float(name in view.flight.inferred) for name in ("V", "beta", "alpha")]
+    across = [float(name in model.flight.inferred) for name in ("V", "beta", "alpha")]
     return gusts[:, :3] * across, gusts[:, 3:]
 
 
-def _unseen(view: View, moving: Array) -> Array:
+def _unseen(model: ResidualModel, moving: Array) -> Array:
     """What air that moves so (N, 3) does to readings (N, 12) of the flow angles, and what no vane reads."""
-    angles = np.zeros((len(view.record), len(OUTPUTS)))
-    angles[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]] = -moving[: len(angles), 1:] / view.record["V"][:, None]
+    angles = np.zeros((len(model.record), len(OUTPUTS)))
+    angles[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]] = -moving[: len(angles), 1:] / model.record["V"][:, None]
     return angles
 
 
@@ -79,10 +79,10 @@ def _power(velocity: Array) -> float:
     return float((velocity**2).sum(axis=1).mean())
 
 
-def _recorded(view: View, course: Course, readings: Array, noise: dict[str, Array]) -> Course:
+def _recorded(model: ResidualModel, course: Course, readings: Array, noise: dict[str, Array]) -> Course:
     """Readings (N, 12) as the instruments would have recorded them, with the commands as noisy as the flight's."""
-    turning = _rates_of_change(readings[:, 3:6], np.asarray(course.begins), view.simulator.step)
-    symbols = [*view.simulator.layout.symbols, *(["thrust"] if view.simulator.aircraft.throttle else [])]
+    turning = _rates_of_change(readings[:, 3:6], np.asarray(course.begins), model.simulator.step)
+    symbols = [*model.simulator.layout.symbols, *(["thrust"] if model.simulator.aircraft.throttle else [])]
     commands = np.asarray(course.commands).copy()
     commands[: len(readings), : len(symbols)] += np.column_stack([noise[s] for s in symbols])
     short = course.altitude.size - len(readings)

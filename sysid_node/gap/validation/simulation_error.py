@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.predictive_density import Evidence, groups_of
+from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.multiple_shooting import Course, beside, course_of, off
 from sysid_node.gap.validation.noise_floor import unavoidable
 from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
@@ -61,14 +61,14 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
 
     None without attitude, where no flight is long enough, or where the simulator departs within a short flight.
     """
-    found = zip(final.views, base.points, final.points, strict=True)
+    found = zip(final.models, base.points, final.points, strict=True)
     tables = [_table(*parts) for parts in found if shows(parts[0])]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return None
     motion, noise, *errors = np.concatenate(tables, axis=1)
-    lateral = all(view.flight.lateral for view in final.views)
-    unread = {angle for view in final.views for angle in view.flight.inferred}
-    unread |= thrust.READINGS if any(not view.flight.metered for view in final.views) else set()
+    lateral = all(model.flight.lateral for model in final.models)
+    unread = {angle for model in final.models for angle in model.flight.inferred}
+    unread |= thrust.THRUST_READINGS if any(not model.flight.metered for model in final.models) else set()
     counted = np.array([(lateral or name in _LONGITUDINAL) and name not in unread for name in READINGS])
     counted &= motion.mean(axis=0) > _MOVED * noise.mean(axis=0)
     if not counted.any():
@@ -76,29 +76,29 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
     return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
 
 
-def foreseen(views: Sequence[View]) -> bool:
+def foreseen(models: Sequence[ResidualModel]) -> bool:
     """Whether the file's own simulator, in such air and with such sensors, would be off as far in every reading.
 
     Then there is nothing to blame, however well an effect would mimic the weather.
     """
-    tables = [_table(v, *[[v.simulator.neutral()] * len(groups_of(v))] * 2) for v in views if shows(v)]
+    tables = [_table(v, *[[v.simulator.neutral()] * len(window_groups(v))] * 2) for v in models if shows(v)]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
     _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
     return bool((before <= BY_CHANCE**2 * np.mean(floors, axis=0)).all())
 
 
-def shows(view: View) -> bool:
+def shows(model: ResidualModel) -> bool:
     """Whether a flight can be flown beside: its attitude was measured, and it is long enough."""
-    return motion_of(view.record) is not None and len(view.record) >= _size(view)
+    return motion_of(model.record) is not None and len(model.record) >= _size(model)
 
 
-def drawn(view: View, points: Sequence[Array]) -> Drawn:
+def drawn(model: ResidualModel, points: Sequence[Array]) -> Drawn:
     """A flight with the file's simulator and the corrected one beside it; ``points`` by group of windows."""
-    course, neutral = course_of(view, _size(view)), view.simulator.neutral()
-    _, measured, _ = beside(view, neutral, course)
-    before, after = (measured - e for e in (off(view, neutral, course), _errors(view, points, course)))
-    return Drawn(view.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
+    course, neutral = course_of(model, _size(model)), model.simulator.neutral()
+    _, measured, _ = beside(model, neutral, course)
+    before, after = (measured - e for e in (off(model, neutral, course), _errors(model, points, course)))
+    return Drawn(model.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
 
 
 def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
@@ -139,31 +139,31 @@ def _blocks(count: int, random: np.random.Generator) -> NDArray[np.intp]:
     return np.asarray((starts[..., None] + np.arange(size)).reshape(_DRAWS, -1)[:, :count] % count)
 
 
-def _table(view: View, base: Sequence[Array], final: Sequence[Array]) -> Array:
+def _table(model: ResidualModel, base: Sequence[Array], final: Sequence[Array]) -> Array:
     """Mean squares (5 + K, S, R) by short flight.
 
     Of the motion, of the sensors' noise, of the errors of the file, of the derivatives within their tolerances and with
     the causes, and of what is left of each of K flights of the simulator itself.
     """
-    course, neutral = course_of(view, _size(view)), view.simulator.neutral()
-    measured = _cut(view, beside(view, neutral, course)[1])
-    errors = [_squares(view, _errors(view, points, course)) for points in ([neutral] * len(base), base, final)]
-    floors, noise = zip(*unavoidable(view, final[len(final) // 2], course), strict=True)
+    course, neutral = course_of(model, _size(model)), model.simulator.neutral()
+    measured = _cut(model, beside(model, neutral, course)[1])
+    errors = [_squares(model, _errors(model, points, course)) for points in ([neutral] * len(base), base, final)]
+    floors, noise = zip(*unavoidable(model, final[len(final) // 2], course), strict=True)
     motion = ((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
-    sensors = np.mean([_squares(view, each) for each in noise], axis=0)
-    return np.stack([motion, sensors, *errors, *(_squares(view, floor) for floor in floors)])
+    sensors = np.mean([_squares(model, each) for each in noise], axis=0)
+    return np.stack([motion, sensors, *errors, *(_squares(model, floor) for floor in floors)])
 
 
-def _errors(view: View, points: Sequence[Array], course: Course) -> Array:
+def _errors(model: ResidualModel, points: Sequence[Array], course: Course) -> Array:
     """Measured minus simulated (N, 12), each short flight with the parameters that it was not fitted to."""
-    size, windows = _size(view), view.windows
-    edges = [windows.slices[group[0]].start + windows.size / 4 for group in groups_of(view)][1:]
-    middles = np.arange(len(view.record)) // size * size + size // 2
+    size, windows = _size(model), model.windows
+    edges = [windows.slices[group[0]].start + windows.size / 4 for group in window_groups(model)][1:]
+    middles = np.arange(len(model.record)) // size * size + size // 2
     owner = np.searchsorted(np.array(edges), middles, side="right")
-    error = np.empty((len(view.record), len(OUTPUTS)))
+    error = np.empty((len(model.record), len(OUTPUTS)))
     for mine, theta in _distinct(points):
         chosen = np.isin(owner, mine)
-        error[chosen] = off(view, theta, course)[chosen]
+        error[chosen] = off(model, theta, course)[chosen]
     return error
 
 
@@ -175,18 +175,18 @@ def _distinct(points: Sequence[Array]) -> list[tuple[list[int], Array]]:
     return [(own, points[own[0]]) for own in places.values()]
 
 
-def _size(view: View) -> int:
+def _size(model: ResidualModel) -> int:
     """Samples of a short flight."""
-    return round(WINDOW * view.simulator.rate)
+    return round(WINDOW * model.simulator.rate)
 
 
-def _cut(view: View, series: Array) -> Array:
+def _cut(model: ResidualModel, series: Array) -> Array:
     """A series (N, 12) by short flight (S, samples, R)."""
-    size = _size(view)
+    size = _size(model)
     count = len(series) // size
     return np.asarray(series[: count * size, _COLUMNS].reshape(count, size, len(_COLUMNS)))
 
 
-def _squares(view: View, series: Array) -> Array:
+def _squares(model: ResidualModel, series: Array) -> Array:
     """Mean squares (S, R) of a series (N, 12) by short flight."""
-    return np.asarray((_cut(view, series) ** 2).mean(axis=1))
+    return np.asarray((_cut(model, series) ** 2).mean(axis=1))

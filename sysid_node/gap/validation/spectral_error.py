@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.predictive_density import Evidence, groups_of
-from sysid_node.gap.instruments.overidentification import Structure
-from sysid_node.gap.residuals.residual_model import CHANNELS, View
+from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
+from sysid_node.gap.instruments.overidentification import OveridentificationTest
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex, power_of
 
 #: A channel counts where its own power is so many times the sensors' noise.
@@ -44,13 +44,19 @@ class Gap:
     intervals: dict[str, Interval]  # of the four errors, by name
 
 
-def gap_of(views: Sequence[View], before: Sequence[Complex], base: Evidence, after: Evidence, left: Structure) -> Gap:
+def gap_of(
+    models: Sequence[ResidualModel],
+    before: Sequence[Complex],
+    base: Evidence,
+    after: Evidence,
+    left: OveridentificationTest,
+) -> Gap:
     """The gap on flights not fitted, from their residuals (W, L, 12) as the file has it, then as fitted."""
-    groups = [(i, group) for i, view in enumerate(views) for group in groups_of(view)]
-    measured = np.array([(np.abs(views[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
-    noise = np.array([len(g) * (views[i].noise.sum(axis=0) - 0.5 * views[i].noise[0]) for i, g in groups])
+    groups = [(i, group) for i, model in enumerate(models) for group in window_groups(model)]
+    measured = np.array([(np.abs(models[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
+    noise = np.array([len(g) * (models[i].noise.sum(axis=0) - 0.5 * models[i].noise[0]) for i, g in groups])
     stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
-    counted = views[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
+    counted = models[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
 
     def errors(weight: Array, share: Array) -> Array:
         """Overall errors (4,) at weights (G,) of the groups, where such a share (12,) of the remainder is structure."""
@@ -84,7 +90,7 @@ def interval(drawn: Array) -> Interval:
     return low, high
 
 
-def _bootstrap(errors: Callable[[Array, Array], Array], left: Structure, groups: int) -> Array:
+def _bootstrap(errors: Callable[[Array, Array], Array], left: OveridentificationTest, groups: int) -> Array:
     """Errors (D, 4) in bootstraps of the groups, the structure left as uncertain as chance makes it."""
     random = np.random.default_rng(0)
     draws = random.multinomial(groups, np.ones(groups) / groups, _DRAWS)

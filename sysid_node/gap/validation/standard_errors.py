@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import Fit, onsets
-from sysid_node.gap.estimation.predictive_density import groups_of
-from sysid_node.gap.instruments.liml import responses
+from sysid_node.gap.estimation.fit import CandidateFit, onset_places
+from sysid_node.gap.estimation.predictive_density import window_groups
+from sysid_node.gap.instruments.liml import influence
 from sysid_node.gap.selection.onset import uncertainty
 
 #: Share of itself by which a size is off beyond chance, 1 sigma.
@@ -29,13 +29,13 @@ def stated(name: str, value: float, error: float) -> list[float]:
     return [value, error if name == "onset" else float(np.hypot(error, DISCREPANCY * value))]
 
 
-def standard_errors(fit: Fit) -> Array:
+def standard_errors(fit: CandidateFit) -> Array:
     """Of all unknowns (unknowns,) by chance alone, of a fit as ``sizes.unbiased`` leaves it."""
-    steps = np.array([part[group].sum(axis=0) for view, part in zip(fit.views, responses(fit), strict=True)
-                      for group in groups_of(view)])  # fmt: skip
+    steps = np.array([part[group].sum(axis=0) for model, part in zip(fit.models, influence(fit), strict=True)
+                      for group in window_groups(model)])  # fmt: skip
     steps = steps - steps.mean(axis=0)
     scatter = (steps**2).sum(axis=0) * len(steps) / max(len(steps) - 1, 1)
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), scatter))
-    for place in onsets(fit):
+    for place in onset_places(fit):
         errors[place] = uncertainty(fit, place)
     return np.asarray(errors)

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import Fit
+from sysid_node.gap.estimation.fit import CandidateFit
 from sysid_node.gap.estimation.nuisances import CLOCKS
 from sysid_node.gap.estimation.predictive_density import Evidence
-from sysid_node.gap.instruments.excitation import purposeful
-from sysid_node.gap.instruments.overidentification import CHANCE
-from sysid_node.gap.residuals.admissibility import excitation
-from sysid_node.gap.residuals.residual_model import CHANNELS, View
+from sysid_node.gap.instruments.excitation import externally_excited
+from sysid_node.gap.instruments.overidentification import CHANCE_DEVIATIONS
+from sysid_node.gap.residuals.admissibility import signal_to_noise
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.acceptance import NOTICED, power_left
 from sysid_node.gap.selection.causes import Cause
@@ -44,11 +44,11 @@ _NAMED = 0.03
 _TELLING = 6.0
 
 
-def verdict_of(views: Sequence[View], attribution: Attribution, check: Check) -> str:
+def verdict_of(models: Sequence[ResidualModel], attribution: Attribution, check: Check) -> str:
     """One of gap.json's five words."""
-    if max(excitation(view).max() for view in views) < _TELLING:
+    if max(signal_to_noise(model).max() for model in models) < _TELLING:
         return "unsupported"
-    if check.foreseen or not any(purposeful(view) for view in views):
+    if check.foreseen or not any(externally_excited(model) for model in models):
         return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
@@ -114,28 +114,28 @@ def explained(attribution: Attribution) -> float:
 def _structure_left(attribution: Attribution) -> Array:
     """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
     left, evidence = attribution.left, attribution.chosen.evidence
-    share = np.where(left.deviations > CHANCE, left.share, 0.0)
+    share = np.where(left.deviations > CHANCE_DEVIATIONS, left.share, 0.0)
     return np.asarray(share * power_left(evidence) / _motion(evidence))
 
 
-def _sampling(fit: Fit) -> Array:
+def _sampling(fit: CandidateFit) -> Array:
     """Power (12,) that stamps leave which are off by chance within a sample, as shares of the motion.
 
     A step in a command falls anywhere between two messages, each time elsewhere: no clock's error is it, and coherent
     with the commands it is.
     """
     left, motion = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
-    for view, point in zip(fit.views, fit.points, strict=True):
-        rates = np.array([view.flight.actuator_rate, view.flight.air_rate])
-        slopes = view.slopes(point, [view.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
+    for model, point in zip(fit.models, fit.points, strict=True):
+        rates = np.array([model.flight.actuator_rate, model.flight.air_rate])
+        slopes = model.slopes(point, [model.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
         left += sum(power_of(slopes[..., i]) / (12.0 * rate**2) for i, rate in enumerate(rates))
-        motion += (np.abs(view.measured[:, 1:]) ** 2).sum(axis=(0, 1))
+        motion += (np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1))
     return left / np.maximum(motion, 1e-300)
 
 
 def _motion(evidence: Evidence) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
-    power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.views)
+    power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.models)
     return np.asarray(np.maximum(power, 1e-300))
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import Fit
-from sysid_node.gap.residuals.residual_model import CHANNELS, View
-from sysid_node.gap.residuals.windowed_spectra import EDGES, Complex, power_of
+from sysid_node.gap.estimation.fit import CandidateFit
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
+from sysid_node.gap.residuals.windowed_spectra import BAND_EDGES, Complex, power_of
 from sysid_node.gap.selection.forward_selection import Attribution
 
 #: Share of the power that a band, a time or a regime holds when it is named.
@@ -39,8 +39,8 @@ class Shape:
 
 def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str, Any]]:
     """Shares of the gap by station and axis, adding up to one; the largest first."""
-    views = attribution.base.fit.views
-    scale = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in views)
+    models = attribution.base.fit.models
+    scale = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in models)
     powers = [_power(before), *(_power(r) for r in _steps(attribution.corrected))]
     stations = [*(c.station for c in attribution.chosen.fit.candidates), "aerodynamics"]
     parts: dict[tuple[str, int], float] = {}
@@ -53,37 +53,37 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
         parts["noise", axis] = float(remainder[axis] * (1.0 - attribution.left.share[axis]))
     total = sum(parts.values()) or 1.0
     kept = sorted(((k, p / total) for k, p in parts.items() if p > 0.0), key=lambda pair: -pair[1])
-    return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(views, before, a)} for (s, a), share in kept]
+    return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(models, before, a)} for (s, a), share in kept]
 
 
-def _steps(fit: Fit) -> list[list[Complex]]:
+def _steps(fit: CandidateFit) -> list[list[Complex]]:
     """Residuals with the effects added to the file's model in turn, then with the nuisances too."""
-    neutral = fit.views[0].simulator.neutral()
-    points, steps = [neutral.copy() for _ in fit.views], []
+    neutral = fit.models[0].simulator.neutral()
+    points, steps = [neutral.copy() for _ in fit.models], []
     for candidate in fit.candidates:
         for point, fitted in zip(points, fit.points, strict=True):
             own = list(candidate.entries)
             point[own] = fitted[own]
-        steps.append([v.residual(p) for v, p in zip(fit.views, points, strict=True)])
-    return [*steps, [v.residual(p) for v, p in zip(fit.views, fit.points, strict=True)]]
+        steps.append([v.residual(p) for v, p in zip(fit.models, points, strict=True)])
+    return [*steps, [v.residual(p) for v, p in zip(fit.models, fit.points, strict=True)]]
 
 
 def _power(residuals: Sequence[Complex]) -> Array:
     return np.asarray(sum(power_of(r) for r in residuals))
 
 
-def _when(views: Sequence[View], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
+def _when(models: Sequence[ResidualModel], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
     """Band, time and regime that hold most of an axis's gap."""
-    longest = int(np.argmax([v.windows.count for v in views]))
-    view, power = views[longest], np.abs(residuals[longest][:, 1:, axis]) ** 2
+    longest = int(np.argmax([v.windows.count for v in models]))
+    model, power = models[longest], np.abs(residuals[longest][:, 1:, axis]) ** 2
     by_line, by_window = power.sum(axis=0), power.sum(axis=1)
-    low, high = _smallest(np.bincount(view.windows.bands[1:], by_line, len(EDGES) - 1).astype(float))
+    low, high = _smallest(np.bincount(model.windows.bands[1:], by_line, len(BAND_EDGES) - 1).astype(float))
     first, last = _smallest(by_window)
-    starts = view.windows.starts
+    starts = model.windows.starts
     return {
-        "band_hz": [float(EDGES[low]), float(min(EDGES[high + 1], view.windows.frequencies[-1]))],
-        "regime": _regime(view, by_window),
-        "window_s": [float(starts[first]), float(starts[last] + view.windows.length)],
+        "band_hz": [float(BAND_EDGES[low]), float(min(BAND_EDGES[high + 1], model.windows.frequencies[-1]))],
+        "regime": _regime(model, by_window),
+        "window_s": [float(starts[first]), float(starts[last] + model.windows.length)],
     }
 
 
@@ -97,14 +97,14 @@ def _smallest(power: Array) -> tuple[int, int]:
     return 0, power.size - 1
 
 
-def _regime(view: View, by_window: Array) -> dict[str, list[float]]:
+def _regime(model: ResidualModel, by_window: Array) -> dict[str, list[float]]:
     """Range of the signal whose departures go with the gap by window, where one does."""
     best, found = 0.5, {}
-    for name in _signals(view):
-        values = view.record[name]
-        pieces = [values[window] for window in view.windows.slices]
+    for name in _signals(model):
+        values = model.record[name]
+        pieces = [values[window] for window in model.windows.slices]
         spread = np.array([np.abs(p - values.mean()).max() for p in pieces])
-        if view.windows.count < 4 or spread.std() < 1e-12 or by_window.std() < 1e-300:
+        if model.windows.count < 4 or spread.std() < 1e-12 or by_window.std() < 1e-300:
             continue
         together = float(np.corrcoef(spread, np.sqrt(by_window))[0, 1])
         if together > best:
@@ -121,20 +121,20 @@ def missing(attribution: Attribution) -> Shape | None:
         return None
     axis = int(np.argmax(np.where(before.deviations > 3.0, before.coherent, 0.0)))
     fit = attribution.base.fit
-    view, point = fit.views[0], fit.points[0]
-    remainder = view.series[:, axis] - view.predicted_series(point)[:, axis]
-    shapes = [_binned(view, name, unit, axis, remainder) for name, unit in _signals(view).items()]
+    model, point = fit.models[0], fit.points[0]
+    remainder = model.series[:, axis] - model.predicted_series(point)[:, axis]
+    shapes = [_binned(model, name, unit, axis, remainder) for name, unit in _signals(model).items()]
     return max(shapes, key=lambda shape: shape.explained)
 
 
-def _signals(view: View) -> dict[str, str]:
+def _signals(model: ResidualModel) -> dict[str, str]:
     """Signals of the flight and of its controls that moved, and their units."""
-    controls = dict.fromkeys(view.simulator.aircraft.control_symbols, "rad")
-    return {n: u for n, u in {**REGIMES, **controls}.items() if n in view.record.columns and view.record[n].std() > 0}
+    controls = dict.fromkeys(model.simulator.aircraft.control_symbols, "rad")
+    return {n: u for n, u in {**REGIMES, **controls}.items() if n in model.record.columns and model.record[n].std() > 0}
 
 
-def _binned(view: View, name: str, unit: str, axis: int, remainder: Array) -> Shape:
-    values = view.record[name]
+def _binned(model: ResidualModel, name: str, unit: str, axis: int, remainder: Array) -> Shape:
+    values = model.record[name]
     edges = np.linspace(float(np.percentile(values, 0.5)), float(np.percentile(values, 99.5)), _BINS + 1)
     inside = (values >= edges[0]) & (values <= edges[-1])
     place = np.clip(np.searchsorted(edges, values[inside], side="right") - 1, 0, _BINS - 1)
@@ -148,6 +148,6 @@ def _binned(view: View, name: str, unit: str, axis: int, remainder: Array) -> Sh
     )
     centres = 0.5 * (edges[1:] + edges[:-1])
     independent = np.maximum(
-        counts * 4.0 / view.simulator.rate, 1.0
+        counts * 4.0 / model.simulator.rate, 1.0
     )  # the remainder keeps its sign for a quarter second
     return Shape(CHANNELS[axis], name, unit, centres[full], means[full], (spread / np.sqrt(independent))[full], between)

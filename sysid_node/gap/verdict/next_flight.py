@@ -19,10 +19,10 @@ from sysid_node.excite.manoeuvre import THROTTLE
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.estimation.candidates import Candidate, prior
-from sysid_node.gap.estimation.fit import Fit, real_rows, weights
-from sysid_node.gap.flightdata.gap_flight import thinned
-from sysid_node.gap.residuals.build import view_like
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
+from sysid_node.gap.flightdata.gap_flight import resampled
+from sysid_node.gap.residuals.build import residual_model_like
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import Trial
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.forward_selection import Attribution
@@ -104,23 +104,23 @@ def _confused(cause: Cause) -> list[Trial]:
     return list(best.values())
 
 
-def propose(fit: Fit, pairs: Sequence[tuple[Candidate, Fit]]) -> Proposal | None:
+def propose(fit: CandidateFit, pairs: Sequence[tuple[Candidate, CandidateFit]]) -> Proposal | None:
     """The best of the proposals for pairs of a cause and the fit of its rival; None where none can be flown."""
-    view = fit.views[0]
-    flown = min(_separation(view, fit.points[0], *pair, fit) for pair in pairs)
+    model = fit.models[0]
+    flown = min(_separation(model, fit.points[0], *pair, fit) for pair in pairs)
     found: list[Proposal] = []
     for words, shape, width, share, throttle in _PROPOSALS:
         try:
-            planned = _flown(view, fit, _specs(view, shape, width, share, throttle))
+            planned = _flown(model, fit, _specs(model, shape, width, share, throttle))
         except InputError:
             continue  # beyond a limit, or it diverges: not a flight to propose
         found.append(Proposal(words, min(_separation(planned, fit.points[0], *p, fit) for p in pairs), flown))
     return max(found, key=lambda proposal: proposal.separation, default=None)
 
 
-def _specs(view: View, shape: str, width: float, share: float, throttle: bool) -> list[str]:
+def _specs(model: ResidualModel, shape: str, width: float, share: float, throttle: bool) -> list[str]:
     """The manoeuvre as ``sysid excite`` takes it: surfaces in turn, every twelve seconds again."""
-    aircraft, duration = view.simulator.aircraft, view.record.duration
+    aircraft, duration = model.simulator.aircraft, model.record.duration
     surfaces = list(aircraft.controls)
     every = 4.0 * len(surfaces)
     specs = []
@@ -136,9 +136,9 @@ def _specs(view: View, shape: str, width: float, share: float, throttle: bool) -
     return specs
 
 
-def _flown(view: View, fit: Fit, specs: list[str]) -> View:
+def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> ResidualModel:
     """The manoeuvre as the corrected simulator flies it in still air, seen as the flight was. Raises InputError."""
-    simulator, record = view.simulator, view.record
+    simulator, record = model.simulator, model.record
     plan = parse_manoeuvre(specs, simulator.aircraft, simulator.rate, record.duration)
     deflections = np.zeros((len(record), len(simulator.commands)))
     deflections[:, :-1] = plan.surfaces()[: len(record)]
@@ -150,8 +150,8 @@ def _flown(view: View, fit: Fit, specs: list[str]) -> View:
     columns = {name: outputs[:, i] for i, name in enumerate(simulator.outputs)}
     columns |= {name: np.asarray(sortie.flight.commands)[:, i] for i, name in enumerate(_symbols(simulator))}
     columns["rho"] = np.asarray(air_density(-jnp.asarray(sortie.flight.states)[:, 2]))
-    flight = replace(view.flight, record=FlightRecord(record.time, columns), imu_rate=simulator.rate, source="")
-    return view_like(view, thinned(flight, simulator.rate))
+    flight = replace(model.flight, record=FlightRecord(record.time, columns), imu_rate=simulator.rate, source="")
+    return residual_model_like(model, resampled(flight, simulator.rate))
 
 
 def _symbols(simulator: Simulator) -> tuple[str, ...]:
@@ -168,21 +168,21 @@ def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
     return found
 
 
-def _separation(view: View, point: Array, cause: Candidate, rival: Fit, fit: Fit) -> float:
+def _separation(model: ResidualModel, point: Array, cause: Candidate, rival: CandidateFit, fit: CandidateFit) -> float:
     """Of a cause's response from the nearest that its rival and the nuisances can do, in standard deviations."""
-    neutral = view.simulator.neutral()
+    neutral = model.simulator.neutral()
     own = list(cause.entries)
     without, instead = point.copy(), point.copy()
     without[own] = neutral[own]
     instead[own] = neutral[own]
     added = [i for i in rival.indices if i not in fit.indices]
     instead[added] = rival.points[0][added]
-    weight = weights(view.windows, np.where(view.axes, view.noise, 1.0))
-    response = real_rows(view.predicted(point) - view.predicted(instead), weight).ravel()
+    weight = weights(model.windows, np.where(model.axes, model.noise, 1.0))
+    response = real_rows(model.predicted(point) - model.predicted(instead), weight).ravel()
     moving = [*added, *(i for i in fit.nuisances.indices if i not in own)]
-    slopes = real_rows(view.slopes(instead, moving), weight).reshape(response.size, -1)
+    slopes = real_rows(model.slopes(instead, moving), weight).reshape(response.size, -1)
     known = dict(zip(fit.nuisances.indices, fit.nuisances.sigma, strict=True))
-    sigma = np.array([*prior(view.simulator, added)[1], *(known[i] for i in moving[len(added) :])])
+    sigma = np.array([*prior(model.simulator, added)[1], *(known[i] for i in moving[len(added) :])])
     matrix = np.vstack([slopes, np.diag(1.0 / sigma)])
     target = np.concatenate([response, np.zeros(sigma.size)])
     best = np.linalg.lstsq(matrix, target, rcond=None)[0]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.estimation.fit import blank, polish
+from sysid_node.gap.estimation.fit import converged, unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.predictive_density import cross_validated, held_out, probabilities
+from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, held_out_evidence, probabilities
 
 
 def test_equal_scores_share() -> None:
@@ -22,14 +22,14 @@ def test_one_group_alone_is_not_sure() -> None:
     assert probabilities([scores, np.zeros(6)])[0] < plain - 0.1
 
 
-def test_what_is_flown_is_what_is_written(plain_view) -> None:
+def test_what_is_flown_is_what_is_written(plain_model) -> None:
     """Truth: corrected.yaml, which holds derivatives and neither biases nor clocks, though the fit has found some."""
-    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
-    fit = polish(blank([plain_view], nuisances), rounds=1)
-    others = [i for i, (effect, _) in enumerate(plain_view.simulator.parameters) if effect != "derivative_error"]
-    neutral = plain_view.simulator.neutral()
+    nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
+    fit = converged(unfitted([plain_model], nuisances), rounds=1)
+    others = [i for i, (effect, _) in enumerate(plain_model.simulator.parameters) if effect != "derivative_error"]
+    neutral = plain_model.simulator.neutral()
     assert np.any(fit.points[0][others] != neutral[others])
-    for evidence in (cross_validated(fit), held_out(fit, [plain_view], [nuisances])):
+    for evidence in (cross_validated_evidence(fit), held_out_evidence(fit, [plain_model], [nuisances])):
         for point in evidence.points[0]:
             np.testing.assert_array_equal(point[others], neutral[others])
             assert np.any(point != neutral)

@@ -9,28 +9,28 @@ from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.flightdata.gap_flight import Flight, complete
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.validation.multiple_shooting import course_of, off
 from sysid_node.gap.validation.noise_floor import unavoidable
 from sysid_node.sim import Simulator
 
 
-def blind(aircraft, flight: Flight, *lost: str) -> Flight:
+def blind(aircraft, flight: GapFlight, *lost: str) -> GapFlight:
     """The flight as an aircraft without these instruments has it."""
     columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in lost}}
-    return complete(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+    return completed_flight(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
 
 
 @pytest.fixture(scope="module")
-def vaneless(aircraft, plain) -> Flight:
+def vaneless(aircraft, plain) -> GapFlight:
     return blind(aircraft, plain, "alpha", "beta")
 
 
 @pytest.fixture(scope="module")
-def vaneless_view(aircraft, vaneless):
-    return view_of(Simulator(aircraft, 50.0), vaneless)
+def vaneless_model(aircraft, vaneless):
+    return residual_model_of(Simulator(aircraft, 50.0), vaneless)
 
 
 def test_angles_are_those_that_the_vanes_read(plain, vaneless) -> None:
@@ -46,22 +46,22 @@ def test_one_vane_is_used_where_it_is_there(aircraft, plain) -> None:
     np.testing.assert_array_equal(flight.record["alpha"], plain.record["alpha"])
 
 
-def test_what_was_not_measured_is_not_compared(vaneless_view) -> None:
-    assert {c for c, measured in zip(CHANNELS, vaneless_view.axes, strict=True) if not measured} == {"alpha", "beta"}
-    effects = {c.effect for c in candidates_of(vaneless_view.simulator, [vaneless_view])}
+def test_what_was_not_measured_is_not_compared(vaneless_model) -> None:
+    assert {c for c, measured in zip(CHANNELS, vaneless_model.axes, strict=True) if not measured} == {"alpha", "beta"}
+    effects = {c.effect for c in candidates_of(vaneless_model.simulator, [vaneless_model])}
     assert not {"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"} & effects
     assert {"actuator_lag", "command_delay", "cg_shift"} <= effects
 
 
-def test_only_noise_is_left_of_the_same_aircraft(vaneless_view) -> None:
-    view = vaneless_view
-    residual = np.abs(view.residual(view.simulator.neutral())[:, 1:]) ** 2
-    ratio = (residual.mean(axis=0).sum(axis=0) / view.noise[1:].sum(axis=0))[view.axes]
+def test_only_noise_is_left_of_the_same_aircraft(vaneless_model) -> None:
+    model = vaneless_model
+    residual = np.abs(model.residual(model.simulator.neutral())[:, 1:]) ** 2
+    ratio = (residual.mean(axis=0).sum(axis=0) / model.noise[1:].sum(axis=0))[model.axes]
     assert (ratio < 8.0).all(), ratio
 
 
-def test_still_air_is_known_to_be_still(vaneless_view) -> None:
-    assert vaneless_view.gusts < 0.01 * vaneless_view.record["V"].mean()
+def test_still_air_is_known_to_be_still(vaneless_model) -> None:
+    assert vaneless_model.gusts < 0.01 * vaneless_model.record["V"].mean()
 
 
 def test_a_late_imu_cannot_be_told_from_late_commands(aircraft, make_flight) -> None:
@@ -106,10 +106,10 @@ def test_the_floor_without_vanes_knows_of_gusts(aircraft, make_flight) -> None:
     floors = []
     for turbulence in ("none", "light"):
         flight = blind(aircraft, make_flight({}, seed=3, turbulence=turbulence), "alpha", "beta")
-        view = view_of(Simulator(aircraft, 50.0), flight)
-        course = course_of(view, 100)
-        error, _ = next(unavoidable(view, view.simulator.neutral(), course))
-        mine = off(view, view.simulator.neutral(), course)
+        model = residual_model_of(Simulator(aircraft, 50.0), flight)
+        course = course_of(model, 100)
+        error, _ = next(unavoidable(model, model.simulator.neutral(), course))
+        mine = off(model, model.simulator.neutral(), course)
         floors.append((np.sqrt((error[:, 4] ** 2).mean()), np.sqrt((mine[:, 4] ** 2).mean())))
     (calm, calm_flown), (rough, rough_flown) = floors
     assert rough > 3.0 * calm and rough_flown > 3.0 * calm_flown

@@ -5,14 +5,14 @@ from dataclasses import replace
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap.flightdata.manoeuvre_window import manoeuvre_of
+from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
 
 CONTROLS = ("de", "da", "dr")
 
 
 def test_the_only_manoeuvre_is_kept_with_what_rings_after_it(aircraft) -> None:
     flight = fly(aircraft, {}, manoeuvre=["3211:elevator:start=20:width=0.3"], duration=50.0)
-    cut = manoeuvre_of(flight, CONTROLS)
+    cut = cut_to_manoeuvre(flight, CONTROLS)
     assert cut.record.duration == pytest.approx(2.0 + 7 * 0.3 + 5.0, abs=1.0)
     assert cut.left_out == pytest.approx(flight.record.duration - cut.record.duration, abs=0.05)
     assert abs(cut.record["de"]).max() == abs(flight.record["de"]).max()
@@ -22,12 +22,12 @@ def test_the_only_manoeuvre_is_kept_with_what_rings_after_it(aircraft) -> None:
 def test_manoeuvres_all_over_a_flight_are_kept(aircraft) -> None:
     steps = ["3211:elevator:start=2", "3211:aileron:start=20", "3211:rudder:start=40"]
     flight = fly(aircraft, {}, manoeuvre=steps, duration=50.0)
-    assert manoeuvre_of(flight, CONTROLS) is flight
+    assert cut_to_manoeuvre(flight, CONTROLS) is flight
 
 
 def test_where_nothing_steps_all_is_kept(aircraft) -> None:
     flight = fly(aircraft, {}, manoeuvre=["multisine:elevator"], duration=50.0)
-    assert manoeuvre_of(flight, CONTROLS) is flight
+    assert cut_to_manoeuvre(flight, CONTROLS) is flight
 
 
 def test_a_throttle_that_steps_later_belongs_to_the_manoeuvres(aircraft) -> None:
@@ -35,5 +35,5 @@ def test_a_throttle_that_steps_later_belongs_to_the_manoeuvres(aircraft) -> None
     record = flight.record
     thrust = record["thrust"] + 3.0 * (record.time > 35.0)
     stepped = replace(flight, record=replace(record, columns={**record.columns, "thrust": thrust}))
-    assert manoeuvre_of(flight, CONTROLS).left_out > 30.0
-    assert manoeuvre_of(stepped, CONTROLS) is stepped
+    assert cut_to_manoeuvre(flight, CONTROLS).left_out > 30.0
+    assert cut_to_manoeuvre(stepped, CONTROLS) is stepped

@@ -9,17 +9,17 @@ from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.flightdata.gap_flight import Flight, complete
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.sim import Simulator
 
 
-def without_thrust(aircraft, flight: Flight) -> Flight:
+def without_thrust(aircraft, flight: GapFlight) -> GapFlight:
     """The flight as it is recorded where nobody meters the engine."""
     columns = {**flight.record.columns, "thrust": np.full(len(flight.record), np.nan)}
-    return complete(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+    return completed_flight(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
 
 
 def test_thrust_is_what_the_files_drag_leaves(aircraft, plain) -> None:
@@ -33,9 +33,9 @@ def test_thrust_is_what_the_files_drag_leaves(aircraft, plain) -> None:
 
 
 def test_forward_motion_is_not_compared(aircraft, plain) -> None:
-    view = view_of(Simulator(aircraft, 50.0), without_thrust(aircraft, plain))
-    assert {c for c, measured in zip(CHANNELS, view.axes, strict=True) if not measured} == {"CD"}
-    effects = {c.effect for c in candidates_of(view.simulator, [view])}
+    model = residual_model_of(Simulator(aircraft, 50.0), without_thrust(aircraft, plain))
+    assert {c for c, measured in zip(CHANNELS, model.axes, strict=True) if not measured} == {"CD"}
+    effects = {c.effect for c in candidates_of(model.simulator, [model])}
     assert not {"thrust_scale", "motor_lag", "thrust_line_offset", "thrust_yaw", "propwash"} & effects
     assert {"actuator_lag", "command_delay", "cg_shift"} <= effects
 
@@ -56,4 +56,4 @@ def test_a_thrust_with_holes_is_refused(aircraft, plain) -> None:
     thrust[100:120] = np.nan
     holed = replace(plain.record, columns={**plain.record.columns, "thrust": thrust})
     with pytest.raises(InputError, match="no complete thrust"):
-        complete(aircraft, replace(plain, record=holed))
+        completed_flight(aircraft, replace(plain, record=holed))

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from sysid_node.gap.estimation.fit import blank, polish
+from sysid_node.gap.estimation.fit import converged, unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.instruments.liml import _channels, _without_chance, unbiased
-from sysid_node.gap.instruments.overidentification import Equations
+from sysid_node.gap.instruments.liml import _channels, _without_chance, liml_estimate
+from sysid_node.gap.instruments.overidentification import MomentEquations
 
 ROWS, INSTRUMENTS, DRAWS = 400, 60, 200
 TRUTH = 1.0
 
 
-def drawn(random: np.random.Generator) -> Equations:
+def drawn(random: np.random.Generator) -> MomentEquations:
     """One channel: a slope that the instruments foretell by a fifth; gusts move it and the remainder alike."""
     instruments = np.linalg.qr(random.standard_normal((ROWS, INSTRUMENTS)))[0]
     gusts = random.standard_normal(ROWS)
@@ -20,10 +20,10 @@ def drawn(random: np.random.Generator) -> Equations:
     along = instruments.T @ slope
     information, right = np.array([[1e-6 + along @ along]]), np.array([along @ (instruments.T @ remainder)])
     rows, slopes = remainder.reshape(1, ROWS, 1), slope.reshape(1, ROWS, 1, 1)
-    return Equations([{0: instruments}], [rows], [slopes], information, right, 0.0)
+    return MomentEquations([{0: instruments}], [rows], [slopes], information, right, 0.0)
 
 
-def solved(seen: Equations) -> tuple[float, float]:
+def solved(seen: MomentEquations) -> tuple[float, float]:
     """By two stages, and without what chance gives to them."""
     channels, two_stages = _channels(seen), seen.right / seen.information[0]
     step = two_stages
@@ -42,6 +42,6 @@ def test_many_instruments_bias_two_stages_and_not_the_likelihood() -> None:
     assert abs(np.median(found[:, 1])) < 0.2 * found[:, 0].mean()
 
 
-def test_in_still_air_least_squares_stands(plain_view) -> None:
-    fit = polish(blank([plain_view], nuisances_of(plain_view.simulator.aircraft, plain_view)), rounds=1)
-    assert unbiased(fit) is fit
+def test_in_still_air_least_squares_stands(plain_model) -> None:
+    fit = converged(unfitted([plain_model], nuisances_of(plain_model.simulator.aircraft, plain_model)), rounds=1)
+    assert liml_estimate(fit) is fit

@@ -8,35 +8,35 @@ from gap_flights import fly
 from scipy.signal import lsim
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.gap.estimation.fit import _root, blank, polish
+from sysid_node.gap.estimation.fit import _root, converged, unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments import overidentification as structure
-from sysid_node.gap.instruments.excitation import deliberate
+from sysid_node.gap.instruments.excitation import external_excitation
 from sysid_node.gap.instruments.overidentification import (
-    CHANCE,
-    Structure,
-    commands,
-    instruments,
+    CHANCE_DEVIATIONS,
+    OveridentificationTest,
+    command_instruments,
+    gust_free_instruments,
+    overidentification_of,
     pooled,
-    ringing,
-    structure_left,
-    structure_of,
+    pooled_overidentification,
+    resonator_instruments,
 )
-from sysid_node.gap.residuals.build import view_of
-from sysid_node.gap.residuals.residual_model import COEFFICIENTS, View
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 from sysid_node.sim import Simulator
 
 DIRECTIONS, ROWS = 37, 400
 
 
-def measured(random: np.random.Generator, strength: float, structure: float = 0.0) -> Structure:
+def measured(random: np.random.Generator, strength: float, structure: float = 0.0) -> OveridentificationTest:
     """One channel of noise of so many levels, and structure of so many along the instruments' directions."""
     series = np.sqrt(strength) * random.standard_normal(ROWS)
     series[:DIRECTIONS] += np.sqrt(structure) * random.choice([-1.0, 1.0], DIRECTIONS)
     inside, outside = float(np.sum(series[:DIRECTIONS] ** 2)), float(np.sum(series[DIRECTIONS:] ** 2))
     noise = max(outside / (ROWS - DIRECTIONS), 1.0)
     found = (inside - DIRECTIONS, inside + outside, np.sqrt(2.0 * DIRECTIONS), noise)
-    return Structure(*(np.array([value]) for value in found))
+    return OveridentificationTest(*(np.array([value]) for value in found))
 
 
 @pytest.mark.parametrize("strength", [1.0, 1.8])
@@ -81,25 +81,27 @@ def foretold(table: np.ndarray, series: np.ndarray) -> float:
     return float(1.0 - left.var() / series.var())
 
 
-def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_view: View) -> None:
+def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_model: ResidualModel) -> None:
     """An oscillator at 1.15 Hz, between two of the resonators, of damping 0.08, driven by the elevator's command."""
-    omega, damping, rate = 2.0 * np.pi * 1.15, 0.08, plain_view.simulator.rate
-    given = deliberate(plain_view).all[:, 0]
+    omega, damping, rate = 2.0 * np.pi * 1.15, 0.08, plain_model.simulator.rate
+    given = external_excitation(plain_model).all[:, 0]
     rung = lsim(([omega**2], [1.0, 2.0 * damping * omega, omega**2]), given - given[0], np.arange(given.size) / rate)[1]
-    assert foretold(ringing(plain_view)[0], rung - rung.mean()) > 0.9
-    assert foretold(commands(plain_view)[0], rung - rung.mean()) < 0.75
+    assert foretold(resonator_instruments(plain_model)[0], rung - rung.mean()) > 0.9
+    assert foretold(command_instruments(plain_model)[0], rung - rung.mean()) < 0.75
 
 
-def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_view: View, monkeypatch) -> None:
+def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_model: ResidualModel, monkeypatch) -> None:
     """On a flight held out, that is; of the one that was fitted they do."""
-    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
-    fit = polish(blank([plain_view], nuisances), rounds=1)
-    alone = structure_left(fit)
+    nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
+    fit = converged(unfitted([plain_model], nuisances), rounds=1)
+    alone = pooled_overidentification(fit)
     endless = replace(fit, information=np.full_like(fit.information, np.nan))
-    monkeypatch.setattr(structure, "upon", lambda *_: endless)
-    np.testing.assert_array_equal(structure_left(fit, [plain_view], [nuisances]).deviations, alone.deviations)
-    monkeypatch.setattr(structure, "upon", lambda *_: fit)  # seen twice
-    again = structure_left(fit, [plain_view], [nuisances])
+    monkeypatch.setattr(structure, "fit_on_other_flight", lambda *_: endless)
+    np.testing.assert_array_equal(
+        pooled_overidentification(fit, [plain_model], [nuisances]).deviations, alone.deviations
+    )
+    monkeypatch.setattr(structure, "fit_on_other_flight", lambda *_: fit)  # seen twice
+    again = pooled_overidentification(fit, [plain_model], [nuisances])
     np.testing.assert_allclose(again.beyond, 2.0 * alone.beyond)
     np.testing.assert_allclose(again.share, alone.share)
 
@@ -110,8 +112,8 @@ def test_gusts_that_pass_for_derivatives_make_no_structure_of_sharp_steps() -> N
     aircraft, steps = load_aircraft("kestrel"), (("elevator", 0.05, 1.0), ("aileron", 0.06, 3.8), ("rudder", 0.11, 6.0))
     doublets = [f"doublet:{name}:amplitude={size}:width=0.4:start={at}:every=8:repeat=5" for name, size, at in steps]
     flight = fly(aircraft, {}, seed=4, turbulence="light", manoeuvre=doublets, duration=44.0)
-    view = view_of(Simulator(aircraft, 50.0), flight)
-    fit = polish(blank([view], nuisances_of(aircraft, view)))
+    model = residual_model_of(Simulator(aircraft, 50.0), flight)
+    fit = converged(unfitted([model], nuisances_of(aircraft, model)))
     roll = COEFFICIENTS.index("Cl")
-    assert structure_of(fit, by=instruments).deviations[roll] > CHANCE
-    assert structure_left(fit).deviations[roll] < 0.6 * CHANCE
+    assert overidentification_of(fit, by=gust_free_instruments).deviations[roll] > CHANCE_DEVIATIONS
+    assert pooled_overidentification(fit).deviations[roll] < 0.6 * CHANCE_DEVIATIONS

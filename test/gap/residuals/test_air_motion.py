@@ -4,27 +4,27 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import blank, polish, with_candidates
-from sysid_node.gap.estimation.nuisances import gusty, nuisances_of
-from sysid_node.gap.residuals.air_motion import gusts_of
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.estimation.fit import converged, unfitted, with_candidates
+from sysid_node.gap.estimation.nuisances import is_gusty, nuisances_of
+from sysid_node.gap.residuals.air_motion import gust_speed
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.sim import Simulator
 
 
 @pytest.fixture(scope="module")
 def late(aircraft):
-    return view_of(Simulator(aircraft, 50.0), fly(aircraft, {"imu_delay": {"delay": 0.06}}, seed=21))
+    return residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {"imu_delay": {"delay": 0.06}}, seed=21))
 
 
 def test_a_late_imu_is_no_weather(late) -> None:
-    assert gusts_of(late, late.simulator.neutral()) > 5.0 * late.gusts
-    assert not gusty(late)
+    assert gust_speed(late, late.simulator.neutral()) > 5.0 * late.gusts
+    assert not is_gusty(late)
 
 
 def test_weather_is_no_instruments_error(aircraft) -> None:
-    blown = view_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
-    assert gusty(blown)
-    assert blown.gusts > 0.5 * gusts_of(blown, blown.simulator.neutral())
+    blown = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
+    assert is_gusty(blown)
+    assert blown.gusts > 0.5 * gust_speed(blown, blown.simulator.neutral())
 
 
 @pytest.mark.parametrize(
@@ -32,10 +32,12 @@ def test_weather_is_no_instruments_error(aircraft) -> None:
 )
 def test_times_of_instruments_are_found(aircraft, late, effect, parameter, value) -> None:
     """Not short by what noise adds where readings are differentiated, nor by a clock that takes its share."""
-    view = (
-        late if effect == "imu_delay" else view_of(late.simulator, fly(aircraft, {effect: {parameter: value}}, seed=22))
+    model = (
+        late
+        if effect == "imu_delay"
+        else residual_model_of(late.simulator, fly(aircraft, {effect: {parameter: value}}, seed=22))
     )
-    nuisances = nuisances_of(aircraft, view)
-    candidates = [c for c in candidates_of(view.simulator, [view]) if c.effect == effect]
-    found = polish(with_candidates(polish(blank([view], nuisances)), candidates, nuisances, [0.5 * value]))
+    nuisances = nuisances_of(aircraft, model)
+    candidates = [c for c in candidates_of(model.simulator, [model]) if c.effect == effect]
+    found = converged(with_candidates(converged(unfitted([model], nuisances)), candidates, nuisances, [0.5 * value]))
     assert found.values[0] == pytest.approx(value, rel=0.04)

@@ -6,39 +6,39 @@ import jax
 import numpy as np
 
 from sysid_node.gap.residuals import residual_model
-from sysid_node.gap.residuals.residual_model import kinematic
+from sysid_node.gap.residuals.residual_model import kinematic_parameters
 
 
-def test_only_noise_is_left_of_the_same_aircraft(plain_view) -> None:
-    residual = np.abs(plain_view.residual(plain_view.simulator.neutral())[:, 1:]) ** 2
-    ratio = residual.mean(axis=0).sum(axis=0) / plain_view.noise[1:].sum(axis=0)
+def test_only_noise_is_left_of_the_same_aircraft(plain_model) -> None:
+    residual = np.abs(plain_model.residual(plain_model.simulator.neutral())[:, 1:]) ** 2
+    ratio = residual.mean(axis=0).sum(axis=0) / plain_model.noise[1:].sum(axis=0)
     assert (ratio[[0, 1, 2, 4]] < 3.0).all() and (ratio < 8.0).all(), ratio
 
 
-def test_slopes_agree_with_differences(plain_view) -> None:
-    names, neutral = plain_view.simulator.names, plain_view.simulator.neutral()
+def test_slopes_agree_with_differences(plain_model) -> None:
+    names, neutral = plain_model.simulator.names, plain_model.simulator.neutral()
     index = names.index("derivative_error.Cm_alpha")
     step = np.zeros_like(neutral)
     step[index] = 1e-4
-    numeric = (plain_view.predicted(neutral + step) - plain_view.predicted(neutral - step)) / 2e-4
-    slopes = plain_view.slopes(neutral, [index])[..., 0]
+    numeric = (plain_model.predicted(neutral + step) - plain_model.predicted(neutral - step)) / 2e-4
+    slopes = plain_model.slopes(neutral, [index])[..., 0]
     np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
 
 
-def test_kinematics_depend_on_no_other_entries_than_those_named(plain_view) -> None:
-    simulator = plain_view.simulator
-    entries = np.setdiff1d(np.arange(len(simulator.names)), kinematic(simulator.layout))
+def test_kinematics_depend_on_no_other_entries_than_those_named(plain_model) -> None:
+    simulator = plain_model.simulator
+    entries = np.setdiff1d(np.arange(len(simulator.names)), kinematic_parameters(simulator.layout))
     somewhere = simulator.neutral() + 0.1 * np.random.default_rng(0).random(len(simulator.names))
     changed = somewhere.copy()
     changed[entries] += 0.01
     np.testing.assert_array_equal(
-        plain_view.predicted_series(changed)[:, 6:], plain_view.predicted_series(somewhere)[:, 6:]
+        plain_model.predicted_series(changed)[:, 6:], plain_model.predicted_series(somewhere)[:, 6:]
     )
 
 
-def test_slopes_know_what_moves_the_flow(plain_view) -> None:
+def test_slopes_know_what_moves_the_flow(plain_model) -> None:
     """Slopes by what moves the flow, and by what does not in a flow that is known; truth: JAX, of everything."""
-    simulator = plain_view.simulator
+    simulator = plain_model.simulator
     point = simulator.neutral() + 0.01 * np.random.default_rng(0).random(len(simulator.names))
     acting = np.ones(len(point), bool)
 
@@ -46,28 +46,28 @@ def test_slopes_know_what_moves_the_flow(plain_view) -> None:
     def along(direction: jax.Array) -> list[jax.Array]:
         def channels(theta: jax.Array) -> list[jax.Array]:
             return list(
-                residual_model._channels(simulator.layout, simulator.model, theta, acting, plain_view.given, None)
+                residual_model._channels(simulator.layout, simulator.model, theta, acting, plain_model.given, None)
             )
 
         return jax.jvp(channels, (point,), (direction,))[1]
 
-    motion = kinematic(simulator.layout)
+    motion = kinematic_parameters(simulator.layout)
     others = np.setdiff1d(np.arange(len(point)), motion).tolist()
     assert len(others) > 60 and len(motion) > 20
     for expected, entries in ((residual_model._forces_in, others), (residual_model._channels, motion)):
         direction = np.zeros(len(point))
         direction[entries] = np.random.default_rng(1).normal(size=len(entries)) * simulator.scales[entries]
         parts = (entries[first : first + 3] for first in range(0, len(entries), 3))
-        found = sum(plain_view._slopes_along(expected, point, some) @ direction[some] for some in parts)
-        series = np.stack(along(direction), axis=1)[: len(plain_view.record)]
-        truth = plain_view.windows.transform(series)[:, :, : found.shape[2]]
+        found = sum(plain_model._slopes_along(expected, point, some) @ direction[some] for some in parts)
+        series = np.stack(along(direction), axis=1)[: len(plain_model.record)]
+        truth = plain_model.windows.transform(series)[:, :, : found.shape[2]]
         np.testing.assert_allclose(found, truth, atol=1e-12 * np.abs(truth).max())
 
 
-def test_what_is_kept_along_with_slopes_is_what_is_predicted(plain_view) -> None:
-    names, point = plain_view.simulator.names, plain_view.simulator.neutral()
+def test_what_is_kept_along_with_slopes_is_what_is_predicted(plain_model) -> None:
+    names, point = plain_model.simulator.names, plain_model.simulator.neutral()
     point[names.index("cg_shift.x")] = 0.02
-    fresh = replace(plain_view)
+    fresh = replace(plain_model)
     fresh.slopes(point, [names.index("imu_bias.q"), names.index("actuator_lag.time_constant")])
-    expected = plain_view.windows.transform(plain_view.predicted_series(point))
+    expected = plain_model.windows.transform(plain_model.predicted_series(point))
     np.testing.assert_allclose(fresh.predicted(point), expected, atol=1e-12 * np.abs(expected).max())

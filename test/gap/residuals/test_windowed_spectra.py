@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.residuals.windowed_spectra import SHARE, Windows
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Windows
 
 
 def test_white_noise_keeps_its_variance(random) -> None:
@@ -23,4 +23,6 @@ def test_coefficients_count_each_sample_once() -> None:
     """Twice as many coefficients as samples in the band: each window of T s has one line each 1/T, every T/2."""
     windows = Windows.over(50000, 50.0)
     independent = 2 * windows.frequencies[-1] * 1000.0  # real numbers in 1000 s of this band
-    assert SHARE * 2 * windows.count * (windows.frequencies.size - 1) == pytest.approx(independent, rel=0.02)
+    assert INDEPENDENT_SHARE * 2 * windows.count * (windows.frequencies.size - 1) == pytest.approx(
+        independent, rel=0.02
+    )

@@ -16,8 +16,8 @@ def trial(mean: float, noise: float, random: np.random.Generator) -> SimpleNames
     left = noise * (random.standard_normal((WINDOWS, LINES, 12)) + 1j * random.standard_normal((WINDOWS, LINES, 12)))
     left[:, 0] = 0.0
     left[:, 0, V] = mean
-    view = SimpleNamespace(measured=np.ones((WINDOWS, LINES, 12), complex))
-    return SimpleNamespace(evidence=SimpleNamespace(residuals=(left,), views=(view,)))
+    model = SimpleNamespace(measured=np.ones((WINDOWS, LINES, 12), complex))
+    return SimpleNamespace(evidence=SimpleNamespace(residuals=(left,), models=(model,)))
 
 
 def test_what_is_off_on_average_counts_whatever_weather_is_left(random: np.random.Generator) -> None:

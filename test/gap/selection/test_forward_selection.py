@@ -5,10 +5,10 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.checkpoint import Steps
-from sysid_node.gap.estimation.fit import Projected, blank, polish
+from sysid_node.gap.estimation.checkpoint import Checkpoint
+from sysid_node.gap.estimation.fit import VariableProjection, converged, unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection import acceptance
 from sysid_node.gap.selection import candidate_fitter as module
 from sysid_node.gap.selection.candidate_fitter import Trier
@@ -20,14 +20,14 @@ from sysid_node.sim import Simulator
 def weak_and_slow(aircraft):
     """An engine that is slow and weak: slow alone, twice as slow would do nearly as well."""
     effects = {"motor_lag": {"time_constant": 0.7}, "thrust_scale": {"error": -0.4}}
-    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, effects, seed=16))
-    return attribute([view], nuisances_of(aircraft, view), lambda s, t: None)
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, effects, seed=16))
+    return attribute([model], nuisances_of(aircraft, model), lambda s, t: None)
 
 
 def test_both_of_two_effects_are_named_with_their_sizes(weak_and_slow) -> None:
     fit = weak_and_slow.chosen.fit
     assert fit.effects == {"motor_lag", "thrust_scale"}
-    names = fit.views[0].simulator.names
+    names = fit.models[0].simulator.names
     found = {names[i]: fit.points[0][i] for i in fit.indices}
     assert found["motor_lag.time_constant"] == pytest.approx(0.7, rel=0.15)
     assert found["thrust_scale.error"] == pytest.approx(-0.4, rel=0.15)
@@ -38,18 +38,18 @@ def test_what_adds_up_is_no_alternative(weak_and_slow) -> None:
     assert all(cause.share > 0.9 for cause in weak_and_slow.causes)
 
 
-def test_what_gives_no_numbers_is_no_explanation(plain_view, monkeypatch) -> None:
+def test_what_gives_no_numbers_is_no_explanation(plain_model, monkeypatch) -> None:
     """As where slopes grow without end."""
 
     def endless(*args: object) -> None:
         raise np.linalg.LinAlgError("not positive definite")
 
-    nuisances = nuisances_of(plain_view.simulator.aircraft, plain_view)
-    trier = Trier(nuisances, Steps())
-    base = trier.trial(blank([plain_view], nuisances), [])
-    (candidate,) = (c for c in candidates_of(plain_view.simulator, [plain_view]) if c.label == "command_delay")
+    nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
+    trier = Trier(nuisances, Checkpoint())
+    base = trier.trial(unfitted([plain_model], nuisances), [])
+    (candidate,) = (c for c in candidates_of(plain_model.simulator, [plain_model]) if c.label == "command_delay")
     with monkeypatch.context() as patch:
-        patch.setattr(module, "judged", endless)
+        patch.setattr(module, "competing_evidence", endless)
         assert trier.upon(base, (0.0, candidate, (0.02,))) is None
     monkeypatch.setattr(module, "_first_look", endless)
     ((left, looked_at, _),) = trier.looks(base, [candidate], lambda share, text: None)
@@ -64,13 +64,13 @@ def test_what_is_needed_lest_the_others_grow_without_end_contributes_without_end
 
     base, chosen = weak_and_slow.base, weak_and_slow.chosen
     assert np.isfinite(acceptance._contributed(base, base, chosen)).all()
-    monkeypatch.setattr(acceptance, "Projected", endless)
+    monkeypatch.setattr(acceptance, "VariableProjection", endless)
     assert np.isinf(acceptance._contributed(base, base, chosen)).all()
 
 
 def test_a_fit_that_begins_where_nothing_is_finite_ends_as_one_without_numbers(weak_and_slow, monkeypatch) -> None:
     """SciPy's own error for it would end the diagnosis."""
     fit = weak_and_slow.chosen.fit
-    monkeypatch.setattr(Projected, "ahead", lambda self, values: np.full(self.matrix.shape[0], np.inf))
+    monkeypatch.setattr(VariableProjection, "ahead", lambda self, values: np.full(self.matrix.shape[0], np.inf))
     with pytest.raises(np.linalg.LinAlgError, match="grows without end"):
-        polish(fit, rounds=1)
+        converged(fit, rounds=1)

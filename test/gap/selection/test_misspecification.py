@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.checkpoint import Steps
-from sysid_node.gap.estimation.fit import blank
+from sysid_node.gap.estimation.checkpoint import Checkpoint
+from sysid_node.gap.estimation.fit import unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.calibration import Grounds
 from sysid_node.gap.selection.candidate_fitter import Trier
 from sysid_node.gap.selection.misspecification import adequacy_of
@@ -21,11 +21,11 @@ def misfit(aircraft):
     """What a scale of the IMU leaves of what it does, fitted to a flight."""
 
     def of(flight):
-        view = view_of(Simulator(aircraft, 50.0), flight)
-        nuisances = nuisances_of(aircraft, view)
-        trier = Trier(nuisances, Steps())
-        base = trier.trial(blank([view], nuisances), [])
-        (candidate,) = (c for c in candidates_of(view.simulator, [view]) if c.label == "imu_scale")
+        model = residual_model_of(Simulator(aircraft, 50.0), flight)
+        nuisances = nuisances_of(aircraft, model)
+        trier = Trier(nuisances, Checkpoint())
+        base = trier.trial(unfitted([model], nuisances), [])
+        (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "imu_scale")
         return Grounds.of("imu_scale", 1000.0, adequacy_of(trier.beside(base, candidate).fit, candidate))
 
     return of

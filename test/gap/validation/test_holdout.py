@@ -73,7 +73,7 @@ def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(aircra
     fit = beside.corrected
     (lag,) = fit.indices
     assert beside.filed and fit.points[0][lag] == attribution.corrected.points[0][lag] == pytest.approx(0.08, rel=0.1)
-    assert np.flatnonzero(fit.points[0] != fit.views[0].simulator.neutral()).tolist() == [lag]
+    assert np.flatnonzero(fit.points[0] != fit.models[0].simulator.neutral()).tolist() == [lag]
 
 
 def test_a_single_flight_with_each_manoeuvre_once_is_checked_on_its_parts(aircraft) -> None:

@@ -5,30 +5,30 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import blank, polish, with_candidates
+from sysid_node.gap.estimation.fit import converged, unfitted, with_candidates
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.predictive_density import beside, cross_validated, groups_of
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, window_groups, with_neighbours
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.validation.kfold import _steps, parted
 from sysid_node.sim import Simulator
 
 
-def test_each_part_is_left_out_of_what_predicts_it(aircraft, plain_view) -> None:
-    fit = polish(blank([plain_view], nuisances_of(aircraft, plain_view)))
+def test_each_part_is_left_out_of_what_predicts_it(aircraft, plain_model) -> None:
+    fit = converged(unfitted([plain_model], nuisances_of(aircraft, plain_model)))
     (steps,) = _steps(fit, filed=False)
     _, sigma, _ = fit.stacked
-    for group, step in zip(groups_of(plain_view), steps, strict=True):
-        kept = np.setdiff1d(np.arange(plain_view.windows.count), beside(group, plain_view.windows.count))
+    for group, step in zip(window_groups(plain_model), steps, strict=True):
+        kept = np.setdiff1d(np.arange(plain_model.windows.count), with_neighbours(group, plain_model.windows.count))
         J, r = fit.slopes[0][kept].reshape(-1, step.size), fit.rows[0][kept].ravel()
         free = np.linalg.solve(J.T @ J + fit.prior_information, J.T @ r - fit.stacked[0] / sigma**2)
         assert np.abs(step / sigma).max() > 1e-3
         np.testing.assert_allclose(step / sigma, free / sigma, atol=1e-6)
 
 
-def test_nuisances_may_be_held(aircraft, plain_view) -> None:
-    fit = polish(blank([plain_view], nuisances_of(aircraft, plain_view)))
-    evidence = parted(cross_validated(fit), fit, filed=True)
-    own = [i for i, name in enumerate(plain_view.simulator.names) if name.startswith("derivative_error")]
+def test_nuisances_may_be_held(aircraft, plain_model) -> None:
+    fit = converged(unfitted([plain_model], nuisances_of(aircraft, plain_model)))
+    evidence = parted(cross_validated_evidence(fit), fit, filed=True)
+    own = [i for i, name in enumerate(plain_model.simulator.names) if name.startswith("derivative_error")]
     for point in evidence.points[0]:
         np.testing.assert_allclose(point[own], fit.points[0][own], rtol=0.0, atol=1e-5 * np.ptp(fit.points[0][own]))
 
@@ -36,15 +36,19 @@ def test_nuisances_may_be_held(aircraft, plain_view) -> None:
 def test_an_onset_stays_where_the_whole_flight_has_it(aircraft) -> None:
     """Without the parts about it, nothing tells of it; a linear step would lead anywhere."""
     lost = {"control_effectiveness_loss": {"elevator": 0.5, "onset": 12.0}}
-    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, lost, seed=22, turbulence="light"))
-    nuisances = nuisances_of(aircraft, view)
-    (loss,) = (c for c in candidates_of(view.simulator, [view]) if c.label == "control_effectiveness_loss of elevator")
-    fit = polish(with_candidates(polish(blank([view], nuisances)), [loss], nuisances, [0.5, 12.0]))
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, lost, seed=22, turbulence="light"))
+    nuisances = nuisances_of(aircraft, model)
+    (loss,) = (
+        c for c in candidates_of(model.simulator, [model]) if c.label == "control_effectiveness_loss of elevator"
+    )
+    fit = converged(with_candidates(converged(unfitted([model], nuisances)), [loss], nuisances, [0.5, 12.0]))
     _, onset = loss.indices
-    evidence = parted(cross_validated(fit), fit)
+    evidence = parted(cross_validated_evidence(fit), fit)
     assert [point[onset] for point in evidence.points[0]] == pytest.approx(
         [fit.points[0][onset]] * len(evidence.points[0]), abs=0.01
     )
-    bare = polish(blank([view], nuisances))
-    left, without = (np.abs(e.residuals[0][:, 1:]).max() for e in (evidence, parted(cross_validated(bare), bare)))
+    bare = converged(unfitted([model], nuisances))
+    left, without = (
+        np.abs(e.residuals[0][:, 1:]).max() for e in (evidence, parted(cross_validated_evidence(bare), bare))
+    )
     assert left < 2.0 * without

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid_node.gap.estimation.predictive_density import Evidence, groups_of
-from sysid_node.gap.residuals.build import view_of
-from sysid_node.gap.residuals.residual_model import View
+from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import WINDOW, drawn, flown, foreseen
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.verdict.decision import far_off
@@ -23,21 +23,21 @@ EFFECTS: dict[str, dict[str, dict[str, float]]] = {
 }
 
 
-def evidence(view: View, theta) -> Evidence:
-    count = len(groups_of(view))
-    return Evidence(np.zeros(count), (), (view,), ((theta,) * count,))
+def evidence(model: ResidualModel, theta) -> Evidence:
+    count = len(window_groups(model))
+    return Evidence(np.zeros(count), (), (model,), ((theta,) * count,))
 
 
-def gap_of(view: View, effects: Mapping[str, Mapping[str, float]]):
+def gap_of(model: ResidualModel, effects: Mapping[str, Mapping[str, float]]):
     """Before: the file; after: with the effects."""
-    simulator = view.simulator
-    return flown(evidence(view, simulator.neutral()), evidence(view, simulator.vector(effects)))
+    simulator = model.simulator
+    return flown(evidence(model, simulator.neutral()), evidence(model, simulator.vector(effects)))
 
 
 @pytest.mark.parametrize("kind", EFFECTS)
 def test_the_true_effect_leaves_the_noise_floor(aircraft, make_flight, kind) -> None:
-    view = view_of(Simulator(aircraft, 50.0), make_flight(EFFECTS[kind], seed=3))
-    gap = gap_of(view, EFFECTS[kind])
+    model = residual_model_of(Simulator(aircraft, 50.0), make_flight(EFFECTS[kind], seed=3))
+    gap = gap_of(model, EFFECTS[kind])
     assert gap.before > 4.0 * gap.noise_floor
     assert gap.after == pytest.approx(gap.noise_floor, rel=0.15) and gap.noise_floor < 0.15
     assert gap.shrink_percent == pytest.approx(100.0, abs=3.0)
@@ -45,26 +45,26 @@ def test_the_true_effect_leaves_the_noise_floor(aircraft, make_flight, kind) -> 
 
 def test_gusts_are_no_gap(aircraft, make_flight) -> None:
     """Light turbulence, nothing wrong: what it leaves is foretold by how much the air moved."""
-    view = view_of(Simulator(aircraft, 50.0), make_flight({}, seed=4, turbulence="light"))
-    gap = gap_of(view, {})
+    model = residual_model_of(Simulator(aircraft, 50.0), make_flight({}, seed=4, turbulence="light"))
+    gap = gap_of(model, {})
     assert gap.before == pytest.approx(gap.noise_floor, rel=0.3)
     assert gap.intervals["before"][0] < gap.before < gap.intervals["before"][1]
     assert gap.shrink_percent == 0.0
 
 
-def test_short_flights_begin_where_the_flight_is(plain_view) -> None:
+def test_short_flights_begin_where_the_flight_is(plain_model) -> None:
     """The simulator reads what was measured at the start of each, and departs from it later."""
-    beside = drawn(plain_view, [plain_view.simulator.vector({"mass_error": {"error": 0.3}})])
+    beside = drawn(plain_model, [plain_model.simulator.vector({"mass_error": {"error": 0.3}})])
     begins = np.flatnonzero(beside.begins)
-    assert np.diff(begins) == pytest.approx(WINDOW * plain_view.simulator.rate)
+    assert np.diff(begins) == pytest.approx(WINDOW * plain_model.simulator.rate)
     off = np.abs(beside.measured - beside.before)[:, 9]
     np.testing.assert_allclose(off[begins], 0.0, atol=1e-9)
     assert off.max() > 0.05
 
 
-def test_no_attitude_no_short_flights(plain_view) -> None:
-    columns = {n: v for n, v in plain_view.record.columns.items() if n not in ("phi", "theta")}
-    bare = replace(plain_view, record=replace(plain_view.record, columns=columns))
+def test_no_attitude_no_short_flights(plain_model) -> None:
+    columns = {n: v for n, v in plain_model.record.columns.items() if n not in ("phi", "theta")}
+    bare = replace(plain_model, record=replace(plain_model.record, columns=columns))
     assert gap_of(bare, {}) is None
 
 
@@ -72,9 +72,9 @@ def test_weather_is_foreseen_and_effects_are_not(aircraft, make_flight) -> None:
     """Turbulence in which nothing but the autopilot moves the surfaces, and a wing that rings in still air."""
     simulator = Simulator(aircraft, 50.0)
     weather = make_flight({}, seed=5, turbulence="light", manoeuvre=[])
-    assert foreseen([view_of(simulator, weather)])
+    assert foreseen([residual_model_of(simulator, weather)])
     slow = make_flight({"structural_mode": {"gain": 0.3}}, seed=6)
-    assert not foreseen([view_of(simulator, slow)])
+    assert not foreseen([residual_model_of(simulator, slow)])
 
 
 @pytest.mark.parametrize(("after", "told"), [((0.15, 0.18), True), ((0.09, 0.12), False)])

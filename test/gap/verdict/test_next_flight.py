@@ -5,20 +5,20 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import Fit, blank, linearised, with_candidates
+from sysid_node.gap.estimation.fit import CandidateFit, linearised, unfitted, with_candidates
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.residuals.build import view_of
+from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.verdict.next_flight import propose
 from sysid_node.sim import Simulator
 
 
 @pytest.fixture(scope="module")
-def fits(aircraft) -> dict[str, Fit]:
+def fits(aircraft) -> dict[str, CandidateFit]:
     """Explanations of a flight with late commands, each where it belongs."""
-    view = view_of(Simulator(aircraft, 50.0), fly(aircraft, {"command_delay": {"delay": 0.08}}, seed=14))
-    nuisances = nuisances_of(aircraft, view)
-    base = blank([view], nuisances)
-    table = {c.effect: c for c in candidates_of(view.simulator, [view])}
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {"command_delay": {"delay": 0.08}}, seed=14))
+    nuisances = nuisances_of(aircraft, model)
+    base = unfitted([model], nuisances)
+    table = {c.effect: c for c in candidates_of(model.simulator, [model])}
     sizes = {"command_delay": 0.08, "actuator_stamp_delay": -0.08, "actuator_lag": 0.08}
     return {n: linearised(with_candidates(base, [table[n]], nuisances, [size])) for n, size in sizes.items()}
 

@@ -11,7 +11,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.gap.estimation.predictive_density import carried
+from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, drawn, shows
 from sysid_node.gap.validation.spectral_error import STAGES
@@ -59,7 +59,7 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
         "facts": facts,
         "next_flight": found.next_flight,
         "short": bool(found.flown),
-        "window": f"{WINDOW:g} s" if found.flown else f"{found.views[0].windows.length:.2g} s",
+        "window": f"{WINDOW:g} s" if found.flown else f"{found.models[0].windows.length:.2g} s",
     }
 
 
@@ -134,8 +134,8 @@ Panel = tuple[Any, str, Figure]
 
 def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved, each short flight a line of its own."""
-    place = next(k for k, view in enumerate(found.views) if shows(view))
-    record = drawn(found.views[place], found.final.points[place])
+    place = next(k for k, model in enumerate(found.models) if shows(model))
+    record = drawn(found.models[place], found.final.points[place])
     span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
     begins = record.begins[span].copy()
     panels = []
@@ -159,15 +159,15 @@ def _worst(time: Array, error: Array) -> slice:
 
 def _coefficients(found: Diagnosis) -> list[Panel]:
     """Coefficients, constant offsets removed, and readings that the causes mend."""
-    view, gaps = found.views[0], found.gap.per_channel
-    point = carried(found.attribution.corrected, view)
-    before, after = view.predicted_series(view.simulator.neutral()), view.predicted_series(point)
+    model, gaps = found.models[0], found.gap.per_channel
+    point = transferred_parameters(found.attribution.corrected, model)
+    before, after = model.predicted_series(model.simulator.neutral()), model.predicted_series(point)
     mended = [name in gaps and gaps[name]["before"] > _MENDED * gaps[name]["after"] for name in CHANNELS]
     force = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
     panels = []
-    for k in np.flatnonzero(view.axes & (force | mended)):
-        shown = [x[:, k] - force[k] * (x[:, k].mean() - view.series[:, k].mean()) for x in (before, after)]
-        panels.append(_panel(CHANNELS[k], view.record.time, view.series[:, k], *shown))
+    for k in np.flatnonzero(model.axes & (force | mended)):
+        shown = [x[:, k] - force[k] * (x[:, k].mean() - model.series[:, k].mean()) for x in (before, after)]
+        panels.append(_panel(CHANNELS[k], model.record.time, model.series[:, k], *shown))
     return panels
 
 

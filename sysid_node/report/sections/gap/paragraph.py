@@ -129,8 +129,8 @@ def _falls(found: Diagnosis, otherwise: str) -> str:
 
 def _blindness(found: Diagnosis) -> str:
     """What was not measured, and what cannot be said without."""
-    angles = dict.fromkeys(angle for view in found.views for angle in view.flight.inferred)
-    thrust = "" if all(view.flight.metered for view in found.views) else _THRUST
+    angles = dict.fromkeys(angle for model in found.models for angle in model.flight.inferred)
+    thrust = "" if all(model.flight.metered for model in found.models) else _THRUST
     if not angles:
         return thrust
     known = " and ".join(WORDS[angle] for angle in angles)
@@ -140,7 +140,7 @@ def _blindness(found: Diagnosis) -> str:
 
 def _quiet(found: Diagnosis) -> str:
     """What of the flight was not looked at."""
-    left_out = sum(view.flight.left_out for view in found.views)
+    left_out = sum(model.flight.left_out for model in found.models)
     if not left_out:
         return ""
     return (
