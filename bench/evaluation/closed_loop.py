@@ -14,8 +14,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import controller
 from sysid_node.control.settings import Settings as Control
 from sysid_node.control.types import Sensed, SetPoints
-from sysid_node.excite import inflight
-from sysid_node.excite.inflight import Settings as Excitation
+from sysid_node.excite import exciter
+from sysid_node.excite.exciter import ExcitationSettings as Excitation
 from sysid_node.online.settings import Settings as Estimation
 from sysid_node.ros.beliefs import beliefs_of, precision_of
 from sysid_node.ros.session import Session
@@ -58,7 +58,7 @@ class Flown:
     surfaces: Array  # (N, 3)
     exciting: NDArray[np.bool_]  # (N,)
     cautions: list[str]  # what the pitch and lateral gains were last said to be
-    events: list[inflight.Event]
+    events: list[exciter.ExcitationEvent]
     lost: float  # s, when control was lost; inf = never
 
     def error(self, start: float, stop: float, without: NDArray[np.bool_] | None = None) -> Array:
@@ -97,27 +97,27 @@ def fly(sortie: Sortie) -> Flown:
     flight = live.start(simulator, trim, sortie.air, sound)
     pilot = controller.init(aircraft, Control(adapt=sortie.adapt))
     session = Session(aircraft, Estimation(method=sortie.method), ESTIMATES)
-    exciter = inflight.init(aircraft, sortie.excitation)
+    excitation = exciter.init(aircraft, sortie.excitation)
     command: Sequence[float] = trim.command.tolist()
     rows, lost = [], math.inf
     for k in range(round(sortie.seconds * RATE)):
         flight.theta = failed if k >= sortie.onset * RATE else sound
         now = live.step(simulator, flight, command)
-        _estimate(session, pilot, exciter, now)
-        command, wanted = _command(pilot, exciter, now, set_points(now.time, trim.alpha, sortie.asked))
+        _estimate(session, pilot, excitation, now)
+        command, wanted = _command(pilot, excitation, now, set_points(now.time, trim.alpha, sortie.asked))
         true = _attitude(now.state)
-        rows.append((now.time, *true, *wanted, *now.surfaces[:3], exciter.active))
+        rows.append((now.time, *true, *wanted, *now.surfaces[:3], excitation.active))
         if not (np.abs(true) < (1.0, 1.4, 0.6)).all():
             lost = now.time
             break
     table = np.array(rows)
     said = [axis.verdict for axis in pilot.axes]
     return Flown(
-        table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10] > 0.0, said, exciter.events, lost
+        table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10] > 0.0, said, excitation.events, lost
     )
 
 
-def _estimate(session: Session, pilot: controller.State, exciter: inflight.State, now: live.Reading) -> None:
+def _estimate(session: Session, pilot: controller.State, excitation: exciter.ExciterState, now: live.Reading) -> None:
     """Messages into the estimator, and what falls due to those who use it."""
     stamp = round(1e9 * now.time)
     *surfaces, thrust = now.surfaces.tolist()
@@ -131,18 +131,18 @@ def _estimate(session: Session, pilot: controller.State, exciter: inflight.State
     for due in session.imu(stamp, tuple(now.outputs[:6].tolist())):
         controller.hear(pilot, now.time, beliefs_of(due.estimates))
         precision = precision_of(due.estimates.derivatives.values(), session.aircraft)
-        if inflight.hear(exciter, now.time, precision):
+        if exciter.receive_estimates(excitation, now.time, precision):
             session.reset()
 
 
 def _command(
-    pilot: controller.State, exciter: inflight.State, now: live.Reading, points: SetPoints
+    pilot: controller.State, excitation: exciter.ExciterState, now: live.Reading, points: SetPoints
 ) -> tuple[Sequence[float], Array]:
     """Command (4,) and what was wanted: pitch, roll, sideslip (3,)."""
     _, _, az, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
-    if not exciter.events and now.time >= BEGIN:
-        inflight.start(exciter, now.time)
-    extra = inflight.step(exciter, now.time, inflight.Flight(phi, theta, V, -az / inflight.GRAVITY))
+    if not excitation.events and now.time >= BEGIN:
+        exciter.start(excitation, now.time)
+    extra = exciter.step(excitation, now.time, exciter.FlightCondition(phi, theta, V, -az / exciter.GRAVITY))
     sensed = Sensed(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
     command = controller.step(pilot, sensed, points, extra.tolist())
     wanted = pilot.law.wanted

@@ -8,25 +8,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.compatibility import check_sensors, corrected
+from sysid_node.batch.data_compatibility import check_sensors, corrected
 from sysid_node.batch.methods.constrained_least_squares import constrained_least_squares
-from sysid_node.batch.methods.equation_error import columns, equation_error
+from sysid_node.batch.methods.equation_error import equation_error, regressor_matrix
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error
-from sysid_node.batch.methods.integrated_models import Integrated
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
-from sysid_node.batch.methods.stepwise import Selection, supported
-from sysid_node.batch.regression.equations import equations
+from sysid_node.batch.methods.state_space import StateSpaceEstimation
+from sysid_node.batch.methods.stepwise import StepwiseSelection, supported_model
 from sysid_node.batch.regression.filtering import lowpass
-from sysid_node.batch.results.result import Answer, Fit
-from sysid_node.batch.results.validation import figures
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.regression.measured_coefficients import measured_coefficients
+from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
+from sysid_node.batch.results.validation import figures_of_merit
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
 #: Methods that regress each coefficient on measured signals.
-_REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], Settings], Fit]] = {
+_REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], BatchSettings], BatchFit]] = {
     "equation_error": lambda a, records, s: equation_error(a, records, s.low_pass),
     "frequency_equation_error": lambda a, records, s: frequency_equation_error(a, records, s.frequencies),
     "recursive_least_squares": lambda a, records, _: recursive_least_squares(a, records),
@@ -37,7 +37,7 @@ _REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], Settings], F
 METHODS = (*_REGRESSIONS, "output_error", "filter_error")
 
 #: Flight -> output or coefficient -> figure of merit -> value.
-Figures = dict[str, dict[str, dict[str, float]]]
+FiguresByFlight = dict[str, dict[str, dict[str, float]]]
 
 
 @dataclass(frozen=True)
@@ -47,17 +47,17 @@ class Identification:
     ``selections`` holds the stepwise choice of each coefficient's regressors, where one was made.
     """
 
-    fit: Fit
-    coefficients: Sequence[Answer]
-    holdout: Figures
-    selections: Mapping[str, Selection]
+    fit: BatchFit
+    coefficients: Sequence[ModelResponse]
+    holdout: FiguresByFlight
+    selections: Mapping[str, StepwiseSelection]
 
 
 def identify(
     method: str,
     aircraft: Aircraft,
     records: Sequence[FlightRecord],
-    settings: Settings,
+    settings: BatchSettings,
     holdout: Sequence[FlightRecord] = (),
 ) -> Identification:
     """Estimates the aircraft file's derivatives from ``records`` and checks them on ``holdout``.
@@ -70,23 +70,23 @@ def identify(
         raise InputError("no flight to identify from; give at least one")
     records, holdout = _named(records), _named(holdout)
     remarks: list[str] = []
-    selections: dict[str, Selection] = {}
+    selections: dict[str, StepwiseSelection] = {}
     if settings.correct_sensors:
         found = check_sensors(aircraft, records, settings.segment or 10.0)
         records, holdout = found.corrected, [corrected(record, found.fit.values) for record in holdout]
         remarks += found.remarks
     if settings.stepwise:
         before = aircraft.derivatives
-        aircraft, selections = supported(aircraft, records, settings.low_pass)
+        aircraft, selections = supported_model(aircraft, records, settings.low_pass)
         lost = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(lost) or 'nothing'}")
-    integrated = None if method in _REGRESSIONS else Integrated.of(method, aircraft, records, settings)
+    integrated = None if method in _REGRESSIONS else StateSpaceEstimation.of(method, aircraft, records, settings)
     fit = integrated.fit() if integrated else _REGRESSIONS[method](aircraft, records, settings)
-    answered: Figures = {}
+    answered: FiguresByFlight = {}
     for record in holdout:
-        answers = predicted_coefficients(aircraft, fit.values, [record], settings.low_pass)
-        answers += integrated.answers(fit, record) if integrated else []
-        answered[record.name] = _figures(aircraft, record, answers)
+        responses = predicted_coefficients(aircraft, fit.values, [record], settings.low_pass)
+        responses += integrated.responses(fit, record) if integrated else []
+        answered[record.name] = _figures_of_flight(aircraft, record, responses)
     return Identification(
         replace(fit, remarks=(*remarks, *fit.remarks)),
         predicted_coefficients(aircraft, fit.values, records, settings.low_pass),
@@ -106,34 +106,38 @@ def _named(records: Sequence[FlightRecord]) -> list[FlightRecord]:
 
 def predicted_coefficients(
     aircraft: Aircraft, values: Mapping[str, float], records: Sequence[FlightRecord], low_pass: float
-) -> list[Answer]:
+) -> list[ModelResponse]:
     """Measured coefficients and what ``values`` make of them, below ``low_pass`` Hz, for each flight that allows it."""
-    answers = []
+    responses = []
     for record in records:
         try:
-            flight = equations(aircraft, record)
+            flight = measured_coefficients(aircraft, record)
         except InputError:
             continue  # a flight without, say, a sideslip vane can be integrated, but its coefficients cannot be formed
         modelled: dict[str, Array] = {}
         for coefficient, regressors in aircraft.structure.items():
             names = [f"{coefficient}_{name}" for name in regressors]
             if coefficient in flight.coefficients and all(name in values for name in names):
-                modelled[coefficient] = columns(flight, regressors) @ np.array([values[name] for name in names])
+                modelled[coefficient] = regressor_matrix(flight, regressors) @ np.array(
+                    [values[name] for name in names]
+                )
         if modelled:
             measured = np.column_stack([flight.coefficients[name] for name in modelled])
             shown = [lowpass(flight.time, X, low_pass) for X in (measured, np.column_stack(list(modelled.values())))]
-            answers.append(Answer(flight.name, flight.time, tuple(modelled), *shown))
-    return answers
+            responses.append(ModelResponse(flight.name, flight.time, tuple(modelled), *shown))
+    return responses
 
 
-def _figures(aircraft: Aircraft, record: FlightRecord, answers: Sequence[Answer]) -> dict[str, dict[str, float]]:
+def _figures_of_flight(
+    aircraft: Aircraft, record: FlightRecord, responses: Sequence[ModelResponse]
+) -> dict[str, dict[str, float]]:
     """Figures of merit of all answers to one flight."""
     table: dict[str, dict[str, float]] = {}
-    for answer in answers:
+    for response in responses:
         inputs = {
-            symbol: np.interp(answer.time, record.time, record[symbol])
+            symbol: np.interp(response.time, record.time, record[symbol])
             for symbol in aircraft.control_symbols
             if np.isfinite(record[symbol]).all()
         }
-        table |= figures(answer, inputs)
+        table |= figures_of_merit(response, inputs)
     return table

@@ -1,4 +1,4 @@
-"""What can be set of the batch estimators: one table for ``--set``, ``summary.json`` and tests."""
+"""Settings of the batch estimators, for ``--set``, ``summary.json`` and tests."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
-from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS
+from sysid_node.batch.methods.equation_error import DEFAULT_LOW_PASS
 from sysid_node.batch.methods.frequency_equation_error import DEFAULT_FREQUENCIES, Frequencies
 from sysid_node.errors import InputError
 from sysid_node.setting import check_frequencies, parsed
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of the batch estimators; raises InputError on impossible values."""
+class BatchSettings:
+    """The settings of the batch estimators; raises InputError on impossible values."""
 
     frequencies: Frequencies = DEFAULT_FREQUENCIES  # Hz: first line, step, last line (frequency_equation_error)
-    low_pass: float = DEFAULT_LOWPASS  # Hz: what is above is left out; 0 = nothing (equation_error)
+    low_pass: float = DEFAULT_LOW_PASS  # Hz: what is above is left out; 0 = nothing (equation_error)
     rate: float = 100.0  # Hz: faster measurements are averaged down to it; 0 = none (output_error, filter_error)
     segment: float = 10.0  # s: flights are cut into pieces this long, each with its own initial state; 0 = whole
     states: tuple[str, ...] = ()  # to be integrated; the others count as measured. Empty: what the model allows
@@ -38,7 +38,7 @@ class Settings:
             raise InputError(f"setting max_gap = {self.max_gap}: expected seconds, more than zero")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Settings:
+    def from_mapping(cls, values: Mapping[str, Any]) -> BatchSettings:
         """From ``--set key=value`` texts or plain values. Raises InputError naming the wrong key or value."""
         kinds = get_type_hints(cls)
         for key in values:

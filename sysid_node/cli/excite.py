@@ -22,7 +22,7 @@ from sysid_node.flight.logs import streams_of
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
-    from sysid_node.excite.optimise import Envelope
+    from sysid_node.excite.optimise import FlightEnvelope
     from sysid_node.excite.prediction import Predictor
     from sysid_node.excite.spec import Segment
     from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
@@ -84,7 +84,7 @@ def _optimised(
     predictor: Predictor,
     segments: Sequence[Segment],
     plan: Manoeuvre,
-    envelope: Envelope,
+    envelope: FlightEnvelope,
     progress: Callable[[float], None],
 ) -> ManoeuvreResult:
     from sysid_node.excite.optimise import optimise  # noqa: PLC0415
@@ -95,11 +95,11 @@ def _optimised(
     return ManoeuvreResult(predictor.aircraft, optimum.best, envelope, not args.open_loop, optimum)
 
 
-def parse_envelope(texts: Iterable[str]) -> Envelope:
+def parse_envelope(texts: Iterable[str]) -> FlightEnvelope:
     """Limits from ``name=value`` texts, the rest as they are by default. Raises InputError."""
-    from sysid_node.excite.optimise import Envelope  # noqa: PLC0415
+    from sysid_node.excite.optimise import FlightEnvelope  # noqa: PLC0415
 
-    known = tuple(Envelope.__dataclass_fields__)
+    known = tuple(FlightEnvelope.__dataclass_fields__)
     values: dict[str, float] = {}
     for text in texts:
         name, _, value = (part.strip() for part in text.partition("="))
@@ -111,7 +111,7 @@ def parse_envelope(texts: Iterable[str]) -> Envelope:
             values[name] = math.nan
         if not 0 < values[name] < math.inf:
             raise InputError(f"--envelope {text!r}: expected {name}=VALUE, above zero (rad, rad/s, or a share)")
-    return Envelope(**values)
+    return FlightEnvelope(**values)
 
 
 def write_design(folder: Path, result: ManoeuvreResult) -> None:

@@ -15,8 +15,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import METHODS, Identification, identify
 from sysid_node.batch.models.rigid_body import OUTPUTS
-from sysid_node.batch.results.result import Answer, Estimate, quality
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.results.batch_fit import ModelResponse, ParameterEstimate, goodness_of_fit
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.cli.shared.terminal import progress_bar, show_estimates
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
@@ -41,7 +41,7 @@ def run_result(
     aircraft: Aircraft,
     records: Sequence[FlightRecord],
     found: Identification,
-    settings: Settings,
+    settings: BatchSettings,
     truth: Mapping[str, float] | None = None,
 ) -> RunResult:
     """All that the report, the summary and the tables need. ``records`` are the flights that were fitted."""
@@ -70,7 +70,9 @@ def run_result(
     )
 
 
-def _derivative(name: str, estimate: Estimate | None, trusted: str, remarks: Sequence[str]) -> DerivativeEstimate:
+def _derivative(
+    name: str, estimate: ParameterEstimate | None, trusted: str, remarks: Sequence[str]
+) -> DerivativeEstimate:
     """One row of the table; a derivative that was not estimated is there with the reason."""
     if estimate is None:
         coefficient = name.partition("_")[0]
@@ -88,7 +90,7 @@ def _fits(found: Identification) -> dict[str, FitQuality]:
     """Quality by coefficient, then by the outputs of a method that integrates."""
     names = list(found.fit.estimates)
     table = {}
-    for name, q in (quality(found.fit.answers) | quality(found.coefficients)).items():
+    for name, q in (goodness_of_fit(found.fit.responses) | goodness_of_fit(found.coefficients)).items():
         own = sum(key.startswith(f"{name}_") for key in names)
         freedom = float(q.samples - (own or len(names)))
         table[name] = FitQuality(name, q.r_squared, q.residual_std, freedom, q.samples)
@@ -98,32 +100,32 @@ def _fits(found: Identification) -> dict[str, FitQuality]:
 def _responses(found: Identification) -> dict[str, Response]:
     """Of the first flight: its outputs, and its coefficients."""
     table = {}
-    for answer in (*found.fit.answers[:1], *found.coefficients[:1]):
-        for name in answer.names:
-            table[name] = Response(OUTPUTS.get(name, ""), answer.time, *answer.column(name))
+    for response in (*found.fit.responses[:1], *found.coefficients[:1]):
+        for name in response.names:
+            table[name] = Response(OUTPUTS.get(name, ""), response.time, *response.column(name))
     return table
 
 
-def _note(records: Sequence[FlightRecord], settings: Settings) -> str:
+def _note(records: Sequence[FlightRecord], settings: BatchSettings) -> str:
     which = f"The first of {len(records)} flights. " if len(records) > 1 else ""
     return f"{which}Coefficients are shown below {settings.low_pass:g} Hz." if settings.low_pass else which
 
 
-def _spectra(aircraft: Aircraft, record: FlightRecord, coefficients: Sequence[Answer]) -> Spectra | None:
+def _spectra(aircraft: Aircraft, record: FlightRecord, coefficients: Sequence[ModelResponse]) -> Spectra | None:
     """Of the first flight: the controls, the coefficients and what the model leaves of them."""
     if not coefficients:
         return None
-    answer = coefficients[0]
-    frequency = _SPECTRUM[0.4 / float(np.median(np.diff(answer.time))) > _SPECTRUM]
+    response = coefficients[0]
+    frequency = _SPECTRUM[0.4 / float(np.median(np.diff(response.time))) > _SPECTRUM]
     complete = [symbol for symbol in aircraft.control_symbols if np.isfinite(record[symbol]).all()]
     inputs = amplitude_spectrum(record.time, np.column_stack([record[s] for s in complete]), frequency)
-    measured = amplitude_spectrum(answer.time, answer.measured, frequency)
-    residuals = amplitude_spectrum(answer.time, answer.residuals, frequency)
+    measured = amplitude_spectrum(response.time, response.measured, frequency)
+    residuals = amplitude_spectrum(response.time, response.residuals, frequency)
     return Spectra(
         frequency,
         dict(zip(complete, inputs.T, strict=True)),
-        dict(zip(answer.names, measured.T, strict=True)),
-        dict(zip(answer.names, residuals.T, strict=True)),
+        dict(zip(response.names, measured.T, strict=True)),
+        dict(zip(response.names, residuals.T, strict=True)),
     )
 
 
@@ -165,7 +167,7 @@ def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) 
     write_table(path, header, rows, keep_empty=False)
 
 
-def parse_settings(texts: Iterable[str], frequencies: str | None = None) -> Settings:
+def parse_settings(texts: Iterable[str], frequencies: str | None = None) -> BatchSettings:
     """From ``key=value`` texts. Raises InputError naming the key or the value that is wrong."""
     values: dict[str, str] = {}
     for text in texts:
@@ -175,7 +177,7 @@ def parse_settings(texts: Iterable[str], frequencies: str | None = None) -> Sett
         values[key.strip()] = value.strip()
     if frequencies is not None:
         values["frequencies"] = frequencies
-    return Settings.from_mapping(values)
+    return BatchSettings.from_mapping(values)
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -190,7 +192,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         "--holdout", action="append", default=[], metavar="BAG", type=Path, help="a flight to check the result on"
     )
     parser.add_argument("--frequencies", metavar="START:STEP:STOP", help="lines of frequency_equation_error, Hz")
-    known = ", ".join(field.name for field in fields(Settings))
+    known = ", ".join(field.name for field in fields(BatchSettings))
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=f"a setting: {known}")
     parser.add_argument(
         "--topic", action="append", default=[], metavar="OURS:=THEIRS", help="a topic's name in the bags"

@@ -19,7 +19,7 @@ _UNSEEN = 1e-12
 
 
 @dataclass(frozen=True)
-class Information:
+class FisherInformation:
     """Information on ``names`` (P,) once the nuisances are estimated too.
 
     ``matrix`` (P, P) is the Fisher information, ``values`` (P,) where it holds; SI units of the parameters.

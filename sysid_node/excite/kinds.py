@@ -16,7 +16,7 @@ Values = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Key:
+class ManoeuvreKey:
     """A number that shapes a manoeuvre: default, unit, what it means, and whether it must be above zero."""
 
     default: float
@@ -26,11 +26,11 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ManoeuvreKind:
     """One kind. ``draw(time, values, count)`` gives (count, N), peak one, zero outside 0 to ``length(values)`` s."""
 
     meaning: str
-    keys: Mapping[str, Key]
+    keys: Mapping[str, ManoeuvreKey]
     length: Callable[[Values], float]
     draw: Callable[[Array, Values, int], Array]
     apart: bool = False  # whether controls that move at once can be told apart
@@ -38,24 +38,24 @@ class Kind:
 
 #: Keys of every kind, besides ``amplitude`` (rad; one for all controls of the segment, or one each).
 COMMON_KEYS = {
-    "start": Key(1.0, "s", "when it begins", positive=False),
-    "repeat": Key(1.0, "", "how often it is flown"),
-    "every": Key(0.0, "s", "from one beginning to the next; 0: one second after the last end", positive=False),
+    "start": ManoeuvreKey(1.0, "s", "when it begins", positive=False),
+    "repeat": ManoeuvreKey(1.0, "", "how often it is flown"),
+    "every": ManoeuvreKey(0.0, "s", "from one beginning to the next; 0: one second after the last end", positive=False),
 }
 
 _BAND = {
-    "length": Key(20.0, "s", "how long it lasts"),
-    "low": Key(0.1, "Hz", "lowest frequency"),
-    "high": Key(2.0, "Hz", "highest frequency"),
+    "length": ManoeuvreKey(20.0, "s", "how long it lasts"),
+    "low": ManoeuvreKey(0.1, "Hz", "lowest frequency"),
+    "high": ManoeuvreKey(2.0, "Hz", "highest frequency"),
 }
 
 
-def _steps(meaning: str, *pattern: float) -> Kind:
+def _steps(meaning: str, *pattern: float) -> ManoeuvreKind:
     def draw(time: Array, values: Values, count: int) -> Array:
         return np.tile(shapes.multistep(time, pattern, values["width"]), (count, 1))
 
-    keys = {"width": Key(0.5, "s", "length of the unit step")}
-    return Kind(meaning, keys, lambda values: sum(pattern) * values["width"], draw)
+    keys = {"width": ManoeuvreKey(0.5, "s", "length of the unit step")}
+    return ManoeuvreKind(meaning, keys, lambda values: sum(pattern) * values["width"], draw)
 
 
 def _ramp(time: Array, values: Values, count: int) -> Array:
@@ -80,19 +80,21 @@ def _length(values: Values) -> float:
     return values["length"]
 
 
-KINDS: Mapping[str, Kind] = {
+KINDS: Mapping[str, ManoeuvreKind] = {
     "pulse": _steps("one step and back", 1),
     "doublet": _steps("a step, its opposite, and back", 1, 1),
     "211": _steps("steps of 2, 1 and 1 units, alternating", 2, 1, 1),
     "3211": _steps("steps of 3, 2, 1 and 1 units, alternating", 3, 2, 1, 1),
-    "ramp": Kind("a slow triangle", {"length": Key(20.0, "s", "how long it lasts")}, _length, _ramp),
-    "sweep": Kind("a sine of growing frequency", _BAND, _length, _sweep),
-    "random": Kind(
+    "ramp": ManoeuvreKind("a slow triangle", {"length": ManoeuvreKey(20.0, "s", "how long it lasts")}, _length, _ramp),
+    "sweep": ManoeuvreKind("a sine of growing frequency", _BAND, _length, _sweep),
+    "random": ManoeuvreKind(
         "band-limited Gaussian noise, another for each control",
-        {**_BAND, "seed": Key(1.0, "", "of the random numbers", positive=False)},
+        {**_BAND, "seed": ManoeuvreKey(1.0, "", "of the random numbers", positive=False)},
         _length,
         _random,
         apart=True,
     ),
-    "multisine": Kind("orthogonal multisines on all its controls at once", _BAND, _length, _multisine, apart=True),
+    "multisine": ManoeuvreKind(
+        "orthogonal multisines on all its controls at once", _BAND, _length, _multisine, apart=True
+    ),
 }

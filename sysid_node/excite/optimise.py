@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from sysid_node.errors import InputError
-from sysid_node.excite.information import Information
+from sysid_node.excite.information import FisherInformation
 from sysid_node.excite.prediction import Prediction, Predictor, tolerances_of
-from sysid_node.excite.space import Space
+from sysid_node.excite.search_space import SearchSpace
 from sysid_node.excite.spec import Segment
 from sysid_node.flight.record import FlightRecord
 
@@ -31,7 +31,7 @@ _SHOWN = 0.9
 
 
 @dataclass(frozen=True)
-class Envelope:
+class FlightEnvelope:
     """How far a flight may stray from trim: angles rad, any angular rate rad/s, airspeed as a share of trim's."""
 
     alpha: float = 0.10
@@ -66,7 +66,7 @@ class Optimum:
     evaluations: int
 
 
-def shares_left(information: Information, tolerances: Array) -> Array:
+def posterior_to_prior_ratios(information: FisherInformation, tolerances: Array) -> Array:
     """Standard error over tolerance (P,) once the flight and the aircraft file are both known: 1, nothing learnt."""
     scaled = tolerances[:, None] * information.matrix * tolerances
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(scaled + np.eye(len(tolerances))))))
@@ -76,7 +76,7 @@ def optimise(
     predictor: Predictor,
     segments: Sequence[Segment],
     duration: float,
-    envelope: Envelope | None = None,
+    envelope: FlightEnvelope | None = None,
     evaluations: int = 200,
     progress: Callable[[int, float], None] | None = None,
 ) -> Optimum:
@@ -86,7 +86,7 @@ def optimise(
     Raises InputError where the start cannot be flown, or leaves the envelope however small it is.
     """
     start = predictor.predict(predictor.draw(segments, duration))
-    search = _Search(predictor, segments, duration, envelope or Envelope(), start, progress)
+    search = _Search(predictor, segments, duration, envelope or FlightEnvelope(), start, progress)
     minimize(
         search.cost,
         search.begin(),
@@ -109,14 +109,14 @@ class _Search:
         predictor: Predictor,
         segments: Sequence[Segment],
         duration: float,
-        envelope: Envelope,
+        envelope: FlightEnvelope,
         start: Prediction,
         progress: Callable[[int, float], None] | None,
     ) -> None:
-        self.space = Space(predictor, segments, duration)
+        self.space = SearchSpace(predictor, segments, duration)
         self.envelope, self.progress = envelope, progress
         self._tolerances = tolerances_of(predictor.aircraft)
-        shown = shares_left(start.information, self._tolerances) < _SHOWN
+        shown = posterior_to_prior_ratios(start.information, self._tolerances) < _SHOWN
         self.counted = shown if shown.any() else np.ones(len(shown), dtype=bool)
         self.best: Prediction | None = None
         self.best_cost = np.inf
@@ -125,7 +125,9 @@ class _Search:
 
     def left(self, prediction: Prediction) -> float:
         """Root mean square share of the counted tolerances that this flight leaves."""
-        return float(np.sqrt(np.mean(shares_left(prediction.information, self._tolerances)[self.counted] ** 2)))
+        return float(
+            np.sqrt(np.mean(posterior_to_prior_ratios(prediction.information, self._tolerances)[self.counted] ** 2))
+        )
 
     def begin(self) -> Array:
         """The start as a point (size,), its amplitudes halved until the flight stays within the envelope."""

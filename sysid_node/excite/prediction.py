@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.excite.information import Information, eliminate, fisher
+from sysid_node.excite.information import FisherInformation, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
 from sysid_node.excite.spec import Segment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
@@ -46,7 +46,7 @@ class Prediction:
 
     manoeuvre: Manoeuvre
     flight: FlightRecord
-    information: Information
+    information: FisherInformation
 
 
 def tolerances_of(aircraft: Aircraft) -> Array:
@@ -93,7 +93,7 @@ class Predictor:
         """Fly it from trim. Raises InputError where a control saturates or the flight diverges."""
         flight = self._fly(self.commands(manoeuvre))
         matrix = fisher(self._slopes(np.asarray(flight.commands)), self._sigma)
-        information = Information(self.names, self.values, eliminate(matrix, len(self.names)))
+        information = FisherInformation(self.names, self.values, eliminate(matrix, len(self.names)))
         return Prediction(manoeuvre, self._record(manoeuvre, flight), information)
 
     def _record(self, manoeuvre: Manoeuvre, flight: Flight) -> FlightRecord:

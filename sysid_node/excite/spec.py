@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.excite.kinds import COMMON_KEYS, KINDS, Key
+from sysid_node.excite.kinds import COMMON_KEYS, KINDS, ManoeuvreKey
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, check_limits, control_limits
 
 Array = NDArray[np.float64]
@@ -207,7 +207,7 @@ def _float(text: str, key: str, value: str) -> float:
     return number
 
 
-def _number(text: str, key: str, value: str | None, known: Key) -> float:
+def _number(text: str, key: str, value: str | None, known: ManoeuvreKey) -> float:
     number = known.default if value is None else _float(text, key, value)
     if number < 0 or (known.positive and number == 0):
         bound = "above zero" if known.positive else "not negative"

@@ -15,8 +15,8 @@ from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.errors import InputError
-from sysid_node.excite import inflight
-from sysid_node.excite.inflight import RANGES, Flight, Settings
+from sysid_node.excite import exciter
+from sysid_node.excite.exciter import RANGES, ExcitationSettings, FlightCondition
 from sysid_node.flight.topics import AIR_DATA, IMU
 from sysid_node.ros import conversion, inputs
 from sysid_node.ros.beliefs import precision_of
@@ -25,7 +25,7 @@ from sysid_node.ros.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, 
 from sysid_node.ros.parameters import Parameter, setting
 from sysid_node.ros.spin import run_program, serve
 
-_DEFAULT = Settings()
+_DEFAULT = ExcitationSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
@@ -72,7 +72,7 @@ class Exciter(LoopNode):
         super().__init__("exciter", PARAMETERS)
         asked = {name: self.values[name] for name in ("watch", *RANGES)}
         asked |= {name: tuple(self.values[name].split()) for name in ("derivatives", "manoeuvre")}
-        self._state = inflight.init(self.aircraft, Settings(**asked))
+        self._state = exciter.init(self.aircraft, ExcitationSettings(**asked))
         self._inertial, self._air = (-math.inf, (math.nan,) * 3), (-math.inf, math.nan)
         self._said = 0
         self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first
@@ -95,7 +95,7 @@ class Exciter(LoopNode):
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
         stamp, values, attitude = inputs.imu_and_attitude(numbers)
-        self._inertial = time.monotonic(), (*attitude, -values[2] / inflight.GRAVITY)
+        self._inertial = time.monotonic(), (*attitude, -values[2] / exciter.GRAVITY)
         self._start_ns = self._start_ns or stamp
         self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
 
@@ -106,7 +106,7 @@ class Exciter(LoopNode):
         estimates = conversion.estimates_from_message(message, 0)
         known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
         precision = precision_of(known.values(), self.aircraft)
-        if inflight.hear(self._state, self._now, precision) and self._reset.service_is_ready():
+        if exciter.receive_estimates(self._state, self._now, precision) and self._reset.service_is_ready():
             self._reset.call_async(Trigger.Request())
         self._tell()
 
@@ -117,21 +117,21 @@ class Exciter(LoopNode):
             roll = pitch = load = math.nan
         if now - measured > STALE:
             airspeed = math.nan
-        moved = inflight.step(self._state, self._now, Flight(roll, pitch, airspeed, load))
+        moved = exciter.step(self._state, self._now, FlightCondition(roll, pitch, airspeed, load))
         stamp = self.get_clock().now().nanoseconds
         self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
         self._tell()
 
     def _on_start(self, _: Any, response: Any) -> Any:
         try:
-            inflight.start(self._state, self._now)
+            exciter.start(self._state, self._now)
             response.success, response.message = True, f"until {', '.join(self._state.settings.derivatives)} are known"
         except InputError as error:
             response.success, response.message = False, str(error)
         return response
 
     def _on_stop(self, _: Any, response: Any) -> Any:
-        inflight.stop(self._state, self._now, "stopped on request")
+        exciter.stop(self._state, self._now, "stopped on request")
         response.success, response.message = True, "surfaces are in the middle"
         return response
 

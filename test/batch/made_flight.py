@@ -11,7 +11,7 @@ from scipy.optimize import fsolve
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.model import Manoeuvre
+from sysid_node.batch.models.model import ManoeuvreData
 from sysid_node.batch.models.rigid_body import OUTPUTS, STATES, rigid_body
 from sysid_node.flight.record import FlightRecord
 
@@ -59,7 +59,7 @@ def clean(seconds: float = 12.0, rate: float = 100.0, turn: int = 1) -> FlightRe
     start = {"V": KESTREL.reference.airspeed, "alpha": alpha, "theta": alpha}
     state = np.array([start.get(name, 0.0) for name in MODEL.states])
     inputs = np.column_stack([columns[name] for name in MODEL.inputs])
-    blank = Manoeuvre(time, inputs, np.zeros((time.size, len(MODEL.outputs))), state)
+    blank = ManoeuvreData(time, inputs, np.zeros((time.size, len(MODEL.outputs))), state)
     outputs = rollout.outputs(MODEL, blank, MODEL.start)
     return FlightRecord(time, columns | dict(zip(MODEL.outputs, outputs.T, strict=True)), f"kestrel {turn:+d}")
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.model import Manoeuvre, Model, Parameter, Scalars
+from sysid_node.batch.models.model import ManoeuvreData, Parameter, Scalars, StateSpaceModel
 from sysid_node.flight.record import Array
 
 #: Short period of a small aircraft at 18 m/s, dimensional: alpha' = q + Za alpha + Zd de, q' = Ma alpha + Mq q + Md de.
@@ -15,7 +15,7 @@ SPEED = 18.0
 NOISE = np.array([0.004, 0.003, 0.05])  # alpha rad, q rad/s, az m/s^2
 
 
-def short_period_model(start: dict[str, float] | None = None, **parameter: object) -> Model:
+def short_period_model(start: dict[str, float] | None = None, **parameter: object) -> StateSpaceModel:
     """Linear short period, outputs alpha, q and the normal acceleration of the path; keywords go to all parameters."""
 
     def derivative(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
@@ -27,7 +27,7 @@ def short_period_model(start: dict[str, float] | None = None, **parameter: objec
         return alpha, q, SPEED * (theta[0] * alpha + theta[1] * de)
 
     values = SHORT_PERIOD | (start or {})
-    return Model(
+    return StateSpaceModel(
         name="short_period",
         states=("alpha", "q"),
         inputs=("de",),
@@ -48,20 +48,22 @@ def multistep(time: Array, start: float, width: float, amplitude: float) -> Arra
 
 
 def flown(
-    model: Model, seconds: float = 10.0, rate: float = 50.0, initial: tuple[float, float] = (0.0, 0.0)
-) -> Manoeuvre:
+    model: StateSpaceModel, seconds: float = 10.0, rate: float = 50.0, initial: tuple[float, float] = (0.0, 0.0)
+) -> ManoeuvreData:
     """A noise-free manoeuvre of ``model`` at its start values."""
     time = np.arange(int(seconds * rate)) / rate
     inputs = (multistep(time, 1.0, 0.25, 0.05) - multistep(time, 5.0, 0.15, 0.05))[:, None]
-    blank = Manoeuvre(time, inputs, np.zeros((time.size, len(model.outputs))), np.array(initial))
+    blank = ManoeuvreData(time, inputs, np.zeros((time.size, len(model.outputs))), np.array(initial))
     return with_outputs(blank, rollout.outputs(model, blank, model.start))
 
 
-def with_outputs(manoeuvre: Manoeuvre, outputs: Array) -> Manoeuvre:
-    return Manoeuvre(manoeuvre.time, manoeuvre.inputs, outputs, manoeuvre.initial_state, manoeuvre.name)
+def with_outputs(manoeuvre: ManoeuvreData, outputs: Array) -> ManoeuvreData:
+    return ManoeuvreData(manoeuvre.time, manoeuvre.inputs, outputs, manoeuvre.initial_state, manoeuvre.name)
 
 
-def noisy(manoeuvre: Manoeuvre, rng: np.random.Generator, deviation: Array = NOISE, colour: float = 0.0) -> Manoeuvre:
+def noisy(
+    manoeuvre: ManoeuvreData, rng: np.random.Generator, deviation: Array = NOISE, colour: float = 0.0
+) -> ManoeuvreData:
     """With added noise; ``colour`` is the noise's correlation time, s (0: white)."""
     noise = rng.normal(size=(len(manoeuvre) + 500, deviation.size))
     if colour > 0.0:

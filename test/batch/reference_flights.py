@@ -12,8 +12,8 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
 from sysid_node.batch.models.lateral_rates import lateral_rates
-from sysid_node.batch.models.manoeuvres import manoeuvre, with_forces_at_cg
-from sysid_node.batch.models.model import Manoeuvre, Model
+from sysid_node.batch.models.manoeuvres import manoeuvre_data, with_forces_at_cg
+from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
 from sysid_node.batch.models.rigid_body import rigid_body
 from sysid_node.batch.models.short_period import short_period
 from sysid_node.batch.regression.filtering import differentiate, lowpass
@@ -86,8 +86,8 @@ TWIN_OTTER_FREQUENCY = {
 class ReferenceCase:
     """A model, a manoeuvre and the aircraft of one published analysis."""
 
-    model: Model
-    manoeuvre: Manoeuvre
+    model: StateSpaceModel
+    manoeuvre: ManoeuvreData
     aircraft: Aircraft
     record: FlightRecord
 
@@ -116,7 +116,7 @@ def hfb_320(
     record = with_forces_at_cg(aircraft, FlightRecord(0.1 * np.arange(len(flown)), columns, "hfb320"))
     model = rigid_body(aircraft, ("V", "alpha", "theta", "q"), outputs, reference_rates=True)
     start = {"V": 106.023, "alpha": 0.111685, "theta": 0.104887, "q": -0.00332659}
-    return ReferenceCase(model, manoeuvre(model, record, start), aircraft, record)
+    return ReferenceCase(model, manoeuvre_data(model, record, start), aircraft, record)
 
 
 def attas_lateral(flights: Path, cutoff: float = 4.0) -> ReferenceCase:
@@ -144,7 +144,7 @@ def attas_lateral(flights: Path, cutoff: float = 4.0) -> ReferenceCase:
         "attas", "", 17631.0, Inertia(133367.0, 252687.0, 359593.0, 11442.0), Geometry(64.0, 21.5, 3.159),
         Reference(130.0, 0.73), {}, {},
     )  # fmt: skip
-    return ReferenceCase(model, manoeuvre(model, record, {"p": 0.0, "r": 0.0}), aircraft, record)
+    return ReferenceCase(model, manoeuvre_data(model, record, {"p": 0.0, "r": 0.0}), aircraft, record)
 
 
 def twin_otter(flights: Path) -> ReferenceCase:
@@ -166,4 +166,4 @@ def twin_otter(flights: Path) -> ReferenceCase:
     record = FlightRecord(0.02 * np.arange(len(flown)), columns, "twin_otter_018")
     start = {"CZ_alpha": -6.3, "CZ_de": -0.6, "CZ_0": -0.6, "Cm_alpha": -1.4, "Cm_q": -36.0, "Cm_de": -1.8}
     model = short_period(aircraft, start, float(flown["alpha"][0]), float(flown["de"][0]))
-    return ReferenceCase(model, manoeuvre(model, record), aircraft, record)
+    return ReferenceCase(model, manoeuvre_data(model, record), aircraft, record)

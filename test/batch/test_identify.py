@@ -7,14 +7,14 @@ import pytest
 from made_flight import KESTREL, TRUTH, clean, flight, scores
 
 from sysid_node.batch.identify import METHODS, identify
-from sysid_node.batch.methods.integrated_models import choose_model
-from sysid_node.batch.models.manoeuvres import segments
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.methods.state_space import model_for_flights
+from sysid_node.batch.models.manoeuvres import cut_into_segments
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
 #: Fast: fewer samples, and pieces of one length.
-QUICK = Settings(rate=50.0, segment=6.0)
+QUICK = BatchSettings(rate=50.0, segment=6.0)
 
 
 def without(record, *names):
@@ -61,15 +61,15 @@ def test_output_error_is_the_sharpest_on_still_air():
 
 def test_the_model_follows_what_was_measured():
     record = clean()
-    model, remarks = choose_model(KESTREL, [record], Settings())
+    model, remarks = model_for_flights(KESTREL, [record], BatchSettings())
     assert model.states == ("V", "alpha", "beta", "p", "q", "r", "phi", "theta")
     assert not remarks
-    gliding, remarks = choose_model(KESTREL, [without(record, "thrust")], Settings())
+    gliding, remarks = model_for_flights(KESTREL, [without(record, "thrust")], BatchSettings())
     assert "V" not in gliding.states
     assert "V" in gliding.inputs
     assert not any(name.startswith("CD") for name in gliding.names)
     assert "thrust was not measured" in remarks[0]
-    blind, remarks = choose_model(KESTREL, [without(record, "beta")], Settings())
+    blind, remarks = model_for_flights(KESTREL, [without(record, "beta")], BatchSettings())
     assert "beta" in blind.states
     assert "beta" not in blind.outputs
     assert "beta not measured: known through the other outputs alone" in remarks
@@ -99,14 +99,14 @@ def test_stepwise_and_sensor_correction_are_told():
 
 def test_pieces_cover_the_flight():
     record = clean()
-    pieces = segments(record, 5.0)
+    pieces = cut_into_segments(record, 5.0)
     assert len(pieces) == 3
     assert sum(map(len, pieces)) == len(record)
     assert max(piece.duration for piece in pieces) <= 5.0
     assert pieces[1].name == "kestrel +1 [2/3]"
-    assert segments(record, 0.0) == [record]
+    assert cut_into_segments(record, 0.0) == [record]
     with pytest.raises(InputError, match=r"cannot be cut into segments of 0\.01 s"):
-        segments(record, 0.01)
+        cut_into_segments(record, 0.01)
 
 
 def test_flights_of_one_name_are_kept_apart():

@@ -2,12 +2,12 @@
 
 import pytest
 
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 
 
 def test_texts_become_values():
-    settings = Settings.from_mapping(
+    settings = BatchSettings.from_mapping(
         {
             "frequencies": "0.2:0.1:3",
             "segment": "5",
@@ -16,10 +16,10 @@ def test_texts_become_values():
             "biases": "ax,az",
         }
     )
-    assert settings == Settings(
+    assert settings == BatchSettings(
         frequencies=(0.2, 0.1, 3.0), segment=5.0, use_prior=True, states=("alpha", "q"), biases=("ax", "az")
     )
-    assert Settings.from_mapping(settings.as_dict()) == settings
+    assert BatchSettings.from_mapping(settings.as_dict()) == settings
 
 
 @pytest.mark.parametrize(
@@ -37,4 +37,4 @@ def test_texts_become_values():
 )
 def test_what_cannot_be_is_refused(values, said):
     with pytest.raises(InputError, match=said):
-        Settings.from_mapping(values)
+        BatchSettings.from_mapping(values)

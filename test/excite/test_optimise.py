@@ -7,10 +7,10 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
-from sysid_node.excite.information import Information
-from sysid_node.excite.optimise import Envelope, optimise, shares_left
+from sysid_node.excite.information import FisherInformation
+from sysid_node.excite.optimise import FlightEnvelope, optimise, posterior_to_prior_ratios
 from sysid_node.excite.prediction import Predictor, tolerances_of
-from sysid_node.excite.space import Space
+from sysid_node.excite.search_space import SearchSpace
 from sysid_node.excite.spec import parse_manoeuvre, parse_segments
 
 CDRW = load_aircraft("cdrw")
@@ -38,21 +38,21 @@ def test_the_error_falls(optimum):
 
 
 def test_the_best_stays_within_the_envelope(optimum):
-    assert max(Envelope().excess(optimum.best.flight).values()) <= 0
+    assert max(FlightEnvelope().excess(optimum.best.flight).values()) <= 0
 
 
 def test_the_spec_flies_what_was_found(predictor, optimum):
     again = predictor.predict(parse_manoeuvre(optimum.best.manoeuvre.spec, CDRW, 50.0, DURATION))
     assert np.array_equal(again.flight["de"], optimum.best.flight["de"])
-    left = shares_left(again.information, tolerances_of(CDRW))
+    left = posterior_to_prior_ratios(again.information, tolerances_of(CDRW))
     assert np.sqrt(np.mean(left**2)) == pytest.approx(optimum.cost_best, rel=1e-12)
     assert optimum.counted == predictor.names
 
 
 def test_what_is_left_combines_file_and_flight():
     """One parameter: 1/variance adds up. Nothing learnt leaves all; a parameter not seen keeps its tolerance."""
-    one = Information(("a", "b"), np.ones(2), np.diag([3.0 / 0.2**2, 0.0]))
-    assert np.allclose(shares_left(one, np.array([0.2, 7.0])), [0.5, 1.0])
+    one = FisherInformation(("a", "b"), np.ones(2), np.diag([3.0 / 0.2**2, 0.0]))
+    assert np.allclose(posterior_to_prior_ratios(one, np.array([0.2, 7.0])), [0.5, 1.0])
 
 
 def test_only_the_axis_that_is_moved_counts(predictor):
@@ -64,7 +64,7 @@ def test_only_the_axis_that_is_moved_counts(predictor):
 
 
 def test_a_narrower_envelope_costs(predictor, optimum):
-    narrow = Envelope(alpha=0.03, beta=0.04, bank=0.3, pitch=0.2, rate=0.5, airspeed=0.1)
+    narrow = FlightEnvelope(alpha=0.03, beta=0.04, bank=0.3, pitch=0.2, rate=0.5, airspeed=0.1)
     other = optimise(predictor, parse_segments(START, CDRW), DURATION, narrow, evaluations=40)
     assert max(narrow.excess(other.best.flight).values()) <= 0
     assert other.cost_best > optimum.cost_best
@@ -74,7 +74,7 @@ def test_points_and_segments_are_each_others_image(predictor):
     segments = parse_segments(
         ("3211:elevator,rudder:amplitude=0.05,-0.1:start=2.5", "sweep:throttle:amplitude=0.05:length=4:start=3"), CDRW
     )
-    space = Space(predictor, segments, 12.0)
+    space = SearchSpace(predictor, segments, 12.0)
     point = space.encode(segments)
     assert point.shape == (space.size,)
     assert np.all((point > 0) & (point < 1))
@@ -85,7 +85,7 @@ def test_points_and_segments_are_each_others_image(predictor):
 
 def test_an_impossible_envelope_is_an_error(predictor):
     with pytest.raises(InputError, match="leaves the envelope however small"):
-        optimise(predictor, parse_segments(START, CDRW), DURATION, Envelope(alpha=1e-6), evaluations=25)
+        optimise(predictor, parse_segments(START, CDRW), DURATION, FlightEnvelope(alpha=1e-6), evaluations=25)
 
 
 def test_progress_is_told(predictor):

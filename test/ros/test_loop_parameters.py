@@ -8,7 +8,7 @@ import yaml
 from harness import ROOT
 
 from sysid_node.control.settings import Settings as Control
-from sysid_node.excite.inflight import Settings as Excitation
+from sysid_node.excite.exciter import ExcitationSettings as Excitation
 from sysid_node.faults.settings import Settings as Faults
 from sysid_node.ros import adaptive_controller, exciter, fault_monitor, flight_simulator
 from sysid_node.ros.loop_node import EFFECT

@@ -20,11 +20,11 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import identify, predicted_coefficients
 from sysid_node.batch.methods import kalman_filters
-from sysid_node.batch.methods.integrated_models import choose_model
-from sysid_node.batch.models.manoeuvres import manoeuvre
-from sysid_node.batch.regression.filtering import averaged
-from sysid_node.batch.results.validation import figures
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.methods.state_space import model_for_flights
+from sysid_node.batch.models.manoeuvres import manoeuvre_data
+from sysid_node.batch.regression.filtering import block_averaged
+from sysid_node.batch.results.validation import figures_of_merit
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.logs import load_flight
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.truth import read_truth
@@ -72,7 +72,7 @@ def case(name: str) -> Case:
 
 def by_batch(method: str, flown: Case) -> Found:
     """A method of ``sysid identify``, as it comes."""
-    fit = identify(method, flown.aircraft, [flown.record], Settings()).fit
+    fit = identify(method, flown.aircraft, [flown.record], BatchSettings()).fit
     return {n: (e.value, e.lower, e.upper) for n, e in fit.estimates.items() if e.valid and n in flown.truth}
 
 
@@ -87,8 +87,8 @@ def by_online(method: str, flown: Case) -> Found:
 
 def by_kalman(method: Callable[..., kalman_filters.Track], flown: Case) -> Found:
     """A filter of state and parameters, told the aircraft file's noise, values and tolerances."""
-    model, _ = choose_model(flown.aircraft, [flown.record], Settings())
-    piece = manoeuvre(model, averaged(flown.record, 100.0))
+    model, _ = model_for_flights(flown.aircraft, [flown.record], BatchSettings())
+    piece = manoeuvre_data(model, block_averaged(flown.record, 100.0))
     noise = flown.aircraft.noise
     sensors = np.array(
         [noise[KINDS.get(name, "accel" if name.startswith("a") and len(name) == 2 else name)] for name in model.outputs]
@@ -125,7 +125,7 @@ METHODS: Mapping[str, Callable[[Case], Found]] = {
 def section(name: str, holdout: str, without: Sequence[str] = ()) -> str:
     """Errors on one flight, then what the estimates make of another; ``without`` some methods."""
     flown, other = case(name), case(holdout)
-    errors, answers = [], []
+    errors, responses = [], []
     for label, method in METHODS.items():
         if label in without:
             continue
@@ -133,7 +133,7 @@ def section(name: str, holdout: str, without: Sequence[str] = ()) -> str:
         found = method(flown)
         seconds = time.process_time() - begin
         errors.append([label, *_errors(found, flown.truth), f"{seconds:.1f}"])
-        answers.append([label, *_answers(found, other)])
+        responses.append([label, *_answers(found, other)])
         print("#", name, *errors[-1], flush=True)
     heads = ("error, %", *WATCHED, "mean", "intervals that hold", "processor, s")
     checked = (
@@ -144,7 +144,7 @@ def section(name: str, holdout: str, without: Sequence[str] = ()) -> str:
         "white",
         "with inputs",
     )
-    return f"{table(heads, errors)}\n\nOn {holdout}, held out:\n\n{table(checked, answers)}"
+    return f"{table(heads, errors)}\n\nOn {holdout}, held out:\n\n{table(checked, responses)}"
 
 
 def _errors(found: Found, truth: Mapping[str, float]) -> list[str]:
@@ -158,11 +158,11 @@ def _errors(found: Found, truth: Mapping[str, float]) -> list[str]:
 def _answers(found: Found, other: Case) -> list[str]:
     """Normalised error of each coefficient, then the means of the other figures; below the usual low-pass."""
     values = {n: value for n, (value, _, _) in found.items()}
-    several = predicted_coefficients(other.aircraft, values, [other.record], Settings().low_pass)
+    several = predicted_coefficients(other.aircraft, values, [other.record], BatchSettings().low_pass)
     if not several:
         return ["-"] * 10
     inputs = {s: np.interp(several[0].time, other.record.time, other.record[s]) for s in other.aircraft.control_symbols}
-    merits = figures(several[0], inputs)
+    merits = figures_of_merit(several[0], inputs)
     own = [f"{merits[c]['normalised_error']:.3f}" if c in merits else "-" for c in ("CL", "CD", "CY", "Cl", "Cm", "Cn")]
     means = [
         np.mean([m[key] for m in merits.values()]) for key in ("theil", "r_squared", "whiteness", "input_correlation")

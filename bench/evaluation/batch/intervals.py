@@ -20,9 +20,9 @@ from evaluation.judging import Verdict, judge
 from evaluation.pages import table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.batch.identify import identify
-from sysid_node.batch.methods.integrated_models import Integrated
-from sysid_node.batch.results.result import Estimate
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.methods.state_space import StateSpaceEstimation
+from sysid_node.batch.results.batch_fit import ParameterEstimate
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
@@ -43,8 +43,8 @@ MANOEUVRES = (
 )
 #: For a model of the longitudinal motion alone, which takes the sideslip as measured, gusts and all.
 ELEVATOR = ("3211:elevator:amplitude=0.06:width=0.3:start=1:every=6:repeat=3",)
-WHOLE = Settings(segment=0.0)
-LONGITUDINAL = Settings(segment=0.0, states=("V", "alpha", "q", "theta"))
+WHOLE = BatchSettings(segment=0.0)
+LONGITUDINAL = BatchSettings(segment=0.0, states=("V", "alpha", "q", "theta"))
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Trial:
     air: str
     turbulence: str = "none"
     rotary: bool = True
-    settings: Settings = WHOLE
+    settings: BatchSettings = WHOLE
     faster: int = 1
     rate: float = RATE
     manoeuvres: Sequence[str] = MANOEUVRES
@@ -118,12 +118,12 @@ def _rows(trial: Trial, record: FlightRecord) -> dict[str, list[float]]:
 
 
 @lru_cache
-def _first(trial: Trial) -> Integrated:
+def _first(trial: Trial) -> StateSpaceEstimation:
     """The method set up, so that it compiles only once."""
-    return Integrated.of(trial.method, AIRCRAFT, [fly(1, trial)], trial.settings)
+    return StateSpaceEstimation.of(trial.method, AIRCRAFT, [fly(1, trial)], trial.settings)
 
 
-def _row(e: Estimate, converged: bool) -> list[float]:
+def _row(e: ParameterEstimate, converged: bool) -> list[float]:
     return [e.value, e.standard_error, e.lower, e.upper, float(e.valid and converged)]
 
 

@@ -13,7 +13,7 @@ from evaluation.pages import table
 from sysid_node.batch.methods.filter_error import filter_error
 from sysid_node.batch.methods.kalman_filters import extended_kalman, unscented_kalman
 from sysid_node.batch.methods.output_error import output_error
-from sysid_node.batch.results.result import Estimate, Fit
+from sysid_node.batch.results.batch_fit import BatchFit, ParameterEstimate
 
 Reference = Mapping[str, tuple[float, float]]
 REPEAT = 5
@@ -44,7 +44,7 @@ def section(flights: Path) -> str:
     return "\n\n".join(parts)
 
 
-def _timed(call: Callable[[], Fit]) -> tuple[Fit, float, float]:
+def _timed(call: Callable[[], BatchFit]) -> tuple[BatchFit, float, float]:
     """The fit, and the least wall-clock and processor time of several, compiled."""
     fit, times = call(), []
     for _ in range(REPEAT):
@@ -55,7 +55,7 @@ def _timed(call: Callable[[], Fit]) -> tuple[Fit, float, float]:
     return fit, float(wall), float(processor)
 
 
-def _beside(reference: Reference, found: Mapping[str, Estimate]) -> str:
+def _beside(reference: Reference, found: Mapping[str, ParameterEstimate]) -> str:
     rows = [
         [
             name,
@@ -68,7 +68,7 @@ def _beside(reference: Reference, found: Mapping[str, Estimate]) -> str:
     return table(("", "published", "here (s.e. for white; for coloured residuals)", "off, in published s.e."), rows)
 
 
-def _filters(case: published.ReferenceCase, biased: Fit) -> str:
+def _filters(case: published.ReferenceCase, biased: BatchFit) -> str:
     """Filter error and the Kalman filters beside the published ones."""
     fit = filter_error(case.model, [case.manoeuvre])
     r, q = (np.array(variances) for variances in published.HFB_FILTER_NOISE)

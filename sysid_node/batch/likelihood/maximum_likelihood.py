@@ -17,14 +17,14 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from sysid_node.batch.likelihood.unknowns import Priors, Unknowns
-from sysid_node.batch.regression.coloured_residuals import coloured_covariance, degrees_of_freedom
-from sysid_node.batch.results.result import Answer
+from sysid_node.batch.regression.coloured_residuals import coloured_covariance, spectral_degrees_of_freedom
+from sysid_node.batch.results.batch_fit import ModelResponse
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
 
 @dataclass(frozen=True)
-class Search:
+class SearchOptions:
     """How long to look: rounds of noise relaxation, and model evaluations within each.
 
     Converged once a whole round moves no unknown by more than ``tolerance`` of its standard error. ``early``
@@ -37,7 +37,7 @@ class Search:
     early: int = 50
 
 
-DEFAULT_SEARCH = Search()
+DEFAULT_SEARCH = SearchOptions()
 
 #: A model whose answer is so many times the measurement has diverged.
 _DIVERGED = 1e6
@@ -46,7 +46,7 @@ _DIVERGED = 1e6
 _OWN_ROUNDS = 4
 
 
-class Problem(ABC):
+class LikelihoodProblem(ABC):
     """An estimation as functions of z (n,): the unknowns first, then what a method adds."""
 
     def __init__(self, unknowns: Unknowns) -> None:
@@ -61,7 +61,7 @@ class Problem(ABC):
         """Lower and upper bounds (n,)."""
 
     @abstractmethod
-    def answers(self, z: Array) -> list[Answer]:
+    def responses(self, z: Array) -> list[ModelResponse]:
         """What the model makes of each manoeuvre."""
 
     @abstractmethod
@@ -77,15 +77,15 @@ class Problem(ABC):
 
         No output's noise is taken to be below a rounding error of its size.
         """
-        answers = self.answers(z)
-        residuals = np.concatenate([answer.residuals for answer in answers])
-        size = np.nanmax(np.abs(np.concatenate([answer.measured for answer in answers])), axis=0, initial=0.0)
+        responses = self.responses(z)
+        residuals = np.concatenate([response.residuals for response in responses])
+        size = np.nanmax(np.abs(np.concatenate([response.measured for response in responses])), axis=0, initial=0.0)
         return np.diag(np.maximum(np.sqrt(np.nanmean(residuals**2, axis=0)), 1e-12 * (1.0 + size)))
 
     def weighted(self, z: Array, noise: Array) -> tuple[list[Array], list[Array]]:
         """Residuals (N, ny), zero where nothing was measured, and sensitivities (N, ny, n), in units of the noise."""
-        residuals = [whitened(_measured_only(answer), noise) for answer in self.answers(z)]
-        return residuals, [whitened(block, noise) for block in self.sensitivities(z)]
+        residuals = [in_noise_units(_measured_only(response), noise) for response in self.responses(z)]
+        return residuals, [in_noise_units(block, noise) for block in self.sensitivities(z)]
 
     def covariance(
         self, information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
@@ -93,13 +93,13 @@ class Problem(ABC):
         """Covariance (n, n) of the estimates, and its degrees of freedom, from what ``weighted`` gives: here with
         sensitivities that owe nothing to the noise, whatever its colour.
         """
-        freedom = degrees_of_freedom([len(errors) for errors in residuals])
+        freedom = spectral_degrees_of_freedom([len(errors) for errors in residuals])
         return coloured_covariance(inverted(information), sensitivities, residuals), freedom
 
     def residuals(self, z: Array, noise: Array) -> Array:
         """Measured minus modelled in units of the noise, zero where nothing was measured, then the priors."""
         index, mean, sigma = self.priors()
-        parts = [whitened(_measured_only(answer), noise).ravel() for answer in self.answers(z)]
+        parts = [in_noise_units(_measured_only(response), noise).ravel() for response in self.responses(z)]
         return np.concatenate([*parts, (mean - z[index]) / sigma])
 
     def jacobian(self, z: Array, noise: Array) -> Array:
@@ -107,7 +107,7 @@ class Problem(ABC):
         index, _, sigma = self.priors()
         prior = np.zeros((index.size, z.size))
         prior[np.arange(index.size), index] = -1.0 / sigma
-        parts = [-whitened(block, noise).reshape(-1, z.size) for block in self.sensitivities(z)]
+        parts = [-in_noise_units(block, noise).reshape(-1, z.size) for block in self.sensitivities(z)]
         return np.concatenate([*parts, prior])
 
     def check(self, z: Array) -> None:
@@ -118,14 +118,14 @@ class Problem(ABC):
                 f"{available} measured values for {z.size} unknowns; give longer manoeuvres or estimate less "
                 "(fewer parameters, initial states and biases)"
             )
-        for answer in self.answers(z):
-            size = 1.0 + np.abs(np.nan_to_num(answer.measured)).max(axis=0)
-            lost = np.argwhere(~(np.abs(answer.modelled) < _DIVERGED * size))
+        for response in self.responses(z):
+            size = 1.0 + np.abs(np.nan_to_num(response.measured)).max(axis=0)
+            lost = np.argwhere(~(np.abs(response.modelled) < _DIVERGED * size))
             if lost.size:
                 row, column = lost[0]
                 raise InputError(
-                    f"{answer.name}: model {self.unknowns.model.name} diverges from its start values: "
-                    f"{answer.names[column]} is beyond all measure from {answer.time[row]:.2f} s on; start nearer "
+                    f"{response.name}: model {self.unknowns.model.name} diverges from its start values: "
+                    f"{response.names[column]} is beyond all measure from {response.time[row]:.2f} s on; start nearer "
                     "to the aircraft (equation_error finds start values) or cut the flight into shorter manoeuvres"
                 )
 
@@ -135,12 +135,12 @@ def inverted(information: Array) -> Array:
     return np.asarray(np.linalg.pinv(information, rcond=1e-14, hermitian=True), dtype=np.float64)
 
 
-def _measured_only(answer: Answer) -> Array:
+def _measured_only(response: ModelResponse) -> Array:
     """Residuals, zero where nothing was measured; where the model has no number, neither have they."""
-    return np.where(np.isfinite(answer.measured), answer.residuals, 0.0)
+    return np.where(np.isfinite(response.measured), response.residuals, 0.0)
 
 
-def whitened(rows: Array, noise: Array) -> Array:
+def in_noise_units(rows: Array, noise: Array) -> Array:
     """``rows`` (N, ny, ...) in units of the noise (ny, ny): its inverse applied to the second axis."""
     if not np.any(np.tril(noise, -1)):
         return np.asarray(rows / np.diag(noise).reshape(1, -1, *(1,) * (rows.ndim - 2)))
@@ -148,7 +148,7 @@ def whitened(rows: Array, noise: Array) -> Array:
     return np.asarray(np.moveaxis(np.tensordot(inverse, rows, axes=(1, 1)), 0, 1))
 
 
-def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
+def maximise_likelihood(problem: LikelihoodProblem, search: SearchOptions) -> tuple[Array, int, str]:
     """The unknowns of maximum likelihood, the rounds it took, and a complaint where it did not converge."""
     z = problem.start()
     problem.check(z)
@@ -171,7 +171,7 @@ def maximise(problem: Problem, search: Search) -> tuple[Array, int, str]:
 
 
 def weighted_least_squares(
-    problem: Problem, z: Array, chosen: NDArray[np.intp], noise: Array, evaluations: int
+    problem: LikelihoodProblem, z: Array, chosen: NDArray[np.intp], noise: Array, evaluations: int
 ) -> Array:
     """The unknowns with those of index ``chosen`` moved to the least squares for this noise."""
 
@@ -201,10 +201,10 @@ def weighted_least_squares(
     return moved(solution.x)
 
 
-def answer_with_own(problem: Problem, z: Array) -> list[Answer]:
+def responses_with_nuisances_estimated(problem: LikelihoodProblem, z: Array) -> list[ModelResponse]:
     """The model's answers at ``z``, with only the manoeuvres' own unknowns (initial states, biases) estimated."""
     problem.check(z)
     own = np.arange(len(problem.unknowns.free), problem.unknowns.size)
     for _ in range(_OWN_ROUNDS if own.size else 0):
         z = weighted_least_squares(problem, z, own, problem.noise(z), DEFAULT_SEARCH.evaluations)
-    return problem.answers(z)
+    return problem.responses(z)

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sysid_node.batch.models.model import Dynamics, Manoeuvre, Model
+from sysid_node.batch.models.model import ManoeuvreData, ModelEquations, StateSpaceModel
 from sysid_node.flight.record import Array
 
 #: Where in the step each stage looks, and its share in the result.
@@ -20,7 +20,7 @@ _PLACES, _SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 /
 
 
 def rk4_step(
-    dynamics: Dynamics, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array
+    dynamics: ModelEquations, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array
 ) -> jax.Array:
     """State (nx,) after ``dt`` s, the input (nu,) going linearly from ``u0`` to ``u1``.
 
@@ -40,18 +40,20 @@ def rk4_step(
     return x + dt * total
 
 
-def derivative(dynamics: Dynamics, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+def derivative(dynamics: ModelEquations, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
     """State derivative (nx,)."""
     return jnp.stack(dynamics.derivative(tuple(x), tuple(u), tuple(theta)))
 
 
-def output(dynamics: Dynamics, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
+def output(dynamics: ModelEquations, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
     """Outputs (..., ny) at states (..., nx) and inputs (..., nu)."""
     values = dynamics.output(tuple(jnp.moveaxis(x, -1, 0)), tuple(jnp.moveaxis(u, -1, 0)), tuple(theta))
     return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
 
-def simulate(dynamics: Dynamics, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array) -> jax.Array:
+def simulate(
+    dynamics: ModelEquations, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array
+) -> jax.Array:
     """States (N, nx) at each time from ``x0`` (nx,); pure, differentiable."""
 
     def advance(x: jax.Array, interval: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
@@ -63,7 +65,7 @@ def simulate(dynamics: Dynamics, time: jax.Array, inputs: jax.Array, x0: jax.Arr
 
 
 def _outputs(
-    dynamics: Dynamics, every: int, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array
+    dynamics: ModelEquations, every: int, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array
 ) -> jax.Array:
     values = output(dynamics, simulate(dynamics, time, inputs, x0, theta), inputs, theta)
     rows = len(time) // every
@@ -75,7 +77,7 @@ _outputs_jit = jax.jit(_outputs, static_argnums=(0, 1))
 
 @partial(jax.jit, static_argnums=(0, 1, 6, 7))
 def _sensitivities(
-    dynamics: Dynamics,
+    dynamics: ModelEquations,
     every: int,
     time: jax.Array,
     inputs: jax.Array,
@@ -95,15 +97,15 @@ def _sensitivities(
     return jacobian
 
 
-def outputs(model: Model, manoeuvre: Manoeuvre, theta: Array, x0: Array | None = None) -> Array:
+def outputs(model: StateSpaceModel, manoeuvre: ManoeuvreData, theta: Array, x0: Array | None = None) -> Array:
     """Modelled outputs (N // every, ny), from the manoeuvre's initial state unless ``x0`` (nx,) says otherwise."""
     start = manoeuvre.initial_state if x0 is None else x0
     return np.asarray(_outputs_jit(model.dynamics, manoeuvre.every, manoeuvre.time, manoeuvre.inputs, start, theta))
 
 
 def sensitivities(
-    model: Model,
-    manoeuvre: Manoeuvre,
+    model: StateSpaceModel,
+    manoeuvre: ManoeuvreData,
     theta: Array,
     x0: Array,
     free: tuple[int, ...],

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.batch.models.model import Manoeuvre, Model
+from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
@@ -24,15 +24,19 @@ class Unknowns:
     biases. A bias is added to the modelled output.
     """
 
-    model: Model
-    manoeuvres: tuple[Manoeuvre, ...]
+    model: StateSpaceModel
+    manoeuvres: tuple[ManoeuvreData, ...]
     free: tuple[int, ...]  # indices of the free parameters
     states: tuple[int, ...]  # indices of the free initial states
     biases: tuple[int, ...]  # indices of the biased outputs
 
     @classmethod
     def of(
-        cls, model: Model, manoeuvres: Sequence[Manoeuvre], initial_states: Sequence[str], biases: Sequence[str]
+        cls,
+        model: StateSpaceModel,
+        manoeuvres: Sequence[ManoeuvreData],
+        initial_states: Sequence[str],
+        biases: Sequence[str],
     ) -> Unknowns:
         """From names. Raises InputError on names that the model does not have, or with nothing to estimate."""
         free = tuple(i for i, parameter in enumerate(model.parameters) if not parameter.fixed)

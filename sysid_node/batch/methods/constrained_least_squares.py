@@ -15,7 +15,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.methods.recursive_least_squares import sequential_fit
-from sysid_node.batch.results.result import Fit
+from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.flight.record import Array, FlightRecord
 
 WINDOW = 1.0  # s
@@ -28,7 +28,7 @@ _LOOSE = (0.5, 0.05)
 
 def constrained_least_squares(
     aircraft: Aircraft, records: Sequence[FlightRecord], window: float = WINDOW, kept: float = KEPT
-) -> Fit:
+) -> BatchFit:
     """The aircraft file's derivatives after the last window. Raises InputError as ``equation_error`` does."""
 
     def along(names: Sequence[str], y: Array, X: Array, step: float) -> tuple[Array, Array]:

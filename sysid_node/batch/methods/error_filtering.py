@@ -13,14 +13,14 @@ from collections.abc import Callable, Sequence
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.methods.recursive_least_squares import recursion, sequential_fit
-from sysid_node.batch.results.result import Fit
+from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.flight.record import Array, FlightRecord
 
 #: rad/s: bandwidth of the filter; well above the short period of a small aircraft.
 DEFAULT_RATE = 30.0
 
 
-def error_filtering(aircraft: Aircraft, records: Sequence[FlightRecord], rate: float = DEFAULT_RATE) -> Fit:
+def error_filtering(aircraft: Aircraft, records: Sequence[FlightRecord], rate: float = DEFAULT_RATE) -> BatchFit:
     """The aircraft file's derivatives after one pass; ``rate`` rad/s. Raises InputError as ``equation_error`` does."""
 
     def along(_: Sequence[str], y: Array, X: Array, step: float) -> tuple[Array, Array]:

@@ -19,13 +19,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sysid_node.batch.likelihood import kalman
-from sysid_node.batch.likelihood.covariance import assess
-from sysid_node.batch.likelihood.maximum_likelihood import Problem, Search, answer_with_own, maximise, whitened
+from sysid_node.batch.likelihood import steady_kalman_filter
+from sysid_node.batch.likelihood.covariance import assessed_fit
+from sysid_node.batch.likelihood.maximum_likelihood import (
+    LikelihoodProblem,
+    SearchOptions,
+    in_noise_units,
+    maximise_likelihood,
+    responses_with_nuisances_estimated,
+)
 from sysid_node.batch.likelihood.unknowns import Priors, Unknowns
-from sysid_node.batch.models.model import Dynamics, Manoeuvre, Model, check_manoeuvres
+from sysid_node.batch.models.model import ManoeuvreData, ModelEquations, StateSpaceModel, check_manoeuvres
 from sysid_node.batch.regression.jackknife import jackknife
-from sysid_node.batch.results.result import Answer, Fit
+from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
@@ -34,21 +40,21 @@ _NOISE_RANGE = 1e3
 
 #: The noises' own small likelihood makes the last digits dear; a hundredth of a standard error is enough. A round that
 #: goes all the way to the best gain for the first, wrong, noise may end where the likelihood is highest only locally.
-FILTER_SEARCH = Search(tolerance=1e-2, early=3)
+FILTER_SEARCH = SearchOptions(tolerance=1e-2, early=3)
 
 #: 1-sigma of the logarithm of a noise about its start value: a factor of twenty either way is no surprise.
 _NOISE_PRIOR = 3.0
 
 
 def filter_error(
-    model: Model,
-    manoeuvres: Sequence[Manoeuvre],
+    model: StateSpaceModel,
+    manoeuvres: Sequence[ManoeuvreData],
     *,
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
     correlated: bool = False,
-    search: Search = FILTER_SEARCH,
-) -> Fit:
+    search: SearchOptions = FILTER_SEARCH,
+) -> BatchFit:
     """Estimates the free parameters and the process noise from all manoeuvres together.
 
     ``correlated``: whether what the outputs' innovations have in common counts; it should where a disturbance shows in
@@ -60,19 +66,19 @@ def filter_error(
     """
     check_manoeuvres(model, manoeuvres)
     problem = _FilterError(Unknowns.of(model, manoeuvres, initial_states, biases), correlated)
-    z, iterations, complaint = maximise(problem, search)
-    return assess("filter_error", problem, z, iterations, complaint, problem.noises(z))
+    z, iterations, complaint = maximise_likelihood(problem, search)
+    return assessed_fit("filter_error", problem, z, iterations, complaint, problem.noises(z))
 
 
-def predict_filter(
-    model: Model,
-    manoeuvres: Sequence[Manoeuvre],
+def predict_filter_error(
+    model: StateSpaceModel,
+    manoeuvres: Sequence[ManoeuvreData],
     values: Mapping[str, float],
     noises: Mapping[str, float],
     *,
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
-) -> list[Answer]:
+) -> list[ModelResponse]:
     """One-step predictions on other manoeuvres, parameters and noises (a fit's ``extras``) held.
 
     Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
@@ -81,10 +87,10 @@ def predict_filter(
     check_manoeuvres(held, manoeuvres)
     problem = _FilterError(Unknowns.of(held, manoeuvres, initial_states, biases))
     logs = np.log([noises[name] for name in _noise_names(model)])
-    return answer_with_own(problem, np.concatenate([problem.unknowns.start(), logs]))
+    return responses_with_nuisances_estimated(problem, np.concatenate([problem.unknowns.start(), logs]))
 
 
-class _FilterError(Problem):
+class _FilterError(LikelihoodProblem):
     """One-step predictions; z ends with the logarithms of process and measurement noise, 1 sigma."""
 
     def __init__(self, unknowns: Unknowns, correlated: bool = False) -> None:
@@ -101,9 +107,11 @@ class _FilterError(Problem):
         reach = np.log(_NOISE_RANGE)
         return np.concatenate([lower, self._noise_start - reach]), np.concatenate([upper, self._noise_start + reach])
 
-    def answers(self, z: Array) -> list[Answer]:
+    def responses(self, z: Array) -> list[ModelResponse]:
         return [
-            Answer(m.name, m.time, self.unknowns.model.outputs, m.outputs, np.asarray(_predict_jit(*self._of(i, z))))
+            ModelResponse(
+                m.name, m.time, self.unknowns.model.outputs, m.outputs, np.asarray(_predict_jit(*self._of(i, z)))
+            )
             for i, m in enumerate(self.unknowns.manoeuvres)
         ]
 
@@ -127,7 +135,7 @@ class _FilterError(Problem):
         independent = super().noise(z)
         if not self._correlated:
             return independent
-        errors = whitened(np.concatenate([answer.residuals for answer in self.answers(z)]), independent)
+        errors = in_noise_units(np.concatenate([response.residuals for response in self.responses(z)]), independent)
         correlation = errors.T @ errors / len(errors)
         return np.asarray(independent @ np.linalg.cholesky(correlation + 1e-10 * np.eye(len(correlation))))
 
@@ -144,7 +152,7 @@ class _FilterError(Problem):
         q = np.zeros(len(model.states))
         q[list(_driven(model))], r = np.split(np.exp(2.0 * logs), [len(model.driven_states)])
         theta, x0 = self.unknowns.theta(z), self.unknowns.initial_state(z, 0)
-        expected = kalman.innovation_variance(
+        expected = steady_kalman_filter.innovation_variance(
             model.dynamics, manoeuvre.step, manoeuvre.inputs[0], x0, theta, jnp.asarray(q), jnp.asarray(r)
         )
         scale = np.exp(np.mean(np.log(np.linalg.norm(self.noise(z), axis=1) / np.sqrt(np.asarray(expected)))))
@@ -156,7 +164,7 @@ class _FilterError(Problem):
         noises = range(self.unknowns.size, z.size)
         return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
 
-    def _of(self, index: int, z: Array) -> tuple[Dynamics, Chosen, Array, Array, Array, Array, Array, Array]:
+    def _of(self, index: int, z: Array) -> tuple[ModelEquations, Chosen, Array, Array, Array, Array, Array, Array]:
         u, m = self.unknowns, self.unknowns.manoeuvres[index]
         chosen = (u.free, u.states, u.biases, _driven(u.model))
         local = z[self._columns(index, z)]
@@ -167,7 +175,7 @@ Chosen = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...
 
 
 def _predict(
-    dynamics: Dynamics,
+    dynamics: ModelEquations,
     chosen: Chosen,
     time: jax.Array,
     inputs: jax.Array,
@@ -185,14 +193,17 @@ def _predict(
     x0 = x0.at[jnp.array(chosen[1], dtype=int)].set(states)
     offset = jnp.zeros(outputs.shape[1]).at[jnp.array(chosen[2], dtype=int)].set(bias)
     q = jnp.eye(x0.size)[:, np.array(chosen[3])] @ jnp.exp(2.0 * log_q)  # XLA does not survive this as a scatter
-    return kalman.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, jnp.exp(2.0 * log_r)) + offset
+    return (
+        steady_kalman_filter.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, jnp.exp(2.0 * log_r))
+        + offset
+    )
 
 
 _predict_jit = jax.jit(_predict, static_argnums=(0, 1))
 _predict_jacobian = jax.jit(jax.jacfwd(_predict, argnums=7), static_argnums=(0, 1))
 
 
-def _noise_names(model: Model) -> list[str]:
+def _noise_names(model: StateSpaceModel) -> list[str]:
     return [f"process_{name}" for name in model.driven_states] + [f"sensor_{name}" for name in model.outputs]
 
 
@@ -230,6 +241,6 @@ def _rough_noise(unknowns: Unknowns) -> Array:
     return np.asarray(np.log(np.concatenate([[process(state) for state in model.driven_states], sensor])))
 
 
-def _driven(model: Model) -> tuple[int, ...]:
+def _driven(model: StateSpaceModel) -> tuple[int, ...]:
     """Indices of the states that process noise moves."""
     return tuple(model.states.index(name) for name in model.driven_states)

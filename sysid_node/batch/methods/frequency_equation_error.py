@@ -16,11 +16,21 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import collected, columns, noises, structure_of
-from sysid_node.batch.regression.equations import Equations, Slope, equations, sensor_slopes
-from sysid_node.batch.regression.errors_in_variables import Noise, Noisy
+from sysid_node.batch.methods.equation_error import (
+    combined_fit,
+    regressor_matrix,
+    regressors_by_coefficient,
+    sensor_noises,
+)
+from sysid_node.batch.regression.errors_in_variables import ErrorsInVariables, SensorNoise
 from sysid_node.batch.regression.linear_regression import Regression, regress
-from sysid_node.batch.results.result import Fit
+from sysid_node.batch.regression.measured_coefficients import (
+    MeasuredCoefficients,
+    ReadingSensitivity,
+    measured_coefficients,
+    sensitivity_to_readings,
+)
+from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -39,19 +49,19 @@ _NUISANCES = 2
 
 def frequency_equation_error(
     aircraft: Aircraft, records: Sequence[FlightRecord], frequencies: Frequencies = DEFAULT_FREQUENCIES
-) -> Fit:
+) -> BatchFit:
     """The aircraft file's derivatives from all flights together, within a band of frequencies.
 
     Offsets (``Cm_0``), which no frequency shows, follow from the means. Raises InputError where signals are missing, or
     the flights hold too few independent frequencies for the model.
     """
-    flights = [equations(aircraft, record) for record in records]
-    sensors = [sensor_slopes(aircraft, record) for record in records]
+    flights = [measured_coefficients(aircraft, record) for record in records]
+    sensors = [sensitivity_to_readings(aircraft, record) for record in records]
     fits = {
         coefficient: _fit(coefficient, regressors, flights, sensors, frequencies)
-        for coefficient, regressors in structure_of(aircraft, flights).items()
+        for coefficient, regressors in regressors_by_coefficient(aircraft, flights).items()
     }
-    return collected("frequency_equation_error", fits, flights)
+    return combined_fit("frequency_equation_error", fits, flights)
 
 
 def regress_in_band(
@@ -60,7 +70,7 @@ def regress_in_band(
     ys: Sequence[Array],
     Xs: Sequence[Array],
     frequencies: Frequencies,
-    noises: Sequence[Sequence[Noise]] = (),
+    noises: Sequence[Sequence[SensorNoise]] = (),
 ) -> Regression:
     """Least squares of ``ys`` (N,) on ``Xs`` (N, p) within the band; constants must not be among the regressors.
 
@@ -79,7 +89,7 @@ def regress_in_band(
     sides = [_detrended(y) for y in ys], [_detrended(X) for X in Xs]
     instruments = [_band_passed(t, X, lines) for t, X in zip(times, sides[1], strict=True)]
     noisy = [
-        Noisy(Z, lines.size * float(np.median(np.diff(t))) ** 2, several)
+        ErrorsInVariables(Z, lines.size * float(np.median(np.diff(t))) ** 2, several)
         for Z, t, several in zip(instruments, times, noises, strict=bool(noises))
     ]
     fit = regress(names, *sides, instruments, freedom, noisy)
@@ -126,15 +136,15 @@ def _detrended(x: Array) -> Array:
 def _fit(
     coefficient: str,
     regressors: Sequence[str],
-    flights: Sequence[Equations],
-    sensors: Sequence[Mapping[str, tuple[Array, Slope]]],
+    flights: Sequence[MeasuredCoefficients],
+    sensors: Sequence[Mapping[str, tuple[Array, ReadingSensitivity]]],
     frequencies: Frequencies,
 ) -> Regression:
     """One coefficient: the derivatives within the band, then the offset, where the model has one."""
     varying = [name for name in regressors if name != "0"]
     times, ys = [flight.time for flight in flights], [flight.coefficients[coefficient] for flight in flights]
-    Xs = [columns(flight, varying) for flight in flights]
-    noise_of = [noises(t, s, coefficient, varying, frequencies[2]) for t, s in zip(times, sensors, strict=True)]
+    Xs = [regressor_matrix(flight, varying) for flight in flights]
+    noise_of = [sensor_noises(t, s, coefficient, varying, frequencies[2]) for t, s in zip(times, sensors, strict=True)]
     fit = regress_in_band([f"{coefficient}_{name}" for name in varying], times, ys, Xs, frequencies, noise_of)
     rest = [y - modelled for y, modelled in zip(ys, fit.modelled, strict=True)]
     offset = regress([f"{coefficient}_0"], rest, [np.ones((r.size, 1)) for r in rest])

@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from sysid_node.batch.likelihood.rollout import output, rk4_step
-from sysid_node.batch.models.model import Dynamics, Manoeuvre, Model, check_manoeuvres
-from sysid_node.batch.results.result import Estimate, interval
+from sysid_node.batch.models.model import ManoeuvreData, ModelEquations, StateSpaceModel, check_manoeuvres
+from sysid_node.batch.results.batch_fit import ParameterEstimate, confidence_interval
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
@@ -42,7 +42,7 @@ class Track:
     errors: Array
 
     @property
-    def final(self) -> dict[str, Estimate]:
+    def final(self) -> dict[str, ParameterEstimate]:
         """The estimates after the last sample."""
         return {
             name: _estimate(name, float(value), float(error))
@@ -50,7 +50,9 @@ class Track:
         }
 
 
-def extended_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, start_deviation: Array) -> Track:
+def extended_kalman(
+    model: StateSpaceModel, manoeuvre: ManoeuvreData, q: Array, r: Array, start_deviation: Array
+) -> Track:
     """Joint estimation by linearisation.
 
     ``q`` (nx,) is the variance that process noise adds to each state in a second, ``r`` (ny,) the outputs' noise
@@ -60,12 +62,16 @@ def extended_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, star
     return _filtered(model, manoeuvre, q, r, start_deviation, _extended_predict, _extended_correct)
 
 
-def iterated_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, start_deviation: Array) -> Track:
+def iterated_kalman(
+    model: StateSpaceModel, manoeuvre: ManoeuvreData, q: Array, r: Array, start_deviation: Array
+) -> Track:
     """Joint estimation, each sample's outputs linearised again where they lead to. As ``extended_kalman``."""
     return _filtered(model, manoeuvre, q, r, start_deviation, _extended_predict, _iterated_correct)
 
 
-def unscented_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, start_deviation: Array) -> Track:
+def unscented_kalman(
+    model: StateSpaceModel, manoeuvre: ManoeuvreData, q: Array, r: Array, start_deviation: Array
+) -> Track:
     """Joint estimation by sigma points: no derivatives, second-order accurate. As ``extended_kalman``."""
     return _filtered(model, manoeuvre, q, r, start_deviation, _unscented_predict, _unscented_correct)
 
@@ -73,7 +79,7 @@ def unscented_kalman(model: Model, manoeuvre: Manoeuvre, q: Array, r: Array, sta
 class _Augmented:
     """The model with its free parameters in the state, as pure functions of the augmented state (nx + P,)."""
 
-    def __init__(self, dynamics: Dynamics, free: tuple[int, ...], theta: jax.Array, states: int) -> None:
+    def __init__(self, dynamics: ModelEquations, free: tuple[int, ...], theta: jax.Array, states: int) -> None:
         self.dynamics, self.free, self.theta, self.states = dynamics, free, theta, states
 
     def split(self, a: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -178,8 +184,8 @@ def _solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
 
 
 def _filtered(
-    model: Model,
-    manoeuvre: Manoeuvre,
+    model: StateSpaceModel,
+    manoeuvre: ManoeuvreData,
     q: Array,
     r: Array,
     start_deviation: Array,
@@ -213,7 +219,7 @@ def _filtered(
 
 @partial(jax.jit, static_argnums=0)
 def _run(
-    method: tuple[Dynamics, tuple[int, ...], Predict, Correct],
+    method: tuple[ModelEquations, tuple[int, ...], Predict, Correct],
     time: jax.Array,
     inputs: jax.Array,
     outputs: jax.Array,
@@ -240,6 +246,6 @@ def _run(
     return track
 
 
-def _estimate(name: str, value: float, error: float) -> Estimate:
-    lower, upper = interval(value, error, np.inf)
-    return Estimate(name, value, error, lower, upper, True, "ok", error)
+def _estimate(name: str, value: float, error: float) -> ParameterEstimate:
+    lower, upper = confidence_interval(value, error, np.inf)
+    return ParameterEstimate(name, value, error, lower, upper, True, "ok", error)

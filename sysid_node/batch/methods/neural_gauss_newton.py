@@ -21,14 +21,19 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS, collected, columns, structure_of
+from sysid_node.batch.methods.equation_error import (
+    DEFAULT_LOW_PASS,
+    combined_fit,
+    regressor_matrix,
+    regressors_by_coefficient,
+)
 from sysid_node.batch.methods.recursive_least_squares import regression_of
 from sysid_node.batch.regression.coloured_residuals import coloured_covariance
-from sysid_node.batch.regression.effective_length import freedom
-from sysid_node.batch.regression.equations import Equations, at_cg, equations
-from sysid_node.batch.regression.filtering import averaged, differentiate, lowpass
+from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
+from sysid_node.batch.regression.filtering import block_averaged, differentiate, lowpass
 from sysid_node.batch.regression.linear_regression import Regression
-from sysid_node.batch.results.result import Fit
+from sysid_node.batch.regression.measured_coefficients import MeasuredCoefficients, at_cg, measured_coefficients
+from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -44,7 +49,7 @@ _SEED = 1
 
 
 @dataclass(frozen=True)
-class _Data:
+class _TrainingData:
     """One group, all flights together: motion (N, m), its rates (N, k), measured coefficients (N, c), the regressors
     of each coefficient; all below the low-pass."""
 
@@ -54,16 +59,20 @@ class _Data:
     regressors: dict[str, Array]
 
 
-def neural_gauss_newton(aircraft: Aircraft, records: Sequence[FlightRecord], low_pass: float = DEFAULT_LOWPASS) -> Fit:
+def neural_gauss_newton(
+    aircraft: Aircraft, records: Sequence[FlightRecord], low_pass: float = DEFAULT_LOW_PASS
+) -> BatchFit:
     """The aircraft file's derivatives from all flights together.
 
     Raises InputError as ``equation_error`` does, and where the attitude was not measured.
     """
-    slower = [averaged(record, _RATE) for record in records]
-    flights = [equations(aircraft, record) for record in slower]
-    structure = structure_of(aircraft, flights)
+    slower = [block_averaged(record, _RATE) for record in records]
+    flights = [measured_coefficients(aircraft, record) for record in slower]
+    structure = regressors_by_coefficient(aircraft, flights)
     for coefficient, regressors in structure.items():
-        freedom([f"{coefficient}_{r}" for r in regressors], [flight.time for flight in flights], low_pass)
+        effective_degrees_of_freedom(
+            [f"{coefficient}_{r}" for r in regressors], [flight.time for flight in flights], low_pass
+        )
     fits: dict[str, Regression] = {}
     for motion, changing, coefficients in _GROUPS:
         present = [name for name in coefficients if name in structure]
@@ -72,18 +81,18 @@ def neural_gauss_newton(aircraft: Aircraft, records: Sequence[FlightRecord], low
             pairs = zip(slower, flights, strict=True)
             parts = [_data(aircraft, r, f, motion, changing, chosen, low_pass) for r, f in pairs]
             fits |= _group(chosen, parts, flights)
-    return collected("neural_gauss_newton", {name: fits[name] for name in structure}, flights)
+    return combined_fit("neural_gauss_newton", {name: fits[name] for name in structure}, flights)
 
 
 def _data(
     aircraft: Aircraft,
     record: FlightRecord,
-    flight: Equations,
+    flight: MeasuredCoefficients,
     motion: Sequence[str],
     changing: Sequence[str],
     structure: dict[str, tuple[str, ...]],
     low_pass: float,
-) -> _Data:
+) -> _TrainingData:
     missing = [name for name in motion if not record.measured(name)]
     if missing:
         raise InputError(f"flight {record.name!r}: neural_gauss_newton needs {', '.join(missing)}, not measured")
@@ -91,16 +100,16 @@ def _data(
     kept = np.isin(record.time, flight.time)
     smooth = partial(lowpass, flight.time, cutoff=low_pass)
     signals = {name: smooth(at[name][kept][:, None])[:, 0] for name in motion}
-    return _Data(
+    return _TrainingData(
         np.column_stack([signals[name] for name in motion]),
         np.column_stack([differentiate(flight.time, signals[name]) for name in changing]),
         smooth(np.column_stack([flight.coefficients[name] for name in structure])),
-        {name: smooth(columns(flight, regressors)) for name, regressors in structure.items()},
+        {name: smooth(regressor_matrix(flight, regressors)) for name, regressors in structure.items()},
     )
 
 
 def _group(
-    structure: dict[str, tuple[str, ...]], parts: Sequence[_Data], flights: Sequence[Equations]
+    structure: dict[str, tuple[str, ...]], parts: Sequence[_TrainingData], flights: Sequence[MeasuredCoefficients]
 ) -> dict[str, Regression]:
     """Trains the group's network, then finds the derivatives through it."""
     motion, rates, measured = (
@@ -140,7 +149,7 @@ def _regressions(
     edges: Array,
     slopes: Array,
     residual: Array,
-    flights: Sequence[Equations],
+    flights: Sequence[MeasuredCoefficients],
 ) -> dict[str, Regression]:
     """The derivatives with errors for the colour of what the network leaves."""
     noise = np.maximum(residual.std(axis=0), 1e-12)
@@ -150,7 +159,7 @@ def _regressions(
     covariance = coloured_covariance(inverse, np.split(S, ends), np.split(v, ends))
     fits = {}
     for (name, regressors), index in zip(structure.items(), np.split(np.arange(found.size), edges), strict=True):
-        Xs = [columns(flight, regressors) for flight in flights]
+        Xs = [regressor_matrix(flight, regressors) for flight in flights]
         ys = [flight.coefficients[name] for flight in flights]
         names = [f"{name}_{regressor}" for regressor in regressors]
         own = covariance[np.ix_(index, index)]

@@ -14,22 +14,28 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.likelihood.covariance import assess
-from sysid_node.batch.likelihood.maximum_likelihood import DEFAULT_SEARCH, Problem, Search, answer_with_own, maximise
+from sysid_node.batch.likelihood.covariance import assessed_fit
+from sysid_node.batch.likelihood.maximum_likelihood import (
+    DEFAULT_SEARCH,
+    LikelihoodProblem,
+    SearchOptions,
+    maximise_likelihood,
+    responses_with_nuisances_estimated,
+)
 from sysid_node.batch.likelihood.unknowns import Unknowns
-from sysid_node.batch.models.model import Manoeuvre, Model, check_manoeuvres
-from sysid_node.batch.results.result import Answer, Fit
+from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel, check_manoeuvres
+from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
 from sysid_node.flight.record import Array
 
 
 def output_error(
-    model: Model,
-    manoeuvres: Sequence[Manoeuvre],
+    model: StateSpaceModel,
+    manoeuvres: Sequence[ManoeuvreData],
     *,
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
-    search: Search = DEFAULT_SEARCH,
-) -> Fit:
+    search: SearchOptions = DEFAULT_SEARCH,
+) -> BatchFit:
     """Estimates the free parameters of ``model`` from all manoeuvres together.
 
     ``initial_states`` are estimated for each manoeuvre (the others stay as given), and so are ``biases``, constants
@@ -38,18 +44,18 @@ def output_error(
     """
     check_manoeuvres(model, manoeuvres)
     problem = _OutputError(Unknowns.of(model, manoeuvres, initial_states, biases))
-    z, iterations, complaint = maximise(problem, search)
-    return assess("output_error", problem, z, iterations, complaint)
+    z, iterations, complaint = maximise_likelihood(problem, search)
+    return assessed_fit("output_error", problem, z, iterations, complaint)
 
 
-def predict(
-    model: Model,
-    manoeuvres: Sequence[Manoeuvre],
+def predict_output_error(
+    model: StateSpaceModel,
+    manoeuvres: Sequence[ManoeuvreData],
     values: Mapping[str, float],
     *,
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
-) -> list[Answer]:
+) -> list[ModelResponse]:
     """The model's answers on other manoeuvres with the parameters held at ``values``.
 
     Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
@@ -57,10 +63,10 @@ def predict(
     held = model.started_at(values)
     check_manoeuvres(held, manoeuvres)
     problem = _OutputError(Unknowns.of(held, manoeuvres, initial_states, biases))
-    return answer_with_own(problem, problem.start())
+    return responses_with_nuisances_estimated(problem, problem.start())
 
 
-class _OutputError(Problem):
+class _OutputError(LikelihoodProblem):
     """Open-loop rollouts."""
 
     def __init__(self, unknowns: Unknowns) -> None:
@@ -73,11 +79,11 @@ class _OutputError(Problem):
     def bounds(self) -> tuple[Array, Array]:
         return self.unknowns.bounds()
 
-    def answers(self, z: Array) -> list[Answer]:
+    def responses(self, z: Array) -> list[ModelResponse]:
         u = self.unknowns
         theta = u.theta(z)
         return [
-            Answer(
+            ModelResponse(
                 m.name,
                 m.output_time,
                 u.model.outputs,

@@ -12,12 +12,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS, collected, columns, structure_of
-from sysid_node.batch.regression.effective_length import freedom
-from sysid_node.batch.regression.equations import equations
+from sysid_node.batch.methods.equation_error import (
+    DEFAULT_LOW_PASS,
+    combined_fit,
+    regressor_matrix,
+    regressors_by_coefficient,
+)
+from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
 from sysid_node.batch.regression.linear_regression import Regression
-from sysid_node.batch.results.identifiability import Groups, status_of, undetermined
-from sysid_node.batch.results.result import Estimate, Fit, interval
+from sysid_node.batch.regression.measured_coefficients import measured_coefficients
+from sysid_node.batch.results.batch_fit import BatchFit, ParameterEstimate, confidence_interval
+from sysid_node.batch.results.identifiability import UnidentifiableGroups, identifiability_status, unidentifiable_groups
 from sysid_node.flight.record import Array, FlightRecord
 
 #: Variance of the start values over the residual's: nothing is known.
@@ -27,7 +32,7 @@ _VAGUE = 1e8
 Pass = Callable[[Sequence[str], Array, Array, float], tuple[Array, Array]]
 
 
-def recursive_least_squares(aircraft: Aircraft, records: Sequence[FlightRecord], forgetting: float = 1.0) -> Fit:
+def recursive_least_squares(aircraft: Aircraft, records: Sequence[FlightRecord], forgetting: float = 1.0) -> BatchFit:
     """The aircraft file's derivatives after one pass along all flights.
 
     ``forgetting`` is the weight that a sample keeps from one to the next. Raises InputError as ``equation_error`` does.
@@ -51,22 +56,22 @@ def recursion(y: Array, X: Array, forgetting: float, shaped: Callable[[float], f
     return values, P
 
 
-def sequential_fit(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], along: Pass) -> Fit:
+def sequential_fit(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], along: Pass) -> BatchFit:
     """All coefficients, each in one pass along the flights one after the other.
 
     Raises InputError where the flights are too short for one: faster than the aircraft moves there is only noise.
     """
-    flights = [equations(aircraft, record) for record in records]
+    flights = [measured_coefficients(aircraft, record) for record in records]
     step = float(np.median(np.diff(flights[0].time)))
     fits = {}
-    for coefficient, regressors in structure_of(aircraft, flights).items():
+    for coefficient, regressors in regressors_by_coefficient(aircraft, flights).items():
         names = [f"{coefficient}_{name}" for name in regressors]
-        freedom(names, [flight.time for flight in flights], DEFAULT_LOWPASS)
-        Xs = [columns(flight, regressors) for flight in flights]
+        effective_degrees_of_freedom(names, [flight.time for flight in flights], DEFAULT_LOW_PASS)
+        Xs = [regressor_matrix(flight, regressors) for flight in flights]
         ys = [flight.coefficients[coefficient] for flight in flights]
         values, covariance = along(names, np.concatenate(ys), np.concatenate(Xs), step)
         fits[coefficient] = regression_of(names, values, covariance, ys, Xs)
-    return collected(method, fits, flights)
+    return combined_fit(method, fits, flights)
 
 
 def regression_of(
@@ -76,7 +81,7 @@ def regression_of(
     modelled = [X @ values for X in Xs]
     residual = np.concatenate([y - m for y, m in zip(ys, modelled, strict=True)])
     noise = float(np.sqrt(np.mean(residual**2)))
-    lost = undetermined(np.asarray(sum(X.T @ X for X in Xs)), names)
+    lost = unidentifiable_groups(np.asarray(sum(X.T @ X for X in Xs)), names)
     errors = noise * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     freedom = float(residual.size - len(names))
     estimates = {
@@ -86,6 +91,14 @@ def regression_of(
     return Regression(estimates, noise**2 * covariance, modelled, noise, lost)
 
 
-def _estimate(name: str, value: float, error: float, freedom: float, lost: Groups) -> Estimate:
-    status = status_of(name, lost)
-    return Estimate(name, value, error, *interval(value, error, freedom), status == "ok", status, error)
+def _estimate(name: str, value: float, error: float, freedom: float, lost: UnidentifiableGroups) -> ParameterEstimate:
+    status = identifiability_status(name, lost)
+    return ParameterEstimate(
+        name,
+        value,
+        error,
+        *confidence_interval(value, error, freedom),
+        status == "ok",
+        status,
+        error,
+    )

@@ -15,22 +15,22 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
-from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS, columns, structure_of
-from sysid_node.batch.regression.equations import equations
+from sysid_node.batch.methods.equation_error import DEFAULT_LOW_PASS, regressor_matrix, regressors_by_coefficient
 from sysid_node.batch.regression.filtering import lowpass
 from sysid_node.batch.regression.linear_regression import regress
+from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
 CRITERIA = ("f_ratio", "predicted_square_error", "cross_validation")
 
 #: F-ratio (squared value over standard error) of a regressor that is worth its place: 1 % by chance.
-F_WORTHWHILE = 7.0
+F_TO_ENTER = 7.0
 _FOLDS = 5
 
 
 @dataclass(frozen=True)
-class Step:
+class StepwiseStep:
     """The model after a regressor entered or left: its figures of merit."""
 
     change: str  # "+alpha" or "-q"
@@ -42,27 +42,27 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Selection:
+class StepwiseSelection:
     """The regressors chosen, and the way there."""
 
     regressors: tuple[str, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[StepwiseStep, ...]
 
 
-def select(
+def select_regressors(
     names: Sequence[str],
     ys: Sequence[Array],
     Xs: Sequence[Array],
     always: Sequence[str] = ("0",),
     criterion: str = "f_ratio",
-) -> Selection:
+) -> StepwiseSelection:
     """The regressors of ``ys`` (N,) that the columns of ``Xs`` (N, p) named ``names`` earn, flights together.
 
     Those of ``always`` are in from the start. Raises InputError on an unknown criterion.
     """
     if criterion not in CRITERIA:
         raise InputError(f"criterion {criterion!r}: expected one of {', '.join(CRITERIA)}")
-    data = _Data(tuple(names), list(ys), list(Xs))
+    data = _RegressionData(tuple(names), list(ys), list(Xs))
     chosen = [name for name in names if name in always]
     candidates = [name for name in names if name not in always]
     steps = [data.step("", chosen, np.nan)]
@@ -77,28 +77,28 @@ def select(
         steps.append(following)
         for name in [n for n in chosen if n not in always and n != best]:
             ratio = data.f_ratio(name, chosen)
-            if ratio < F_WORTHWHILE:
+            if ratio < F_TO_ENTER:
                 chosen.remove(name)
                 steps.append(data.step(f"-{name}", chosen, ratio))
-    return Selection(tuple(name for name in names if name in chosen), tuple(steps))
+    return StepwiseSelection(tuple(name for name in names if name in chosen), tuple(steps))
 
 
-def supported(
+def supported_model(
     aircraft: Aircraft,
     records: Sequence[FlightRecord],
-    low_pass: float = DEFAULT_LOWPASS,
+    low_pass: float = DEFAULT_LOW_PASS,
     criterion: str = "f_ratio",
-) -> tuple[Aircraft, dict[str, Selection]]:
+) -> tuple[Aircraft, dict[str, StepwiseSelection]]:
     """The aircraft with only the derivatives that these flights support, and each coefficient's selection."""
-    flights = [equations(aircraft, record) for record in records]
+    flights = [measured_coefficients(aircraft, record) for record in records]
     selections = {
-        coefficient: select(
+        coefficient: select_regressors(
             regressors,
             [lowpass(flight.time, flight.coefficients[coefficient], low_pass) for flight in flights],
-            [lowpass(flight.time, columns(flight, regressors), low_pass) for flight in flights],
+            [lowpass(flight.time, regressor_matrix(flight, regressors), low_pass) for flight in flights],
             criterion=criterion,
         )
-        for coefficient, regressors in structure_of(aircraft, flights).items()
+        for coefficient, regressors in regressors_by_coefficient(aircraft, flights).items()
     }
 
     def kept(name: str) -> bool:
@@ -109,13 +109,13 @@ def supported(
     return replace(aircraft, derivatives=derivatives), selections
 
 
-def _better(before: Step, after: Step, criterion: str) -> bool:
+def _better(before: StepwiseStep, after: StepwiseStep, criterion: str) -> bool:
     if criterion == "f_ratio":
-        return after.f_ratio >= F_WORTHWHILE
+        return after.f_ratio >= F_TO_ENTER
     return bool(getattr(after, criterion) < getattr(before, criterion))
 
 
-class _Data:
+class _RegressionData:
     """Both sides of an equation, with what stepwise regression asks of them."""
 
     def __init__(self, names: tuple[str, ...], ys: list[Array], Xs: list[Array]) -> None:
@@ -146,11 +146,11 @@ class _Data:
         estimate = regress(chosen, self.ys, [X[:, index] for X in self.Xs]).estimates[name]
         return (estimate.value / estimate.standard_error) ** 2 if estimate.valid else 0.0
 
-    def step(self, change: str, chosen: Sequence[str], ratio: float) -> Step:
+    def step(self, change: str, chosen: Sequence[str], ratio: float) -> StepwiseStep:
         error = float(np.mean(self._residual(self.y, chosen) ** 2))
         penalty = self.variance * len(chosen) / len(self.y)
         explained = 1.0 - error / self.variance if self.variance > 0.0 else np.nan
-        return Step(change, tuple(chosen), explained, ratio, error + penalty, self._cross_validated(chosen))
+        return StepwiseStep(change, tuple(chosen), explained, ratio, error + penalty, self._cross_validated(chosen))
 
     def _cross_validated(self, chosen: Sequence[str]) -> float:
         """Mean square error on each fifth of the data in turn, the rest being fitted."""

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
-from sysid_node.batch.models.model import Model, Parameter, Scalars
+from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
 
 GRAVITY = 9.80665  # m/s^2
 
@@ -66,7 +66,7 @@ def at_probe(position: Vector3, s: Signals) -> dict[str, jax.Array]:
     return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}
 
 
-def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> Model:
+def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> StateSpaceModel:
     """Kinematics driven by the IMU with unknown sensor errors; ``outputs`` of V, alpha, beta, phi, theta, psi.
 
     ``probe`` is where the air data are measured, m from the CG.
@@ -100,4 +100,4 @@ def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> M
             (1.0 + error.get(f"scale_{name}", 0.0)) * s[name] + error.get(f"bias_{name}", 0.0) for name in outputs
         )
 
-    return Model("sensor_errors", STATES, INPUTS, tuple(outputs), parameters, derivative, output)
+    return StateSpaceModel("sensor_errors", STATES, INPUTS, tuple(outputs), parameters, derivative, output)

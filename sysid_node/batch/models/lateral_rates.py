@@ -12,13 +12,13 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.models.model import Model, Parameter, Scalars
+from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
 
 _REGRESSORS = ("p", "r", "da", "dr", "beta")
 _UNITS = {"L": "1/s", "N": "1/s", "Y": "m/s"}
 
 
-def lateral_rates(start: Mapping[str, float]) -> Model:
+def lateral_rates(start: Mapping[str, float]) -> StateSpaceModel:
     """States p, r (rad/s, from their first values); inputs da, dr, beta (rad); outputs pdot, rdot, ay, p, r.
 
     Parameters ``L_p ... N_beta, Y_p ... Y_beta`` per rad or rad/s, offsets ``L_0 N_0`` of the state equations and
@@ -39,7 +39,7 @@ def lateral_rates(start: Mapping[str, float]) -> Model:
         true = (*(acceleration(axis, x, u, theta) for axis in (0, 1, 2)), *x)
         return tuple(value + bias for value, bias in zip(true, theta[17:22], strict=True))
 
-    return Model(
+    return StateSpaceModel(
         name="lateral_rates",
         states=("p", "r"),
         inputs=("da", "dr", "beta"),

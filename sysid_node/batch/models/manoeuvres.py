@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.models.model import Manoeuvre, Model, grouped
+from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel, block_means
 from sysid_node.batch.models.rigid_body import AT_CG
-from sysid_node.batch.regression.equations import at_cg
 from sysid_node.batch.regression.filtering import differentiate
+from sysid_node.batch.regression.measured_coefficients import at_cg
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -21,9 +21,9 @@ _FEWEST = 5  # samples in a piece of flight
 _DERIVED = {"pdot": "p", "qdot": "q", "rdot": "r"}
 
 
-def manoeuvre(
-    model: Model, record: FlightRecord, initial_state: Mapping[str, float] | None = None, every: int = 1
-) -> Manoeuvre:
+def manoeuvre_data(
+    model: StateSpaceModel, record: FlightRecord, initial_state: Mapping[str, float] | None = None, every: int = 1
+) -> ManoeuvreData:
     """The record's columns as inputs, outputs and initial state of ``model``.
 
     Columns are found by name; pdot, qdot and rdot are differentiated where the record lacks them. The initial state
@@ -42,7 +42,7 @@ def manoeuvre(
     inputs = np.column_stack([record[name] for name in model.inputs])
     outputs = np.column_stack([_output(record, name) for name in model.outputs])
     time = record.time - record.time[0]
-    return Manoeuvre(time, inputs, grouped(outputs, every), start, record.name or "flight", every)
+    return ManoeuvreData(time, inputs, block_means(outputs, every), start, record.name or "flight", every)
 
 
 def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
@@ -52,7 +52,7 @@ def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
     return FlightRecord(record.time, columns, record.name, record.start_ns, record.rejected)
 
 
-def segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:
+def cut_into_segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:
     """The record in pieces of equal length, none longer than ``seconds``; 0 leaves it whole.
 
     A long open-loop rollout drifts away on small errors of trim and wind; pieces with an initial state each do not.

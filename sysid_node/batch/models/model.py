@@ -17,14 +17,14 @@ from sysid_node.flight.record import Array
 Scalars = Sequence[jax.Array]
 
 #: ``(states, inputs, parameters) -> values``, in JAX operations only, without side effects.
-Equations = Callable[[Scalars, Scalars, Scalars], Scalars]
+EquationFunction = Callable[[Scalars, Scalars, Scalars], Scalars]
 
 
-class Dynamics(NamedTuple):
+class ModelEquations(NamedTuple):
     """A model's equations alone: what compiled code belongs to, whatever the parameters' values and bounds."""
 
-    derivative: Equations
-    output: Equations
+    derivative: EquationFunction
+    output: EquationFunction
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class StateSpaceModel:
     """A dynamic system with unknown constants.
 
     ``derivative`` gives the states' derivatives and ``output`` the outputs, from states, inputs and parameters one by
@@ -73,8 +73,8 @@ class Model:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     parameters: tuple[Parameter, ...]
-    derivative: Equations
-    output: Equations
+    derivative: EquationFunction
+    output: EquationFunction
     units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
     driven: Mapping[str, float] | None = None  # the states that process noise moves (None: all), with its rough size:
     # unit per root second, 0 where nothing is known of it
@@ -87,9 +87,9 @@ class Model:
                 raise InputError(f"model {self.name}: {kind} named twice: {', '.join(twice)}")
 
     @property
-    def dynamics(self) -> Dynamics:
+    def dynamics(self) -> ModelEquations:
         """The equations alone."""
-        return Dynamics(self.derivative, self.output)
+        return ModelEquations(self.derivative, self.output)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -106,11 +106,11 @@ class Model:
         """Start values (P,)."""
         return np.array([parameter.start for parameter in self.parameters])
 
-    def changed(self, **changes: object) -> Model:
+    def changed(self, **changes: object) -> StateSpaceModel:
         """The same model with some fields replaced."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    def started_at(self, values: Mapping[str, float]) -> Model:
+    def started_at(self, values: Mapping[str, float]) -> StateSpaceModel:
         """The same model with other start values (clipped into the bounds) for some parameters."""
         unknown = sorted(set(values) - set(self.names))
         if unknown:
@@ -125,7 +125,7 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Manoeuvre:
+class ManoeuvreData:
     """One stretch of flight as a model sees it.
 
     ``time`` (N,) s, increasing; ``inputs`` (N, nu), complete; ``outputs`` (N // every, ny) as measured, each the mean
@@ -159,7 +159,7 @@ class Manoeuvre:
     @property
     def output_time(self) -> Array:
         """When the outputs were measured, on average (N // every,), s."""
-        return grouped(self.time, self.every)
+        return block_means(self.time, self.every)
 
     @property
     def step(self) -> float:
@@ -167,13 +167,13 @@ class Manoeuvre:
         return float(np.median(np.diff(self.time)))
 
 
-def grouped(values: Array, every: int) -> Array:
+def block_means(values: Array, every: int) -> Array:
     """Means (N // every, ...) over ``every`` rows each; what is left at the end is dropped."""
     rows = len(values) // every
     return np.asarray(values[: rows * every].reshape(rows, every, *values.shape[1:]).mean(axis=1))
 
 
-def check_manoeuvres(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
+def check_manoeuvres(model: StateSpaceModel, manoeuvres: Sequence[ManoeuvreData]) -> None:
     """Raises InputError where a manoeuvre does not fit the model, lacks inputs, or measures nothing."""
     if not manoeuvres:
         raise InputError(f"model {model.name}: no manoeuvre given; at least one is needed")

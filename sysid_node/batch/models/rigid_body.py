@@ -18,7 +18,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 from sysid_node.batch.models.gusts import DRIVEN, air_relative, gust_parameters, gust_rates, gust_states
 from sysid_node.batch.models.kinematics import at_probe, attitude_rates, flow_rates
-from sysid_node.batch.models.model import Model, Scalars
+from sysid_node.batch.models.model import Scalars, StateSpaceModel
 from sysid_node.errors import InputError
 
 #: States that may be integrated, each with the coefficient without which it cannot be; None: kinematics alone.
@@ -63,7 +63,7 @@ def rigid_body(
     reference_rates: bool = False,
     thrust: bool = True,
     gusts: bool = False,
-) -> Model:
+) -> StateSpaceModel:
     """A model of the aircraft file's derivatives with these states and outputs.
 
     Inputs are the remaining states, the aircraft's controls, ``rho`` (kg/m^3), ``thrust`` (N; left out, and taken as
@@ -85,7 +85,7 @@ def rigid_body(
     all_states = (*states, *(gust_states(states) if gusts else ()))
     turning = gust_parameters(all_states)
     motion = _Motion(aircraft, all_states, inputs, (names, tuple(p.name for p in turning)), reference_rates)
-    return Model(
+    return StateSpaceModel(
         name="rigid_body",
         states=all_states,
         inputs=inputs,

@@ -14,13 +14,13 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.models.kinematics import GRAVITY
-from sysid_node.batch.models.model import Model, Parameter, Scalars
+from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
 
 INPUTS = ("de", "V", "beta", "p", "r", "phi", "theta", "ax", "rho", "q_measured")
 PARAMETERS = ("CZ_alpha", "CZ_de", "CZ_0", "Cm_alpha", "Cm_q", "Cm_de", "Cm_0", "bias_az")
 
 
-def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, de0: float) -> Model:
+def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, de0: float) -> StateSpaceModel:
     """States alpha (rad), q (rad/s); outputs alpha, q, az (m/s^2, at the CG, which the records must be referred to).
 
     ``alpha0``, ``de0`` (rad): the point about which CZ and Cm are linear. The pitch-rate regressor of Cm is the
@@ -54,7 +54,7 @@ def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, 
         s = dict(zip(INPUTS, u, strict=True))
         return x[0], x[1], normal_acceleration(s, coefficients(x, s, theta)[0]) + theta[7]
 
-    return Model(
+    return StateSpaceModel(
         name="short_period",
         states=("alpha", "q"),
         inputs=INPUTS,

@@ -35,7 +35,7 @@ _PARZEN_FREEDOM = 3.709
 _ROUNDS = 2
 
 
-def degrees_of_freedom(lengths: Sequence[int]) -> float:
+def spectral_degrees_of_freedom(lengths: Sequence[int]) -> float:
     """Equivalent degrees of freedom of the residuals' spectrum, for records of these lengths in samples."""
     return _PARZEN_FREEDOM * sum(lengths) / _lag_width(max(lengths))
 

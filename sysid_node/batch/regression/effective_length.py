@@ -12,7 +12,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
 
-def freedom(names: Sequence[str], times: Sequence[Array], low_pass: float) -> float:
+def effective_degrees_of_freedom(names: Sequence[str], times: Sequence[Array], low_pass: float) -> float:
     """How many independent values below ``low_pass`` Hz (0: all) flights sampled at ``times`` (N,) s hold beyond the
     unknowns of one equation.
 

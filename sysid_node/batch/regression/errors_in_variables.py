@@ -27,7 +27,7 @@ _FEWEST_LINES = 20
 _LEAST_LEFT = 0.5
 
 
-def white_variance(time: Array, x: Array, cutoff: float) -> float:
+def white_noise_variance(time: Array, x: Array, cutoff: float) -> float:
     """Variance of each sample of the least white noise that ``x`` (N,) at ``time`` (N,) s shows above ``cutoff`` Hz.
 
     What moves the aircraft falls off there by a factor of four in power with each octave, or faster (the gusts' spectra
@@ -47,19 +47,19 @@ def white_variance(time: Array, x: Array, cutoff: float) -> float:
 
 
 @dataclass(frozen=True)
-class Noise:
+class SensorNoise:
     """One sensor's white noise in a regression on one flight.
 
     ``variance`` of each sample; ``answer`` (N,) and ``regressors`` (N, p): how both sides depend on the reading.
     """
 
     variance: float
-    answer: Array
+    response: Array
     regressors: Array
 
 
 @dataclass(frozen=True)
-class Noisy:
+class ErrorsInVariables:
     """All of it on one flight.
 
     The normal equations are X' B (y - X theta) = 0 with a filter B: ``scores`` (N, p) = B X, ``weight`` the diagonal
@@ -68,12 +68,12 @@ class Noisy:
 
     scores: Array
     weight: float
-    noises: Sequence[Noise]
+    noises: Sequence[SensorNoise]
 
     def excess(self) -> Array:
         """What the noise adds to X' B [X y], on average (p, p + 1)."""
         parts = [
-            noise.variance * self.weight * noise.regressors.T @ np.column_stack([noise.regressors, noise.answer])
+            noise.variance * self.weight * noise.regressors.T @ np.column_stack([noise.regressors, noise.response])
             for noise in self.noises
         ]
         return np.asarray(np.sum(parts, axis=0))
@@ -82,12 +82,14 @@ class Noisy:
         """What the scores' covariance (p, p) is above that of the same noise spread evenly over the flight."""
         total = np.zeros((theta.size, theta.size))
         for noise in self.noises:
-            power = noise.variance * (noise.answer - noise.regressors @ theta) ** 2
+            power = noise.variance * (noise.response - noise.regressors @ theta) ** 2
             total += (self.scores * (power - power.mean())[:, None]).T @ self.scores
         return total
 
 
-def taken_out(information: Array, moment: Array, noisy: Sequence[Noisy]) -> tuple[Array, Array]:
+def corrected_normal_equations(
+    information: Array, moment: Array, noisy: Sequence[ErrorsInVariables]
+) -> tuple[Array, Array]:
     """Information (p, p) and moment (p,) without what the noise has added; less where that would leave next to nothing.
 
     The share that can be taken out is that of Fuller (1987), sec. 2.5: the smallest root of |A - lambda S| = 0.
@@ -106,7 +108,7 @@ def taken_out(information: Array, moment: Array, noisy: Sequence[Noisy]) -> tupl
     return information - share * added, moment - share * excess[:, -1]
 
 
-def widened(covariance: Array, inverse: Array, theta: Array, noisy: Sequence[Noisy]) -> Array:
+def inflated_covariance(covariance: Array, inverse: Array, theta: Array, noisy: Sequence[ErrorsInVariables]) -> Array:
     """The covariance (p, p) with what the noise's unevenness adds; no variance becomes less."""
     extra = inverse @ np.sum([flight.unevenness(theta) for flight in noisy], axis=0) @ inverse
     variance = np.diag(covariance)

@@ -41,19 +41,19 @@ def lowpass(time: Array, X: Array, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(sections, X, axis=0, padlen=min(len(X) - 1, int(3 * rate / cutoff))))
 
 
-def samples_together(record: FlightRecord, rate: float) -> int:
+def averaging_factor(record: FlightRecord, rate: float) -> int:
     """How many samples make one at ``rate`` Hz or a little above; 1 where ``rate`` is 0 or the flight is slower."""
     step = float(np.median(np.diff(record.time)))
     return max(1, int(1.0 / (rate * step) + 1e-6)) if rate > 0.0 else 1
 
 
-def averaged(record: FlightRecord, rate: float) -> FlightRecord:
+def block_averaged(record: FlightRecord, rate: float) -> FlightRecord:
     """The record at ``rate`` Hz or a little above, each sample the mean of those it replaces; 0 leaves it as it is.
 
     A mean over a missing value is missing. Means of states and inputs belong together only as far as both are nearly
     straight lines for so long.
     """
-    together = samples_together(record, rate)
+    together = averaging_factor(record, rate)
     if together < 2 or len(record) < 2 * together:
         return record
     whole = len(record) // together * together

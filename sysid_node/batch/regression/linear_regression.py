@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid_node.batch.regression.coloured_residuals import coloured_covariance, degrees_of_freedom
-from sysid_node.batch.regression.errors_in_variables import Noisy, taken_out, widened
-from sysid_node.batch.results.identifiability import Groups, status_of, undetermined
-from sysid_node.batch.results.result import Estimate, interval
+from sysid_node.batch.regression.coloured_residuals import coloured_covariance, spectral_degrees_of_freedom
+from sysid_node.batch.regression.errors_in_variables import (
+    ErrorsInVariables,
+    corrected_normal_equations,
+    inflated_covariance,
+)
+from sysid_node.batch.results.batch_fit import ParameterEstimate, confidence_interval
+from sysid_node.batch.results.identifiability import UnidentifiableGroups, identifiability_status, unidentifiable_groups
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 
@@ -22,11 +26,11 @@ class Regression:
     ``noise`` is the residuals' standard deviation; ``lost`` names what the data cannot tell apart.
     """
 
-    estimates: dict[str, Estimate]
+    estimates: dict[str, ParameterEstimate]
     covariance: Array
     modelled: list[Array]
     noise: float
-    lost: Groups
+    lost: UnidentifiableGroups
 
 
 def regress(
@@ -35,7 +39,7 @@ def regress(
     Xs: Sequence[Array],
     instruments: Sequence[Array] | None = None,
     freedom: float = np.inf,
-    noisy: Sequence[Noisy] = (),
+    noisy: Sequence[ErrorsInVariables] = (),
 ) -> Regression:
     """Least squares of ``ys`` (N,) on ``Xs`` (N, p), several flights together.
 
@@ -50,10 +54,10 @@ def regress(
         raise InputError(f"{samples} samples for {len(names)} regressors ({', '.join(names)}); give a longer flight")
     Zs = Xs if instruments is None else instruments
     information: Array = np.sum([Z.T @ X for Z, X in zip(Zs, Xs, strict=True)], axis=0)
-    lost = undetermined(information, names)
+    lost = unidentifiable_groups(information, names)
     moment: Array = np.sum([Z.T @ y for Z, y in zip(Zs, ys, strict=True)], axis=0)
     if noisy and not lost:
-        information, moment = taken_out(information, moment, noisy)
+        information, moment = corrected_normal_equations(information, moment, noisy)
     inverse = _inverse(0.5 * (information + information.T))
     values = inverse @ moment
     modelled = [X @ values for X in Xs]
@@ -63,13 +67,15 @@ def regress(
         inverse, [X[:, None, :] for X in Xs], [r[:, None] for r in residuals], [Z[:, None, :] for Z in Zs]
     )
     if noisy:
-        covariance = widened(covariance, inverse, values, noisy)
+        covariance = inflated_covariance(covariance, inverse, values, noisy)
     scatter: Array = np.sum([Z.T @ Z for Z in Zs], axis=0)
     white = noise * np.sqrt(np.clip(np.diag(inverse @ scatter @ inverse), 0.0, None) * samples / (samples - len(names)))
-    freedom = min(freedom, degrees_of_freedom([len(y) for y in ys]))
+    freedom = min(freedom, spectral_degrees_of_freedom([len(y) for y in ys]))
     errors = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     estimates = {
-        name: _estimate(name, float(values[i]), float(errors[i]), freedom, float(white[i]), status_of(name, lost))
+        name: _estimate(
+            name, float(values[i]), float(errors[i]), freedom, float(white[i]), identifiability_status(name, lost)
+        )
         for i, name in enumerate(names)
     }
     return Regression(estimates, covariance, modelled, noise, lost)
@@ -82,6 +88,6 @@ def _inverse(information: Array) -> Array:
     return np.asarray(np.linalg.pinv(information / sizes, rcond=1e-12, hermitian=True) / sizes)
 
 
-def _estimate(name: str, value: float, error: float, freedom: float, white: float, status: str) -> Estimate:
-    lower, upper = interval(value, error, freedom)
-    return Estimate(name, value, error, lower, upper, status == "ok", status, white)
+def _estimate(name: str, value: float, error: float, freedom: float, white: float, status: str) -> ParameterEstimate:
+    lower, upper = confidence_interval(value, error, freedom)
+    return ParameterEstimate(name, value, error, lower, upper, status == "ok", status, white)

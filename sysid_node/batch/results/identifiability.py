@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sysid_node.batch.results.result import correlation
+from sysid_node.batch.results.batch_fit import correlation_matrix
 from sysid_node.flight.record import Array
 
 #: Two estimates correlated more than this cannot be told apart.
@@ -21,10 +21,10 @@ HIGHEST_CONDITION = 1e6
 
 
 #: Groups of parameters that only together have an effect that the data show; one alone has none.
-Groups = tuple[tuple[str, ...], ...]
+UnidentifiableGroups = tuple[tuple[str, ...], ...]
 
 
-def undetermined(information: Array, names: Sequence[str]) -> Groups:
+def unidentifiable_groups(information: Array, names: Sequence[str]) -> UnidentifiableGroups:
     """What the data do not determine at all: parameters without effect alone, those of one effect together.
 
     ``information`` (P, P) is the Fisher information. Empty where every parameter is determined.
@@ -42,7 +42,7 @@ def undetermined(information: Array, names: Sequence[str]) -> Groups:
     return tuple(tuple(names[i] for i in sorted(group)) for group in _merged(groups))
 
 
-def status_of(name: str, groups: Groups) -> str:
+def identifiability_status(name: str, groups: UnidentifiableGroups) -> str:
     """ "ok", "not excited" or "collinear with ..."."""
     for group in groups:
         if name in group:
@@ -62,7 +62,7 @@ def _merged(groups: list[set[int]]) -> list[set[int]]:
 
 def inseparable_pairs(covariance: Array, names: Sequence[str]) -> list[tuple[str, str, float]]:
     """Pairs of parameters that the flight hardly tells apart, with their correlation, the worst first."""
-    table = correlation(covariance)
+    table = correlation_matrix(covariance)
     pairs = [
         (names[i], names[j], float(table[i, j]))
         for i in range(len(names))
@@ -72,7 +72,7 @@ def inseparable_pairs(covariance: Array, names: Sequence[str]) -> list[tuple[str
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def sentences(covariance: Array, names: Sequence[str], groups: Groups) -> list[str]:
+def identifiability_remarks(covariance: Array, names: Sequence[str], groups: UnidentifiableGroups) -> list[str]:
     """In words: what was not determined, and which pairs are hardly told apart."""
     lost = {name for group in groups for name in group}
     kept = [i for i, name in enumerate(names) if name not in lost]

@@ -11,14 +11,14 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from sysid_node.batch.results.result import Answer
+from sysid_node.batch.results.batch_fit import ModelResponse
 from sysid_node.flight.record import Array
 
 #: Longest lag looked at, as a share of the flight.
 _LAG_SHARE = 0.1
 
 
-def figures(answer: Answer, inputs: Mapping[str, Array]) -> dict[str, dict[str, float]]:
+def figures_of_merit(response: ModelResponse, inputs: Mapping[str, Array]) -> dict[str, dict[str, float]]:
     """Output -> figure -> value, on the samples where the output was measured.
 
     ``normalised_error`` RMS of the residual over that of the measurement; ``theil`` Theil's inequality coefficient
@@ -28,22 +28,22 @@ def figures(answer: Answer, inputs: Mapping[str, Array]) -> dict[str, dict[str, 
     modelled without a finite value.
     """
     table = {}
-    for column, name in enumerate(answer.names):
-        measured, modelled = answer.measured[:, column], answer.modelled[:, column]
+    for column, name in enumerate(response.names):
+        measured, modelled = response.measured[:, column], response.modelled[:, column]
         kept = np.isfinite(measured)
         chosen = {key: values[kept] for key, values in inputs.items()}
-        table[name] = _figures(measured[kept], modelled[kept], chosen)
+        table[name] = _figures_of_output(measured[kept], modelled[kept], chosen)
     return table
 
 
-def _figures(measured: Array, modelled: Array, inputs: Mapping[str, Array]) -> dict[str, float]:
+def _figures_of_output(measured: Array, modelled: Array, inputs: Mapping[str, Array]) -> dict[str, float]:
     names = ("normalised_error", "theil", "r_squared", "whiteness", "input_correlation")
     if measured.size < 10 or not np.isfinite(modelled).all() or np.ptp(measured) == 0.0:
         return dict.fromkeys(names, float("nan"))
     mean = measured.mean()
     residual = measured - modelled
-    error, spread, answer = (float(np.sqrt(np.mean(x**2))) for x in (residual, measured - mean, modelled - mean))
-    values = (error / spread, error / (spread + answer), 1.0 - (error / spread) ** 2)
+    error, spread, response = (float(np.sqrt(np.mean(x**2))) for x in (residual, measured - mean, modelled - mean))
+    values = (error / spread, error / (spread + response), 1.0 - (error / spread) ** 2)
     centred = residual - residual.mean()
     correlations = [_largest_correlation(centred, x - x.mean()) for x in inputs.values()]
     return dict(zip(names, (*values, _whiteness(centred), max(correlations, default=float("nan"))), strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.excite.optimise import Envelope, Optimum
+from sysid_node.excite.optimise import FlightEnvelope, Optimum
 from sysid_node.excite.prediction import Prediction
 
 
@@ -15,6 +15,6 @@ class ManoeuvreResult:
 
     aircraft: Aircraft
     prediction: Prediction
-    envelope: Envelope
+    envelope: FlightEnvelope
     autopilot: bool
     optimum: Optimum | None = None

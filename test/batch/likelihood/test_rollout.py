@@ -7,7 +7,7 @@ from made_models import SHORT_PERIOD, flown, short_period_model
 from scipy.linalg import expm
 
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.model import Manoeuvre, grouped
+from sysid_node.batch.models.model import ManoeuvreData, block_means
 
 MODEL = short_period_model()
 SYSTEM = np.array([[SHORT_PERIOD["Za"], 1.0], [SHORT_PERIOD["Ma"], SHORT_PERIOD["Mq"]]])
@@ -16,7 +16,7 @@ SYSTEM = np.array([[SHORT_PERIOD["Za"], 1.0], [SHORT_PERIOD["Ma"], SHORT_PERIOD[
 def free_motion(step):
     """Outputs over one second from an initial disturbance, and the exact ones (matrix exponential)."""
     time = np.arange(0.0, 1.0 + step / 2, step)
-    manoeuvre = Manoeuvre(time, np.zeros((time.size, 1)), np.zeros((time.size, 3)), np.array([0.1, 0.0]))
+    manoeuvre = ManoeuvreData(time, np.zeros((time.size, 1)), np.zeros((time.size, 3)), np.array([0.1, 0.0]))
     exact = np.array([expm(SYSTEM * t) @ manoeuvre.initial_state for t in time])
     return rollout.outputs(MODEL, manoeuvre, MODEL.start)[:, :2], exact
 
@@ -31,7 +31,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step():
 def test_uneven_samples_are_integrated_at_their_own_times():
     rng = np.random.default_rng(3)
     time = np.concatenate([[0.0], np.cumsum(rng.uniform(0.002, 0.015, 150))])
-    manoeuvre = Manoeuvre(time, np.zeros((time.size, 1)), np.zeros((time.size, 3)), np.array([0.1, 0.0]))
+    manoeuvre = ManoeuvreData(time, np.zeros((time.size, 1)), np.zeros((time.size, 3)), np.array([0.1, 0.0]))
     exact = np.array([expm(SYSTEM * t) @ manoeuvre.initial_state for t in time])
     np.testing.assert_allclose(rollout.outputs(MODEL, manoeuvre, MODEL.start)[:, :2], exact, atol=2e-6)
 
@@ -53,10 +53,10 @@ def test_sensitivities_agree_with_finite_differences():
 
 def test_averaged_outputs_are_the_averages():
     whole = flown(MODEL, rate=100.0)
-    averaged = dataclasses.replace(whole, outputs=grouped(whole.outputs, 3), every=3)
-    expected = grouped(rollout.outputs(MODEL, whole, MODEL.start), 3)
+    averaged = dataclasses.replace(whole, outputs=block_means(whole.outputs, 3), every=3)
+    expected = block_means(rollout.outputs(MODEL, whole, MODEL.start), 3)
     np.testing.assert_allclose(rollout.outputs(MODEL, averaged, MODEL.start), expected, atol=1e-12)
     slopes = rollout.sensitivities(MODEL, whole, MODEL.start, whole.initial_state, (4,))
     found = rollout.sensitivities(MODEL, averaged, MODEL.start, whole.initial_state, (4,))
-    np.testing.assert_allclose(found, grouped(slopes, 3), atol=1e-12)
+    np.testing.assert_allclose(found, block_means(slopes, 3), atol=1e-12)
     np.testing.assert_allclose(averaged.output_time[:2], [0.01, 0.04])

@@ -9,8 +9,8 @@ from reference_flights import TWIN_OTTER_EQUATION_ERROR, TWIN_OTTER_FREQUENCY, t
 
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error, regress_in_band
-from sysid_node.batch.regression.equations import equations
 from sysid_node.batch.regression.linear_regression import regress
+from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
@@ -20,7 +20,7 @@ BAND = (0.1, 0.04, 1.5)
 @pytest.fixture(scope="module")
 def otter(flights):
     case = twin_otter(flights)
-    found = equations(case.aircraft, case.record)
+    found = measured_coefficients(case.aircraft, case.record)
     X = np.column_stack([found.regressors[name] for name in ("alpha", "q", "de", "0")])
     return found, X
 
@@ -69,13 +69,13 @@ def test_noisy_flights_are_within_their_intervals(method):
     fit = method(KESTREL, [flight(1), flight(2, turn=-1)])
     assert np.mean(np.abs(scores(fit.estimates)) < 2.0) > 0.8
     assert np.abs(scores(fit.estimates)).max() < 4.5
-    assert {"CL", "CD", "CY", "Cl", "Cm", "Cn"} == set(fit.answers[0].names)
+    assert {"CL", "CD", "CY", "Cl", "Cm", "Cn"} == set(fit.responses[0].names)
 
 
 def test_forces_and_air_data_are_moved_to_the_cg():
-    moved = equations(KESTREL, clean()).coefficients["CL"]
+    moved = measured_coefficients(KESTREL, clean()).coefficients["CL"]
     ignored = dataclasses.replace(KESTREL, sensors=type(KESTREL.sensors)())
-    assert np.abs(equations(ignored, clean()).coefficients["CL"] - moved).max() > 0.02
+    assert np.abs(measured_coefficients(ignored, clean()).coefficients["CL"] - moved).max() > 0.02
 
 
 def test_gaps_are_left_out_and_counted():
@@ -90,11 +90,11 @@ def test_gaps_are_left_out_and_counted():
 def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
     record = flight(5)
     parked = {**record.columns, "V": np.where(record.time < 2.0, 0.1, record["V"])}
-    found = equations(KESTREL, FlightRecord(record.time, parked, "taxi"))
+    found = measured_coefficients(KESTREL, FlightRecord(record.time, parked, "taxi"))
     assert found.left_out == np.count_nonzero(record.time < 2.0)
     assert any("slower than" in remark for remark in found.remarks)
     with pytest.raises(InputError, match=r"only 0 of \d+ samples .* in which the aircraft flies"):
-        equations(KESTREL, FlightRecord(record.time, {**record.columns, "V": 0.0 * record["V"]}, "parked"))
+        measured_coefficients(KESTREL, FlightRecord(record.time, {**record.columns, "V": 0.0 * record["V"]}, "parked"))
 
 
 def test_a_signal_never_measured_is_named():

@@ -10,9 +10,9 @@ from made_models import NOISE, SHORT_PERIOD, flown, short_period_model, with_out
 from reference_flights import HFB_FILTER_ERROR, HFB_FILTER_ERROR_DET, hfb_320
 from scipy.linalg import expm, solve_discrete_are
 
-from sysid_node.batch.likelihood import kalman
+from sysid_node.batch.likelihood import steady_kalman_filter
 from sysid_node.batch.likelihood.rollout import rk4_step
-from sysid_node.batch.methods.filter_error import filter_error, predict_filter
+from sysid_node.batch.methods.filter_error import filter_error, predict_filter_error
 from sysid_node.batch.methods.output_error import output_error
 from sysid_node.batch.models.model import Parameter
 from sysid_node.errors import InputError
@@ -106,7 +106,9 @@ def test_the_steady_covariance_solves_the_riccati_equation():
     C, q, r = rng.normal(size=(3, 4)), rng.uniform(0.01, 1.0, 4), rng.uniform(0.01, 1.0, 3)
     Q = np.diag(q)
     exact = solve_discrete_are(F.T, C.T, Q, np.diag(r))
-    np.testing.assert_allclose(kalman.steady_covariance(*map(jnp.asarray, (F, C, Q, r))), exact, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        steady_kalman_filter.steady_covariance(*map(jnp.asarray, (F, C, Q, r))), exact, rtol=1e-9, atol=1e-12
+    )
 
 
 def sampled_noise(Q, dt):
@@ -119,7 +121,7 @@ def sampled_noise(Q, dt):
 def test_predictions_are_those_of_a_kalman_filter_written_out():
     model, manoeuvre = short_period_model(), in_gusts(np.random.default_rng(5), 5.0)
     q, r, theta = GUSTS**2, NOISE**2, model.start
-    found = kalman.predictions(
+    found = steady_kalman_filter.predictions(
         model.dynamics, manoeuvre.time, manoeuvre.inputs, manoeuvre.outputs, jnp.zeros(2), jnp.asarray(theta), q, r
     )
     dt, u = manoeuvre.step, manoeuvre.inputs
@@ -135,8 +137,8 @@ def test_predictions_are_those_of_a_kalman_filter_written_out():
 def test_predictions_of_the_fitted_flight_are_the_fits():
     manoeuvre = in_gusts(np.random.default_rng(6))
     fit = filter_error(short_period_model(), [manoeuvre])
-    (answer,) = predict_filter(short_period_model(), [manoeuvre], fit.values, fit.extras)
-    np.testing.assert_allclose(answer.modelled, fit.answers[0].modelled, atol=1e-9)
+    (response,) = predict_filter_error(short_period_model(), [manoeuvre], fit.values, fit.extras)
+    np.testing.assert_allclose(response.modelled, fit.responses[0].modelled, atol=1e-9)
 
 
 def test_outputs_with_gaps_are_refused():

@@ -15,8 +15,8 @@ from reference_flights import (
     twin_otter,
 )
 
-from sysid_node.batch.likelihood.maximum_likelihood import Search
-from sysid_node.batch.methods.output_error import output_error, predict
+from sysid_node.batch.likelihood.maximum_likelihood import SearchOptions
+from sysid_node.batch.methods.output_error import output_error, predict_output_error
 from sysid_node.batch.models.model import Parameter
 from sysid_node.errors import InputError
 
@@ -115,9 +115,9 @@ def test_other_flights_are_answered_with_their_own_initial_state():
     other = dataclasses.replace(
         noisy(flown(model, initial=(0.03, 0.2)), np.random.default_rng(4)), initial_state=np.zeros(2)
     )
-    (answer,) = predict(model, [other], SHORT_PERIOD, initial_states=("alpha", "q"))
-    np.testing.assert_allclose(answer.residuals.std(axis=0), NOISE, rtol=0.15)
-    (held,) = predict(model, [other], SHORT_PERIOD)
+    (response,) = predict_output_error(model, [other], SHORT_PERIOD, initial_states=("alpha", "q"))
+    np.testing.assert_allclose(response.residuals.std(axis=0), NOISE, rtol=0.15)
+    (held,) = predict_output_error(model, [other], SHORT_PERIOD)
     assert held.residuals[:, 1].std() > 1.5 * NOISE[1]
 
 
@@ -233,7 +233,7 @@ def test_a_search_cut_short_says_so():
     fit = output_error(
         short_period_model(WRONG_START),
         [noisy(flown(short_period_model()), np.random.default_rng(10))],
-        search=Search(rounds=1, evaluations=2),
+        search=SearchOptions(rounds=1, evaluations=2),
     )
     assert not fit.converged
     assert "not converged after 1 rounds" in fit.message

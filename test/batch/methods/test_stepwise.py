@@ -7,7 +7,7 @@ import pytest
 from made_flight import KESTREL, clean, flight
 
 from sysid_node.aircraft.model import Derivative
-from sysid_node.batch.methods.stepwise import CRITERIA, select, supported
+from sysid_node.batch.methods.stepwise import CRITERIA, select_regressors, supported_model
 from sysid_node.errors import InputError
 
 NAMES = ("0", "a", "b", "c", "d")
@@ -22,18 +22,18 @@ def data(seed, samples=1000):
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_what_made_the_data_is_found(criterion):
     y, X = data(1)
-    chosen = select(NAMES, [y], [X], criterion=criterion).regressors
+    chosen = select_regressors(NAMES, [y], [X], criterion=criterion).regressors
     assert {"0", "a", "c"} <= set(chosen)
 
 
 def test_the_f_ratio_lets_few_others_in():
-    wrong = sum(len(select(NAMES, [y], [X]).regressors) - 3 for y, X in map(data, range(20)))
+    wrong = sum(len(select_regressors(NAMES, [y], [X]).regressors) - 3 for y, X in map(data, range(20)))
     assert wrong <= 3  # of 40 chances
 
 
 def test_steps_are_told_with_their_merits():
     y, X = data(2)
-    steps = select(NAMES, [y], [X]).steps
+    steps = select_regressors(NAMES, [y], [X]).steps
     assert [step.change for step in steps[:3]] == ["", "+a", "+c"] or [s.change for s in steps[:3]] == ["", "+c", "+a"]
     assert steps[2].r_squared > steps[1].r_squared > steps[0].r_squared
     assert steps[2].predicted_square_error < steps[1].predicted_square_error
@@ -45,14 +45,16 @@ def test_a_stand_in_leaves_once_the_real_thing_is_there():
     a, b = rng.normal(size=(2, 1000))
     both = a + b + 0.3 * rng.normal(size=1000)  # first choice, superfluous with a and b
     X = np.column_stack([np.ones(1000), a, b, both])
-    selection = select(("0", "a", "b", "both"), [a + b + 0.1 * rng.normal(size=1000)], [X])
+    selection = select_regressors(("0", "a", "b", "both"), [a + b + 0.1 * rng.normal(size=1000)], [X])
     assert selection.regressors == ("0", "a", "b")
     assert [step.change for step in selection.steps][-1] == "-both"
 
 
 def test_the_aircraft_keeps_the_derivatives_that_the_flights_support():
     extra = {**KESTREL.derivatives, "Cm_beta": Derivative(0.0)}  # symmetric: there is none
-    smaller, selections = supported(dataclasses.replace(KESTREL, derivatives=extra), [clean(), flight(1, turn=-1)])
+    smaller, selections = supported_model(
+        dataclasses.replace(KESTREL, derivatives=extra), [clean(), flight(1, turn=-1)]
+    )
     assert "Cm_beta" not in smaller.derivatives
     assert {"Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cn_dr"} <= set(smaller.derivatives)
     assert "beta" not in selections["Cm"].regressors
@@ -61,4 +63,4 @@ def test_the_aircraft_keeps_the_derivatives_that_the_flights_support():
 def test_an_unknown_criterion_is_refused():
     y, X = data(4)
     with pytest.raises(InputError, match="criterion 'aic': expected one of f_ratio"):
-        select(NAMES, [y], [X], criterion="aic")
+        select_regressors(NAMES, [y], [X], criterion="aic")

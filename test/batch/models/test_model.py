@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_models import SHORT_PERIOD, flown, short_period_model, with_outputs
 
-from sysid_node.batch.models.model import Manoeuvre, Parameter, check_manoeuvres
+from sysid_node.batch.models.model import ManoeuvreData, Parameter, check_manoeuvres
 from sysid_node.errors import InputError
 
 
@@ -44,7 +44,7 @@ def test_moving_start_values_keeps_compiled_code():
 def test_short_or_disordered_manoeuvres_are_refused():
     good = flown(short_period_model())
     with pytest.raises(InputError, match="needs at least 5"):
-        Manoeuvre(good.time[:3], good.inputs[:3], good.outputs[:3], good.initial_state)
+        ManoeuvreData(good.time[:3], good.inputs[:3], good.outputs[:3], good.initial_state)
     with pytest.raises(InputError, match="time must be finite and increase"):
         dataclasses.replace(good, time=good.time[::-1])
     with pytest.raises(InputError, match="outputs have 499 rows for 500 times; expected 500"):

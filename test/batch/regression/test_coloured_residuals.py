@@ -57,7 +57,7 @@ def regression(rng, shape, samples=600):
 )
 def test_intervals_hold_the_truth_whatever_the_colour(shape):
     rng = np.random.default_rng(7)
-    quantile = stats.t.ppf(0.975, coloured_residuals.degrees_of_freedom([600]))
+    quantile = stats.t.ppf(0.975, coloured_residuals.spectral_degrees_of_freedom([600]))
     inside = []
     for _ in range(200):
         values, covariance, _ = regression(rng, shape)

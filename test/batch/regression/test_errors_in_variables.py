@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sysid_node.batch.regression.errors_in_variables import Noise, Noisy, taken_out, white_variance
+from sysid_node.batch.regression.errors_in_variables import (
+    ErrorsInVariables,
+    SensorNoise,
+    corrected_normal_equations,
+    white_noise_variance,
+)
 from sysid_node.batch.regression.linear_regression import regress
 
 TIME = 0.01 * np.arange(3000)
@@ -28,23 +33,23 @@ def slow(rng, samples=3000):
 @pytest.mark.parametrize("cutoff", [2.0, 3.0])
 def test_white_noise_is_found_beside_motion(rng, cutoff):
     """The least of several levels: by a tenth too little, but never too much."""
-    found = [white_variance(TIME, slow(rng) + SIGMA * rng.normal(size=TIME.size), cutoff) for _ in range(40)]
+    found = [white_noise_variance(TIME, slow(rng) + SIGMA * rng.normal(size=TIME.size), cutoff) for _ in range(40)]
     assert 0.8 < np.mean(found) / SIGMA**2 < 1.02
 
 
 def test_motion_alone_is_hardly_taken_for_noise(rng):
-    found = [white_variance(TIME, slow(rng), 3.0) for _ in range(20)]
+    found = [white_noise_variance(TIME, slow(rng), 3.0) for _ in range(20)]
     assert np.mean(found) < 0.002  # of a variance of one
 
 
 def test_a_vibration_is_not_noise(rng):
     x = SIGMA * rng.normal(size=TIME.size) + np.sin(2 * np.pi * 9.0 * TIME)
-    assert white_variance(TIME, x, 3.0) == pytest.approx(SIGMA**2, rel=0.25)
+    assert white_noise_variance(TIME, x, 3.0) == pytest.approx(SIGMA**2, rel=0.25)
 
 
 def test_nothing_is_claimed_of_what_was_not_sampled(rng):
-    assert white_variance(0.1 * np.arange(600), rng.normal(size=600), 3.0) == 0.0
-    assert white_variance(TIME, rng.normal(size=TIME.size), 0.0) == 0.0
+    assert white_noise_variance(0.1 * np.arange(600), rng.normal(size=600), 3.0) == 0.0
+    assert white_noise_variance(TIME, rng.normal(size=TIME.size), 0.0) == 0.0
 
 
 def noisy_line(rng, variance):
@@ -52,7 +57,7 @@ def noisy_line(rng, variance):
     x = slow(rng)
     reading = x + SIGMA * rng.normal(size=x.size)
     X = reading[:, None]
-    return 2.0 * x, X, Noisy(X, 1.0, [Noise(variance, np.zeros(x.size), np.ones((x.size, 1)))])
+    return 2.0 * x, X, ErrorsInVariables(X, 1.0, [SensorNoise(variance, np.zeros(x.size), np.ones((x.size, 1)))])
 
 
 def test_attenuation_is_undone(rng):
@@ -68,7 +73,7 @@ def test_attenuation_is_undone(rng):
 def test_no_more_is_taken_out_than_leaves_half(rng):
     y, X, noisy = noisy_line(rng, 50.0)
     information, moment = X.T @ X, X.T @ y
-    left, _ = taken_out(information, moment, [noisy])
+    left, _ = corrected_normal_equations(information, moment, [noisy])
     assert left[0, 0] == pytest.approx(0.5 * information[0, 0])
 
 
@@ -77,10 +82,10 @@ def test_noise_that_multiplies_is_in_the_standard_error(rng):
     x = np.where(TIME < 3.0, np.sin(2 * np.pi * TIME), 0.01)
     found = []
     for _ in range(200):
-        answer = 2.0 * x * (1.0 + 0.05 * rng.normal(size=x.size))
-        noisy = Noisy(x[:, None], 1.0, [Noise(0.05**2, 2.0 * x, np.zeros((x.size, 1)))])
-        with_ = regress(["a"], [answer], [x[:, None]], noisy=[noisy]).estimates["a"]
-        without = regress(["a"], [answer], [x[:, None]]).estimates["a"]
+        response = 2.0 * x * (1.0 + 0.05 * rng.normal(size=x.size))
+        noisy = ErrorsInVariables(x[:, None], 1.0, [SensorNoise(0.05**2, 2.0 * x, np.zeros((x.size, 1)))])
+        with_ = regress(["a"], [response], [x[:, None]], noisy=[noisy]).estimates["a"]
+        without = regress(["a"], [response], [x[:, None]]).estimates["a"]
         found.append((with_.value, with_.standard_error, without.standard_error))
     values, errors, shorter = np.array(found).T
     assert errors.mean() == pytest.approx(values.std(), rel=0.15)

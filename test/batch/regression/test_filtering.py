@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.batch.regression.filtering import averaged, differentiate, lowpass
+from sysid_node.batch.regression.filtering import block_averaged, differentiate, lowpass
 from sysid_node.flight.record import FlightRecord
 
 TIME = np.arange(500) / 50.0
@@ -46,9 +46,9 @@ def test_a_cutoff_outside_the_band_changes_nothing(cutoff):
 
 def test_averages_use_every_sample_and_keep_their_instant():
     record = FlightRecord(TIME, {"V": 3.0 * TIME + 1.0, "alpha": np.where(TIME < 1.0, np.nan, 1.0)}, "flight")
-    found = averaged(record, 12.0)  # four samples of 50 Hz
+    found = block_averaged(record, 12.0)  # four samples of 50 Hz
     assert len(found) == 125
     np.testing.assert_allclose(found["V"], 3.0 * found.time + 1.0)
     assert np.isnan(found["alpha"][:12]).all()
-    assert averaged(record, 0.0) is record
-    assert averaged(record, 49.0) is record
+    assert block_averaged(record, 0.0) is record
+    assert block_averaged(record, 49.0) is record

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from sysid_node.batch.results.result import Answer
-from sysid_node.batch.results.validation import figures
+from sysid_node.batch.results.batch_fit import ModelResponse
+from sysid_node.batch.results.validation import figures_of_merit
 
 TIME = np.arange(2000) / 50.0
 SIGNAL = 80.0 + np.sin(2 * np.pi * 0.5 * TIME)
 
 
 def of(modelled, measured=SIGNAL, **inputs):
-    answer = Answer("flight", TIME, ("V",), measured[:, None], np.broadcast_to(modelled, TIME.shape)[:, None])
-    return figures(answer, inputs)["V"]
+    response = ModelResponse("flight", TIME, ("V",), measured[:, None], np.broadcast_to(modelled, TIME.shape)[:, None])
+    return figures_of_merit(response, inputs)["V"]
 
 
 def test_an_exact_answer():

@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid_node.excite.manoeuvre import THROTTLE, control_limits
 from sysid_node.excite.multisine import relative_peak_factor
-from sysid_node.excite.optimise import Optimum, shares_left
+from sysid_node.excite.optimise import Optimum, posterior_to_prior_ratios
 from sysid_node.excite.prediction import tolerances_of
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
@@ -25,7 +25,7 @@ WELL, HARDLY = 0.1, 0.9
 
 def opening(result: ManoeuvreResult) -> Mapping[str, Any]:
     """Sentences and facts."""
-    left = shares_left(result.prediction.information, tolerances_of(result.aircraft))
+    left = posterior_to_prior_ratios(result.prediction.information, tolerances_of(result.aircraft))
     plan, flight = result.prediction.manoeuvre, result.prediction.flight
     optimum = result.optimum
     return {

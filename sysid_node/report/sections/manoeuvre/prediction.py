@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from sysid_node.excite.optimise import shares_left
+from sysid_node.excite.optimise import posterior_to_prior_ratios
 from sysid_node.excite.prediction import tolerances_of
 from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
 from sysid_node.report.sections.groups import grouped
@@ -36,7 +36,7 @@ class Row:
 def context(result: ManoeuvreResult) -> Mapping[str, Any]:
     """Groups of rows."""
     information = result.prediction.information
-    left = shares_left(information, tolerances_of(result.aircraft))
+    left = posterior_to_prior_ratios(information, tolerances_of(result.aircraft))
     errors = information.standard_errors
     before = result.optimum.start.information.standard_errors if result.optimum else np.full(errors.size, np.nan)
     rows = {

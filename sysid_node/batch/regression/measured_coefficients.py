@@ -26,7 +26,7 @@ _SLOWEST = 0.2
 
 
 @dataclass(frozen=True)
-class Equations:
+class MeasuredCoefficients:
     """Both sides of the six equations at each time of a flight.
 
     ``coefficients`` CL CD CY Cl Cm Cn as far as they can be formed, besides CX and CZ (body axes); ``regressors`` by
@@ -43,7 +43,7 @@ class Equations:
     noise: Mapping[str, float] = field(default_factory=dict)
 
 
-def equations(aircraft: Aircraft, record: FlightRecord) -> Equations:
+def measured_coefficients(aircraft: Aircraft, record: FlightRecord) -> MeasuredCoefficients:
     """The equations of a flight. Raises InputError where a signal that the aircraft's model needs was never measured.
 
     Where the aircraft has an engine and its thrust was not measured, drag cannot be told from thrust: CD is left out.
@@ -59,7 +59,9 @@ def equations(aircraft: Aircraft, record: FlightRecord) -> Equations:
             f"{_SLOWEST * aircraft.reference.airspeed:.3g} m/s, and were left out"
         )
     noise = _noise(aircraft, float(s["V"].mean()))
-    return Equations(record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks), noise)
+    return MeasuredCoefficients(
+        record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks), noise
+    )
 
 
 def _noise(aircraft: Aircraft, airspeed: float) -> dict[str, float]:
@@ -72,7 +74,7 @@ def _noise(aircraft: Aircraft, airspeed: float) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Slope:
+class ReadingSensitivity:
     """How one sensor's reading enters both sides of the equations, at each time: derivatives (N,) by name."""
 
     coefficients: Mapping[str, Array]
@@ -83,7 +85,7 @@ class Slope:
 _STEPS = {"V": 1e-4, "alpha": 1e-5, "beta": 1e-5}
 
 
-def sensor_slopes(aircraft: Aircraft, record: FlightRecord) -> dict[str, tuple[Array, Slope]]:
+def sensitivity_to_readings(aircraft: Aircraft, record: FlightRecord) -> dict[str, tuple[Array, ReadingSensitivity]]:
     """The air data's readings (N,), and how the equations depend on each, at the times of ``equations``."""
     s = _accelerated(_complete_samples(aircraft, record)[0])
 
@@ -97,7 +99,7 @@ def sensor_slopes(aircraft: Aircraft, record: FlightRecord) -> dict[str, tuple[A
         if name in s:
             above, below = sides(name, step), sides(name, -step)
             slopes = [{n: (a[n] - b[n]) / (2.0 * step) for n in a} for a, b in zip(above, below, strict=True)]
-            found[name] = s[name], Slope(*slopes)
+            found[name] = s[name], ReadingSensitivity(*slopes)
     return found
 
 
@@ -229,7 +231,7 @@ def _regressors(aircraft: Aircraft, s: Mapping[str, Array], lift: Array) -> dict
     return regressors | {symbol: s[symbol] for symbol in aircraft.control_symbols if symbol in s}
 
 
-def usable(aircraft: Aircraft, flights: list[Equations]) -> dict[str, tuple[str, ...]]:
+def formable_regressors(aircraft: Aircraft, flights: list[MeasuredCoefficients]) -> dict[str, tuple[str, ...]]:
     """The aircraft's model as far as every flight can form it: regressors by coefficient."""
     return {
         name: aircraft.structure[name]

@@ -15,9 +15,9 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.methods.filter_error import filter_error
 from sysid_node.batch.models.kinematics import STATES, sensor_errors
-from sysid_node.batch.models.manoeuvres import manoeuvre, segments, with_forces_at_cg
-from sysid_node.batch.regression.filtering import averaged
-from sysid_node.batch.results.result import Fit
+from sysid_node.batch.models.manoeuvres import cut_into_segments, manoeuvre_data, with_forces_at_cg
+from sysid_node.batch.regression.filtering import block_averaged
+from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
@@ -30,7 +30,7 @@ _IMU = ("ax", "ay", "az", "p", "q", "r")
 class Compatibility:
     """The sensor errors found, and the flights with them taken out."""
 
-    fit: Fit
+    fit: BatchFit
     corrected: list[FlightRecord]
     remarks: tuple[str, ...]
 
@@ -45,7 +45,7 @@ def check_sensors(aircraft: Aircraft, records: Sequence[FlightRecord], segment: 
         raise InputError("kinematic consistency needs the airspeed, and not every flight measured it")
     model = sensor_errors(outputs, aircraft.sensors.air_data)
     pieces = [piece for record in records for piece in _pieces(aircraft, record, segment)]
-    manoeuvres = [manoeuvre(model, piece) for piece in pieces]
+    manoeuvres = [manoeuvre_data(model, piece) for piece in pieces]
     fit = filter_error(model, manoeuvres, initial_states=STATES)
     return Compatibility(fit, [corrected(record, fit.values) for record in records], _remarks(fit))
 
@@ -67,10 +67,10 @@ def _pieces(aircraft: Aircraft, record: FlightRecord, segment: float) -> list[Fl
     if record.measured("psi"):
         unwrapped["psi"] = np.unwrap(unwrapped["psi"])
     whole = FlightRecord(record.time, unwrapped, record.name, record.start_ns, record.rejected)
-    return segments(averaged(with_forces_at_cg(aircraft, whole), _RATE), segment)
+    return cut_into_segments(block_averaged(with_forces_at_cg(aircraft, whole), _RATE), segment)
 
 
-def _remarks(fit: Fit) -> tuple[str, ...]:
+def _remarks(fit: BatchFit) -> tuple[str, ...]:
     """The errors that matter, in words."""
     found = [e for e in fit.estimates.values() if abs(e.value) > 2.0 * e.standard_error]
     if not found:

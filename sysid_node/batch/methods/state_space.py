@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import DEFAULT_LOWPASS, equation_error
-from sysid_node.batch.methods.filter_error import filter_error, predict_filter
-from sysid_node.batch.methods.output_error import output_error, predict
-from sysid_node.batch.models.manoeuvres import manoeuvre, segments, with_forces_at_cg
-from sysid_node.batch.models.model import Manoeuvre, Model
+from sysid_node.batch.methods.equation_error import DEFAULT_LOW_PASS, equation_error
+from sysid_node.batch.methods.filter_error import filter_error, predict_filter_error
+from sysid_node.batch.methods.output_error import output_error, predict_output_error
+from sysid_node.batch.models.manoeuvres import cut_into_segments, manoeuvre_data, with_forces_at_cg
+from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
 from sysid_node.batch.models.rigid_body import AT_CG, OUTPUTS, STATES, rigid_body
-from sysid_node.batch.regression.effective_length import freedom
-from sysid_node.batch.regression.filtering import averaged, samples_together
-from sysid_node.batch.results.result import Answer, Fit
-from sysid_node.batch.settings import Settings
+from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
+from sysid_node.batch.regression.filtering import averaging_factor, block_averaged
+from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
@@ -30,23 +30,25 @@ _MODELLED_BY = {"ax": "CD", "ay": "CY", "az": "CL"}
 
 
 @dataclass(frozen=True)
-class Integrated:
+class StateSpaceEstimation:
     """One estimation by a method that integrates the equations of motion."""
 
     method: str
     aircraft: Aircraft
-    settings: Settings
-    model: Model
-    pieces: tuple[Manoeuvre, ...]
+    settings: BatchSettings
+    model: StateSpaceModel
+    pieces: tuple[ManoeuvreData, ...]
     remarks: tuple[str, ...]
 
     @classmethod
-    def of(cls, method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings) -> Integrated:
+    def of(
+        cls, method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
+    ) -> StateSpaceEstimation:
         """Raises InputError where the model needs what was not measured."""
-        model, remarks = choose_model(aircraft, records, settings, gusts=method == "filter_error")
+        model, remarks = model_for_flights(aircraft, records, settings, gusts=method == "filter_error")
         return cls(method, aircraft, settings, model, (), remarks).on(records)
 
-    def on(self, records: Sequence[FlightRecord]) -> Integrated:
+    def on(self, records: Sequence[FlightRecord]) -> StateSpaceEstimation:
         """The same model, and so the same compiled program, set up for other flights.
 
         Raises InputError where these are too short.
@@ -57,27 +59,27 @@ class Integrated:
         flat = tuple(piece for several in pieces for piece in several)
         return replace(self, model=started, pieces=flat, remarks=(*self.remarks, *remark))
 
-    def fit(self) -> Fit:
+    def fit(self) -> BatchFit:
         """The estimation."""
         states, biases = self.model.states, self.settings.biases
         if self.method == "filter_error":
             fit = filter_error(self.model, self.pieces, initial_states=states, biases=biases, correlated=True)
         else:
             fit = output_error(self.model, self.pieces, initial_states=states, biases=biases)
-        return replace(fit, answers=_joined(fit.answers), remarks=(*self.remarks, *fit.remarks))
+        return replace(fit, responses=_joined(fit.responses), remarks=(*self.remarks, *fit.remarks))
 
-    def answers(self, fit: Fit, record: FlightRecord) -> list[Answer]:
+    def responses(self, fit: BatchFit, record: FlightRecord) -> list[ModelResponse]:
         """The fit's answer to another flight: open loop with its own initial states, or one sample ahead."""
         pieces = _pieces(self.method, self.model, self.aircraft, record, self.settings)
         own = {"initial_states": self.model.states, "biases": self.settings.biases}
         if self.method == "filter_error":
-            return _joined(predict_filter(self.model, pieces, fit.values, fit.extras, **own))
-        return _joined(predict(self.model, pieces, fit.values, **own))
+            return _joined(predict_filter_error(self.model, pieces, fit.values, fit.extras, **own))
+        return _joined(predict_output_error(self.model, pieces, fit.values, **own))
 
 
-def choose_model(
-    aircraft: Aircraft, records: Sequence[FlightRecord], settings: Settings, gusts: bool = False
-) -> tuple[Model, tuple[str, ...]]:
+def model_for_flights(
+    aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings, gusts: bool = False
+) -> tuple[StateSpaceModel, tuple[str, ...]]:
     """The rigid-body model that the aircraft file and the measurements allow, and what had to be left out.
 
     ``gusts``: with states for turbulence.
@@ -111,7 +113,7 @@ def choose_model(
     return model, tuple(remarks)
 
 
-def _require_length(model: Model, aircraft: Aircraft, records: Sequence[FlightRecord]) -> None:
+def _require_length(model: StateSpaceModel, aircraft: Aircraft, records: Sequence[FlightRecord]) -> None:
     """Raises InputError where the flights are too short for one of the model's coefficients.
 
     Outputs and states tell of the same few motions: they do not make up for a flight that ends before it has begun.
@@ -119,7 +121,7 @@ def _require_length(model: Model, aircraft: Aircraft, records: Sequence[FlightRe
     for coefficient, regressors in aircraft.structure.items():
         names = [name for name in (f"{coefficient}_{r}" for r in regressors) if name in model.names]
         if names:
-            freedom(names, [record.time for record in records], DEFAULT_LOWPASS)
+            effective_degrees_of_freedom(names, [record.time for record in records], DEFAULT_LOW_PASS)
 
 
 def _possible_states(aircraft: Aircraft, thrust: bool) -> tuple[str, ...]:
@@ -130,7 +132,9 @@ def _possible_states(aircraft: Aircraft, thrust: bool) -> tuple[str, ...]:
     return tuple(state for state in STATES if state in possible)
 
 
-def _started(model: Model, aircraft: Aircraft, records: Sequence[FlightRecord]) -> tuple[Model, tuple[str, ...]]:
+def _started(
+    model: StateSpaceModel, aircraft: Aircraft, records: Sequence[FlightRecord]
+) -> tuple[StateSpaceModel, tuple[str, ...]]:
     """The model with start values from equation error where that is possible, else the aircraft file's."""
     try:
         found = equation_error(aircraft, records).estimates
@@ -139,7 +143,9 @@ def _started(model: Model, aircraft: Aircraft, records: Sequence[FlightRecord]) 
     return model.started_at({name: e.value for name, e in found.items() if e.valid and name in model.names}), ()
 
 
-def _pieces(method: str, model: Model, aircraft: Aircraft, record: FlightRecord, settings: Settings) -> list[Manoeuvre]:
+def _pieces(
+    method: str, model: StateSpaceModel, aircraft: Aircraft, record: FlightRecord, settings: BatchSettings
+) -> list[ManoeuvreData]:
     """The flight in pieces. Output error integrates at the full rate and averages the outputs, measured and modelled;
     a filter, which must correct the state at every output, gets averaged inputs as well.
     """
@@ -149,23 +155,26 @@ def _pieces(method: str, model: Model, aircraft: Aircraft, record: FlightRecord,
         density = np.full(len(record), aircraft.reference.air_density)
         record = replace(record, columns={**record.columns, "rho": density})
     if method == "filter_error":
-        return [manoeuvre(model, piece) for piece in segments(averaged(record, settings.rate), settings.segment)]
-    every = samples_together(record, settings.rate)
-    return [manoeuvre(model, piece, every=every) for piece in segments(record, settings.segment)]
+        return [
+            manoeuvre_data(model, piece)
+            for piece in cut_into_segments(block_averaged(record, settings.rate), settings.segment)
+        ]
+    every = averaging_factor(record, settings.rate)
+    return [manoeuvre_data(model, piece, every=every) for piece in cut_into_segments(record, settings.segment)]
 
 
-def _joined(answers: Sequence[Answer]) -> list[Answer]:
+def _joined(responses: Sequence[ModelResponse]) -> list[ModelResponse]:
     """The answers to the pieces of each flight as one."""
-    flights: dict[str, list[Answer]] = {}
-    for answer in answers:
-        flights.setdefault(answer.name.partition(" [")[0], []).append(answer)
+    flights: dict[str, list[ModelResponse]] = {}
+    for response in responses:
+        flights.setdefault(response.name.partition(" [")[0], []).append(response)
     return [_concatenated(name, parts) for name, parts in flights.items()]
 
 
-def _concatenated(name: str, parts: Sequence[Answer]) -> Answer:
+def _concatenated(name: str, parts: Sequence[ModelResponse]) -> ModelResponse:
     step = float(np.median(np.diff(parts[0].time)))
     starts = np.cumsum([0.0, *(part.time[-1] + step for part in parts[:-1])])
-    return Answer(
+    return ModelResponse(
         name,
         np.concatenate([start + part.time for start, part in zip(starts, parts, strict=True)]),
         parts[0].names,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, clean, flight
 
-from sysid_node.batch.compatibility import check_sensors, corrected
+from sysid_node.batch.data_compatibility import check_sensors, corrected
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 

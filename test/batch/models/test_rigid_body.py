@@ -7,7 +7,7 @@ import pytest
 from made_flight import KESTREL, MODEL, clean, trim
 
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.manoeuvres import manoeuvre, with_forces_at_cg
+from sysid_node.batch.models.manoeuvres import manoeuvre_data, with_forces_at_cg
 from sysid_node.batch.models.rigid_body import STATES, rigid_body
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
@@ -27,7 +27,7 @@ def test_it_flies_as_the_simulator_does():
     density = np.asarray(air_density(-np.asarray(flown.states[:, 2])))
     inputs = dataclasses.replace(record, columns={**record.columns, **outputs, "rho": density})
     start_here = {"V": airspeed, "alpha": alpha, "theta": alpha, **dict.fromkeys(("beta", "p", "q", "r", "phi"), 0.0)}
-    mine = rollout.outputs(MODEL, manoeuvre(MODEL, inputs, start_here), MODEL.start)
+    mine = rollout.outputs(MODEL, manoeuvre_data(MODEL, inputs, start_here), MODEL.start)
     for name, values in zip(MODEL.outputs, mine.T, strict=True):
         assert np.abs(values - outputs[name]).max() < 1e-4 * np.ptp(outputs[name]), name
 
@@ -39,10 +39,10 @@ def test_states_taken_as_measured_change_nothing_where_the_measurement_is_exact(
     # air data at the CG, where a state that is not integrated must be given
     at_cg = dataclasses.replace(KESTREL, sensors=dataclasses.replace(KESTREL.sensors, air_data=(0.0, 0.0, 0.0)))
     exact = rollout.outputs(
-        rigid_body(at_cg, tuple(STATES), tuple(STATES)), manoeuvre(MODEL, clean(), _start()), MODEL.start
+        rigid_body(at_cg, tuple(STATES), tuple(STATES)), manoeuvre_data(MODEL, clean(), _start()), MODEL.start
     )
     columns = {**record.columns, **dict(zip(STATES, exact.T, strict=True))}
-    piece = manoeuvre(model, FlightRecord(record.time, columns, "exact"), _start())
+    piece = manoeuvre_data(model, FlightRecord(record.time, columns, "exact"), _start())
     found = rollout.outputs(rigid_body(at_cg, states, states), piece, model.start)
     for column, name in enumerate(states):
         # measured inputs are linear between samples, and the forces at the CG hold differentiated rates

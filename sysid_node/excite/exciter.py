@@ -34,7 +34,7 @@ EVENTS = 1000  # the last so many are kept
 
 
 @dataclass(frozen=True)
-class Settings:
+class ExcitationSettings:
     """What is flown, what for, and within which limits. Raises InputError on impossible values."""
 
     manoeuvre: tuple[str, ...] = ("multisine:elevator,aileron,rudder:amplitude=0.02:length=15:low=0.15:high=1.9",)
@@ -71,7 +71,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 }
 
 
-class Flight(NamedTuple):
+class FlightCondition(NamedTuple):
     """What the limits are about; NaN = not measured."""
 
     roll: float  # rad
@@ -80,7 +80,7 @@ class Flight(NamedTuple):
     load_factor: float
 
 
-class Event(NamedTuple):
+class ExcitationEvent(NamedTuple):
     """Something that was done at a time (s)."""
 
     time: float
@@ -88,13 +88,13 @@ class Event(NamedTuple):
 
 
 @dataclass
-class State:
+class ExciterState:
     """An exciter's memory."""
 
     aircraft: Aircraft
-    settings: Settings
+    settings: ExcitationSettings
     table: Array  # (N, controls) rad at RATE
-    events: list[Event] = field(default_factory=list)
+    events: list[ExcitationEvent] = field(default_factory=list)
     begun: float = math.nan  # s; NaN = not exciting
     missing: tuple[str, ...] = ()  # derivatives not known well enough
     unknown_since: float = math.nan
@@ -107,7 +107,7 @@ class State:
         return not math.isnan(self.begun)
 
 
-def init(aircraft: Aircraft, settings: Settings) -> State:
+def init(aircraft: Aircraft, settings: ExcitationSettings) -> ExciterState:
     """Nothing moves. Raises InputError on a manoeuvre or a derivative that the aircraft does not have."""
     unknown = [name for name in settings.derivatives if name not in aircraft.derivatives]
     if unknown:
@@ -121,10 +121,10 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
             f"manoeuvre {drawn.spec!r}: moves {np.abs(table).max():.3g} rad, more than the largest amplitude "
             f"{settings.largest_amplitude:g}; lower it"
         )
-    return State(aircraft, settings, table, missing=settings.derivatives)
+    return ExciterState(aircraft, settings, table, missing=settings.derivatives)
 
 
-def start(state: State, time: float) -> None:
+def start(state: ExciterState, time: float) -> None:
     """Begin at a time (s). Raises InputError where it is under way already."""
     if state.active:
         raise InputError("excitation is under way; stop it first")
@@ -132,14 +132,14 @@ def start(state: State, time: float) -> None:
     _log(state, time, "begun")
 
 
-def stop(state: State, time: float, why: str) -> None:
+def stop(state: ExciterState, time: float, why: str) -> None:
     """End at a time (s), and do not begin again by itself."""
     if state.active:
         _end(state, time, why)
     state.armed = False
 
 
-def hear(state: State, time: float, precision: Mapping[str, float]) -> bool:
+def receive_estimates(state: ExciterState, time: float, precision: Mapping[str, float]) -> bool:
     """Estimates at a time (s): half of each interval over its derivative's size, infinite where it is not valid.
 
     Returns whether they should be begun anew, once each time that excitation begins again by itself: what is no longer
@@ -164,7 +164,7 @@ def hear(state: State, time: float, precision: Mapping[str, float]) -> bool:
     return False
 
 
-def step(state: State, time: float, flight: Flight) -> Array:
+def step(state: ExciterState, time: float, flight: FlightCondition) -> Array:
     """Deflections (controls,) rad on top of the commands at a time (s)."""
     if state.active:
         danger = _danger(state, flight)
@@ -178,7 +178,7 @@ def step(state: State, time: float, flight: Flight) -> Array:
     return row
 
 
-def _danger(state: State, flight: Flight) -> str:
+def _danger(state: ExciterState, flight: FlightCondition) -> str:
     """The limit that is passed or the sensor that is silent, if any."""
     s, reference = state.settings, state.aircraft.reference.airspeed
     limits = {
@@ -196,12 +196,12 @@ def _danger(state: State, flight: Flight) -> str:
     return ""
 
 
-def _end(state: State, time: float, why: str) -> None:
+def _end(state: ExciterState, time: float, why: str) -> None:
     _log(state, time, f"{why} after {time - state.begun:.1f} s")
     state.begun = state.unknown_since = math.nan
     state.spoilt = False
 
 
-def _log(state: State, time: float, text: str) -> None:
-    state.events.append(Event(time, text))
+def _log(state: ExciterState, time: float, text: str) -> None:
+    state.events.append(ExcitationEvent(time, text))
     del state.events[:-EVENTS]

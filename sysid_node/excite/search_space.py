@@ -24,7 +24,7 @@ _LEAD = 1.0
 
 
 @dataclass(frozen=True)
-class Space:
+class SearchSpace:
     """Amplitudes, beginnings and, of steps, widths of ``segments``, flown by ``predictor`` within ``duration`` (s)."""
 
     predictor: Predictor

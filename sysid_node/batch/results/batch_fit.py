@@ -12,7 +12,7 @@ from sysid_node.flight.record import Array
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ParameterEstimate:
     """One parameter: value, standard error for coloured residuals, 95 % interval, and whether to trust it.
 
     ``white_error`` is the Cramer-Rao bound, which holds for white residuals only. ``status`` is "ok", or says in
@@ -30,7 +30,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Quality:
+class GoodnessOfFit:
     """How well one output or coefficient is answered: R^2, the residual's root mean square in its unit, samples."""
 
     r_squared: float
@@ -39,7 +39,7 @@ class Quality:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ModelResponse:
     """Measured and modelled outputs (N, ny) of one manoeuvre, on its ``time`` (N,) s; NaN = not measured."""
 
     name: str
@@ -60,7 +60,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Fit:
+class BatchFit:
     """The outcome of one estimation.
 
     ``covariance`` (P, P) of the parameters in the order of ``estimates``, for coloured residuals. ``noise`` is the
@@ -71,11 +71,11 @@ class Fit:
     """
 
     method: str
-    estimates: Mapping[str, Estimate]
+    estimates: Mapping[str, ParameterEstimate]
     covariance: Array
     noise: Mapping[str, float]
     log_det: float
-    answers: Sequence[Answer]
+    responses: Sequence[ModelResponse]
     converged: bool
     iterations: int
     message: str
@@ -91,10 +91,10 @@ class Fit:
     @property
     def correlation(self) -> Array:
         """Correlation coefficients (P, P) of the estimates."""
-        return correlation(self.covariance)
+        return correlation_matrix(self.covariance)
 
 
-def correlation(covariance: Array) -> Array:
+def correlation_matrix(covariance: Array) -> Array:
     """Correlation matrix of a covariance; zero where a variance is zero."""
     deviation = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -104,25 +104,25 @@ def correlation(covariance: Array) -> Array:
     return result
 
 
-def interval(value: float, standard_error: float, freedom: float) -> tuple[float, float]:
+def confidence_interval(value: float, standard_error: float, freedom: float) -> tuple[float, float]:
     """95 % interval with Student's t for the degrees of freedom of the residuals' spectrum."""
     half = float(stats.t.ppf(0.975, freedom)) * standard_error
     return value - half, value + half
 
 
-def quality(answers: Sequence[Answer]) -> dict[str, Quality]:
+def goodness_of_fit(responses: Sequence[ModelResponse]) -> dict[str, GoodnessOfFit]:
     """R^2 and residual by output, over all answers together."""
-    names = dict.fromkeys(name for answer in answers for name in answer.names)
-    return {name: _quality([a.column(name) for a in answers if name in a.names]) for name in names}
+    names = dict.fromkeys(name for response in responses for name in response.names)
+    return {name: _goodness_of_fit([a.column(name) for a in responses if name in a.names]) for name in names}
 
 
-def _quality(pairs: Sequence[tuple[Array, Array]]) -> Quality:
+def _goodness_of_fit(pairs: Sequence[tuple[Array, Array]]) -> GoodnessOfFit:
     measured, modelled = (np.concatenate(part) for part in zip(*pairs, strict=True))
     kept = np.isfinite(measured - modelled)
     samples = int(kept.sum())
     if not samples:
-        return Quality(float("nan"), float("nan"), 0)
+        return GoodnessOfFit(float("nan"), float("nan"), 0)
     squares = float(np.sum((measured - modelled)[kept] ** 2))
     spread = float(np.sum((measured[kept] - measured[kept].mean()) ** 2))
     explained = 1.0 - squares / spread if spread > 0.0 else float("nan")
-    return Quality(explained, float(np.sqrt(squares / samples)), samples)
+    return GoodnessOfFit(explained, float(np.sqrt(squares / samples)), samples)

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.batch.likelihood.rollout import output, rk4_step
-from sysid_node.batch.models.model import Dynamics
+from sysid_node.batch.models.model import ModelEquations
 
 #: Doubling steps of the Riccati equation: time constants up to 2^16 samples have settled.
 _DOUBLINGS = 16
@@ -45,7 +45,7 @@ def gain(covariance: jax.Array, observation: jax.Array, r: jax.Array) -> jax.Arr
 
 
 def predictions(
-    dynamics: Dynamics,
+    dynamics: ModelEquations,
     time: jax.Array,
     inputs: jax.Array,
     outputs: jax.Array,
@@ -74,7 +74,7 @@ def predictions(
 
 @partial(jax.jit, static_argnums=0)
 def innovation_variance(
-    dynamics: Dynamics, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
+    dynamics: ModelEquations, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> jax.Array:
     """Variance (ny,) of each output's innovation that the filter expects at one flight condition."""
     covariance, observation = _linearised(dynamics, dt, u, x, theta, q, r)
@@ -82,7 +82,7 @@ def innovation_variance(
 
 
 def _linearised(
-    dynamics: Dynamics, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
+    dynamics: ModelEquations, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
     """Steady covariance of the predicted state, and the observation matrix, about one flight condition.
 

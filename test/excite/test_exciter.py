@@ -1,0 +1,132 @@
+"""Excitation in flight: when it begins, when it stops, and what stops it at once."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.excite import exciter
+from sysid_node.excite.exciter import ExcitationSettings, FlightCondition
+
+AIRCRAFT = load_aircraft("cdrw")
+LEVEL = FlightCondition(0.0, 0.08, 18.0, 1.0)
+KNOWN = dict.fromkeys(ExcitationSettings().derivatives, 0.01)
+UNKNOWN = dict.fromkeys(ExcitationSettings().derivatives, math.inf)
+
+
+@pytest.fixture
+def state() -> exciter.ExciterState:
+    return exciter.init(AIRCRAFT, ExcitationSettings())
+
+
+def last(state: exciter.ExciterState) -> str:
+    return state.events[-1].text
+
+
+def test_nothing_moves_until_asked(state: exciter.ExciterState) -> None:
+    exciter.receive_estimates(state, 1.0, UNKNOWN)
+    assert not exciter.step(state, 1.0, LEVEL).any()
+    assert not state.events
+
+
+def test_it_flies_the_manoeuvre_and_stops_when_enough_is_known(state: exciter.ExciterState) -> None:
+    exciter.start(state, 10.0)
+    flown = np.array([exciter.step(state, 10.0 + t, LEVEL) for t in np.arange(0.0, 5.0, 0.01)])
+    assert (np.abs(flown).max(axis=0) > 0.01).all()
+    assert np.abs(flown).max() <= 0.02 + 1e-9
+    exciter.receive_estimates(state, 15.0, {**KNOWN, "Cm_de": 0.06})
+    assert state.active
+    assert state.missing == ("Cm_de",)
+    exciter.receive_estimates(state, 16.0, KNOWN)
+    assert not state.active
+    assert last(state) == "known after 6.0 s"
+    assert not exciter.step(state, 16.01, LEVEL).any()
+
+
+@pytest.mark.parametrize(
+    ("flight", "words"),
+    [
+        (LEVEL._replace(roll=1.0), "roll 1"),
+        (LEVEL._replace(pitch=-0.6), "pitch -0.6"),
+        (LEVEL._replace(airspeed=9.0), "airspeed 9"),
+        (LEVEL._replace(load_factor=4.0), "load factor 4"),
+        (LEVEL._replace(roll=math.nan), "roll not measured"),
+        (LEVEL._replace(airspeed=math.nan), "airspeed not measured"),
+    ],
+)
+def test_a_limit_or_a_silent_sensor_ends_it_at_once_for_good(flight: FlightCondition, words: str) -> None:
+    state = exciter.init(AIRCRAFT, ExcitationSettings(watch=True))
+    exciter.start(state, 0.0)
+    assert exciter.step(state, 1.0, LEVEL).any()
+    assert not exciter.step(state, 1.005, flight).any()
+    assert last(state).startswith(f"aborted: {words}")
+    for t in (2.0, 3.0, 4.0):
+        exciter.receive_estimates(state, t, UNKNOWN)
+    assert not state.active
+
+
+def test_it_gives_up(state: exciter.ExciterState) -> None:
+    exciter.start(state, 0.0)
+    exciter.receive_estimates(state, 59.0, {**KNOWN, "Cl_p": 0.5})
+    exciter.step(state, 60.5, LEVEL)
+    assert not state.active
+    assert "Cl_p not known" in last(state)
+
+
+def test_it_begins_again_when_told_to_watch_and_has_the_estimates_begun_anew() -> None:
+    state = exciter.init(AIRCRAFT, ExcitationSettings(watch=True))
+    exciter.start(state, 0.0)
+    assert not exciter.receive_estimates(state, 5.0, KNOWN)
+    lost = {**KNOWN, "Cm_de": math.inf}
+    exciter.receive_estimates(state, 20.0, lost)
+    assert not state.active  # a moment's doubt is none
+    exciter.receive_estimates(state, 20.0 + exciter.AGAIN, lost)
+    assert state.active
+    assert "Cm_de no longer known" in last(state)
+    begun = state.begun
+    exciter.receive_estimates(state, begun + 0.5, KNOWN)
+    assert state.active  # what is known now is of before
+    assert exciter.receive_estimates(state, begun + exciter.CALM, lost)
+    assert not exciter.receive_estimates(state, begun + exciter.CALM + 0.1, lost)
+    exciter.receive_estimates(state, begun + 5.0, KNOWN)
+    assert not state.active
+
+
+def test_without_watching_it_stays_quiet(state: exciter.ExciterState) -> None:
+    exciter.start(state, 0.0)
+    exciter.receive_estimates(state, 5.0, KNOWN)
+    for t in (6.0, 7.0, 8.0):
+        exciter.receive_estimates(state, t, UNKNOWN)
+    assert not state.active
+
+
+def test_requests_that_make_no_sense(state: exciter.ExciterState) -> None:
+    exciter.start(state, 0.0)
+    with pytest.raises(InputError, match="under way"):
+        exciter.start(state, 1.0)
+    exciter.stop(state, 2.0, "stopped on request")
+    assert last(state) == "stopped on request after 2.0 s"
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"manoeuvre": ("doublet:elevator:amplitude=0.2",)}, "largest amplitude"),
+        ({"manoeuvre": ("doublet:canard:amplitude=0.02",)}, "canard"),
+        ({"derivatives": ("Cm_dx",)}, "Cm_dx"),
+        ({"accuracy": 0.0}, "accuracy"),
+    ],
+)
+def test_impossible_plans_are_refused(settings: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        exciter.init(AIRCRAFT, ExcitationSettings(**settings))
+
+
+@pytest.mark.parametrize("kind", ["3211:elevator:amplitude=0.03", "doublet:aileron:amplitude=0.03"])
+def test_other_manoeuvres(kind: str) -> None:
+    state = exciter.init(AIRCRAFT, ExcitationSettings(manoeuvre=(kind,)))
+    exciter.start(state, 0.0)
+    flown = np.array([exciter.step(state, t, LEVEL) for t in np.arange(0.0, 5.0, 0.01)])
+    assert np.abs(flown).max() == pytest.approx(0.03)
