@@ -1,10 +1,12 @@
 """What all tests share."""
 
+import gc
 import os
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,3 +62,23 @@ def browse(tmp_path) -> Callable[[Path], Page]:
         )
 
     return page
+
+
+#: Memory of a test worker from which compiled programs are let go, MB: each stays loaded until then.
+_LARGE = 1000.0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def bounded_memory() -> Iterator[None]:
+    """Frees JAX's compiled programs after a module of tests whose worker has grown large; the disk keeps them."""
+    yield
+    jax = sys.modules.get("jax")
+    if jax is not None and _resident_megabytes() > _LARGE:
+        jax.clear_caches()
+        gc.collect()
+
+
+def _resident_megabytes() -> float:
+    """Memory of this process now, MB; zero where the system does not tell (``/proc`` is Linux's)."""
+    statm = Path("/proc/self/statm")
+    return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6 if statm.exists() else 0.0
