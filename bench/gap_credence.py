@@ -21,7 +21,8 @@ from scipy.optimize import minimize
 from withheld import ledger
 from withheld.scoreboard import calibration
 
-from sysid_node.gap.selection.calibration import PLIABLE, WEIGHTS, Grounds
+from sysid_node.gap.selection.calibration import Grounds
+from sysid_node.gap.thresholds import THRESHOLDS
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def causes(text: str) -> Iterator[tuple[str, Grounds, bool]]:
     first, last = (int(part) for part in seeds.split("-")) if seeds else (0, 10**9)
     for seed, (effect, nats, misfit, there) in ledger.causes(Path(name)):
         if first <= seed <= last:
-            yield f"{name}/{seed}", Grounds(nats, misfit, effect in PLIABLE), there
+            yield f"{name}/{seed}", Grounds(nats, misfit, effect in THRESHOLDS.calibration.flexible_effects), there
 
 
 def learned(X: Array, right: Array) -> Array:
@@ -66,7 +67,10 @@ def learned(X: Array, right: Array) -> Array:
 def page(cases: Sequence[str], X: Array, right: Array, refuted: Sequence[bool]) -> str:
     """The section of the documentation."""
     weights = learned(X, right)
-    rows = [[name, f"{w:.2f}", f"{used:.2f}"] for name, w, used in zip(_NAMES, weights, WEIGHTS, strict=True)]
+    rows = [
+        [name, f"{w:.2f}", f"{used:.2f}"]
+        for name, w, used in zip(_NAMES, weights, THRESHOLDS.calibration.weights, strict=True)
+    ]
     unseen = [_of_others(cases, X, right, case) for case in dict.fromkeys(cases)]
     stated = [(float(p), bool(r)) for some in unseen for p, r in some]
     return "\n\n".join(

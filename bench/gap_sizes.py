@@ -20,9 +20,12 @@ from evaluation.pages import publish, table
 from numpy.typing import NDArray
 from withheld import ledger
 
-from sysid_node.gap.validation.standard_errors import DISCREPANCY
+from sysid_node.gap.thresholds import THRESHOLDS
 
 Array = NDArray[np.float64]
+
+#: The share in use.
+_IN_USE = THRESHOLDS.validation.discrepancy
 
 #: Standard errors to either side, and how often such an interval should hold.
 _LEVELS = ((1.0, 0.683), (1.96, 0.95))
@@ -62,11 +65,11 @@ def page(sets: dict[str, Sequence[tuple[bool, float, float, float]]]) -> str:
     for name, known in sets.items():
         for words, still in (("still air", True), ("turbulence", False)):
             columns = _columns([row for row in known if row[0] == still])
-            shown = [f"{100 * held(*columns, s, k):.0f} %" for s in (0.0, DISCREPANCY) for k, _ in _LEVELS]
+            shown = [f"{100 * held(*columns, s, k):.0f} %" for s in (0.0, _IN_USE) for k, _ in _LEVELS]
             rows.append([f"{name}, {words}", str(columns[0].size), *shown])
     share = learned(*_columns([row for known in sets.values() for row in known]))
     heads = ("set", "sizes", "68 % interval, by chance alone", "95 %", "68 %, as stated", "95 %")
-    return "\n\n".join([table(heads, rows), f"Share learned from all of these: {share:.4f}; in use: {DISCREPANCY:g}."])
+    return "\n\n".join([table(heads, rows), f"Share learned from all of these: {share:.4f}; in use: {_IN_USE:g}."])
 
 
 def _columns(known: Sequence[tuple[bool, float, float, float]]) -> tuple[Array, Array, Array]:

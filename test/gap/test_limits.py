@@ -17,8 +17,9 @@ from sysid_node.gap.estimation.fit import (
     unfitted,
     with_candidates,
 )
-from sysid_node.gap.estimation.nuisances import LIMIT, nuisances_of
+from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
 
 
@@ -33,7 +34,7 @@ def shifted(aircraft) -> CandidateFit:
 def test_none_is_beyond_its_limit_and_some_stand_at_it(shifted) -> None:
     now, sigma, limit = shifted.stacked
     assert (np.abs(now) <= limit * (1.0 + 1e-12)).all()
-    assert (np.abs(now / sigma) > LIMIT - 1e-6).any()
+    assert (np.abs(now / sigma) > THRESHOLDS.priors.limit - 1e-6).any()
 
 
 def test_what_stands_at_its_limit_is_not_uncertain(shifted) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS, Simulator
 
 #: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
@@ -48,14 +49,8 @@ _STAMPS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
 #: Onsets that are tried, as shares of the flight.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
 
-#: Least share of its movement that a stuck surface has lost.
-_JAMMED = 0.95
-
 #: A mode that rings more slowly than any airframe's would pass for whatever a gust does.
-_RINGING, _STIFFEST = ("structural_mode", "frequency"), 3.0
-
-#: How much larger than its plausible scale a parameter may well be (1 sigma of its prior).
-PRIOR_WIDTH = 3.0
+_MODE = ("structural_mode", "frequency")
 
 
 @dataclass(frozen=True)
@@ -102,8 +97,9 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     table = [simulator.parameters[i] for i in indices]
     # A surface half stuck is one that has lost half its effect: only a jam is called one.
     jams = [e == "stuck_surface" and p.switch for e, p in table]
-    lower = [_JAMMED if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
-    lower = [_STIFFEST if (e, p.name) == _RINGING else low for low, (e, p) in zip(lower, table, strict=True)]
+    lower = [THRESHOLDS.priors.jammed if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
+    slowest = THRESHOLDS.priors.lowest_mode
+    lower = [slowest if (e, p.name) == _MODE else low for low, (e, p) in zip(lower, table, strict=True)]
     lower = [0.0 if e in _STAMPS else low for low, (e, _) in zip(lower, table, strict=True)]
     return np.array(lower), np.array([p.upper for _, p in table])
 
@@ -111,7 +107,7 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
 def prior(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     """Centre and 1-sigma of the prior of these entries; an onset may be at any time."""
     parameters = [simulator.parameters[i][1] for i in indices]
-    sigma = [100.0 if p.name == "onset" else PRIOR_WIDTH * simulator.scales[i]
+    sigma = [100.0 if p.name == "onset" else THRESHOLDS.priors.scale * simulator.scales[i]
              for i, p in zip(indices, parameters, strict=True)]  # fmt: skip
     return np.array([p.neutral for p in parameters]), np.array(sigma)
 

@@ -18,12 +18,10 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.thresholds import THRESHOLDS
 
-#: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a prior so much wider.
-DERIVATIVE_ERROR, WIDENING = "derivative_error", 5.0
-
-#: How far a nuisance may go, in sigmas: within it lie 99.7 % of honest errors.
-LIMIT = 3.0
+#: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a wider prior.
+DERIVATIVE_ERROR = "derivative_error"
 
 #: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. A late
 #: IMU is late against both others, and all three together against nothing: it is measured against the air data, and
@@ -32,12 +30,6 @@ CLOCKS = {
     "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
     "air_data_delay": ("air_data_delay", "imu_delay"),
 }
-
-#: Share of the airspeed from which on the air's motion counts.
-_GUSTY = 0.005
-
-#: Mean error of a flow angle that no vane measured, 1 sigma, rad: it is the aircraft file's.
-_INFERRED = 0.01
 
 #: Noise of the aircraft file that a bias may be as large as.
 _BIASES = {
@@ -63,7 +55,7 @@ class Nuisances:
         gone = {e for e in effects if e != DERIVATIVE_ERROR}
         gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
-        wide = np.where(np.isin(self.indices, widened), WIDENING, 1.0)
+        wide = np.where(np.isin(self.indices, widened), THRESHOLDS.priors.widening, 1.0)
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
         more = self.widened + float(np.log(wide[keep]).sum())
         return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
@@ -86,10 +78,10 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
         f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
     }
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
-    sigma |= {f"vane_bias.{angle}": _INFERRED for angle in model.flight.inferred}
+    sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
     if any(is_gusty(v) for v in every):
         sigma |= _turning_air(aircraft)
-    limit = {name: LIMIT * s for name, s in sigma.items()}
+    limit = {name: THRESHOLDS.priors.limit * s for name, s in sigma.items()}
     for clock, rate in zip(CLOCKS, (model.flight.actuator_rate, model.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
     names = model.simulator.names
@@ -100,7 +92,7 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
 
 def is_gusty(model: ResidualModel) -> bool:
     """Whether the air moves across the flight path by enough to count."""
-    return bool(model.gusts >= _GUSTY * model.record["V"].mean())
+    return bool(model.gusts >= THRESHOLDS.priors.gusty * model.record["V"].mean())
 
 
 def _turning_air(aircraft: Aircraft) -> dict[str, float]:

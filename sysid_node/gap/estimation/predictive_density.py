@@ -31,12 +31,7 @@ from sysid_node.gap.estimation.fit import (
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, Nuisances
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
-
-#: Draws of the Bayesian bootstrap.
-_DRAWS = 2000
-
-#: Groups of windows that a flight is parted into, at most.
-_GROUPS = 8
+from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -60,7 +55,8 @@ class Evidence:
 
 def window_groups(model: ResidualModel) -> list[NDArray[np.intp]]:
     """Indices of the windows of each group, neighbours together."""
-    return list(np.array_split(np.arange(model.windows.count), min(_GROUPS, max(model.windows.count // 2, 1))))
+    count = model.windows.count
+    return list(np.array_split(np.arange(count), min(THRESHOLDS.evidence.groups, max(count // 2, 1))))
 
 
 def with_neighbours(group: NDArray[np.intp], count: int) -> NDArray[np.intp]:
@@ -224,7 +220,7 @@ def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:
     """Probability of each explanation from its scores (G,) of the same groups: pseudo-BMA+."""
     table = np.array(scores)
     count = table.shape[1]
-    draws = np.random.default_rng(seed).dirichlet(np.ones(count), _DRAWS) * count
+    draws = np.random.default_rng(seed).dirichlet(np.ones(count), THRESHOLDS.evidence.draws) * count
     totals = draws @ table.T
     totals -= totals.max(axis=1, keepdims=True)
     share = np.exp(totals)

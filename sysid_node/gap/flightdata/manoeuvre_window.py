@@ -12,24 +12,13 @@ import numpy as np
 
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, SHORTEST_FLIGHT, GapFlight, resampled
-
-#: What belongs to a manoeuvre before and after its steps, s: trim, and the modes that it leaves ringing.
-_BEFORE, _AFTER = 2.0, 5.0
-
-#: Share of the commands' sudden changes that a manoeuvre must hold.
-_MOST = 0.95
-
-#: Share of a flight below which its only manoeuvre is a part of it.
-_PART = 0.4
-
-#: A command changes suddenly where it does so many times faster than it usually does.
-_SUDDEN = 8.0
+from sysid_node.gap.thresholds import THRESHOLDS
 
 
 def step_changes(commands: Array) -> Array:
     """Changes (N, controls) of commands from sample to sample, zero where they are no faster than usual."""
     changes = np.diff(commands, axis=0, prepend=commands[:1])
-    return np.where(np.abs(changes) > _SUDDEN * np.median(np.abs(changes), axis=0), changes, 0.0)
+    return np.where(np.abs(changes) > THRESHOLDS.manoeuvre.sudden * np.median(np.abs(changes), axis=0), changes, 0.0)
 
 
 def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
@@ -40,10 +29,12 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     power = (steps / np.maximum(steps.sum(axis=0), 1e-300)).sum(axis=1).cumsum()
     if not power[-1] > 0.0:
         return flight
-    aside = 0.5 * (1.0 - _MOST)
+    limits = THRESHOLDS.manoeuvre
+    aside = 0.5 * (1.0 - limits.share_of_changes)
     first, last = np.searchsorted(power / power[-1], [aside, 1.0 - aside]) / ANALYSIS_RATE
-    begin, end = max(first - _BEFORE, 0.0), min(max(last + _AFTER, first - _BEFORE + SHORTEST_FLIGHT), record.duration)
-    if end - begin > _PART * record.duration:
+    begin = max(first - limits.before, 0.0)
+    end = min(max(last + limits.after, first - limits.before + SHORTEST_FLIGHT), record.duration)
+    if end - begin > limits.share_of_flight * record.duration:
         return flight
     return replace(flight, record=_between(flight.record, begin, end), left_out=flight.record.duration - (end - begin))
 

@@ -12,15 +12,7 @@ from sysid_node.gap.estimation.nuisances import is_gusty
 from sysid_node.gap.flightdata.manoeuvre_window import step_changes
 from sysid_node.gap.residuals.air_motion import with_longest_memory
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
-
-#: Time after which a step is forgotten, s.
-_MEMORY = 3.0
-
-#: Share of a command's movement that must be steps for its steps to stand for it.
-_STEPPED = 0.3
-
-#: Share of the surfaces' movement that the air's motion foretells from which on the weather moves them.
-_DRIVEN = 0.5
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: How long an autopilot answers to a gust, and how finely that is looked at, s.
 _ANSWER, _GRAIN = 2.0, 0.1
@@ -42,10 +34,10 @@ def external_excitation(model: ResidualModel) -> ExternalExcitation:
     gusts. Where none steps (a multisine), the commands themselves, unless the weather moves them."""
     commands = model.commands
     changes = np.diff(commands, axis=0, prepend=commands[:1])
-    decay = np.exp(-model.simulator.step / _MEMORY)
+    decay = np.exp(-model.simulator.step / THRESHOLDS.instruments.memory)
     steps = lfilter([1.0], [1.0, -decay], step_changes(commands), axis=0)
     usual = lfilter([1.0], [1.0, -decay], changes, axis=0)
-    stepped = steps.std(axis=0) > _STEPPED * usual.std(axis=0)
+    stepped = steps.std(axis=0) > THRESHOLDS.instruments.stepped * usual.std(axis=0)
     if stepped[:-1].any():
         return ExternalExcitation(steps[:, stepped], steps[:, stepped])
     if driven_by_gusts(model):
@@ -74,7 +66,7 @@ def driven_by_gusts(model: ResidualModel) -> bool:
     rate = model.simulator.rate
     longest, grain = round(_ANSWER * rate), max(round(_GRAIN * rate), 1)
     lagged = np.column_stack([np.roll(air, lag, axis=0) for lag in range(0, longest, grain)])[longest:]
-    return bool(np.median(_foretold(lagged - lagged.mean(axis=0), surfaces[longest:])) > _DRIVEN)
+    return bool(np.median(_foretold(lagged - lagged.mean(axis=0), surfaces[longest:])) > THRESHOLDS.instruments.driven)
 
 
 def _air(model: ResidualModel) -> Array:

@@ -33,15 +33,10 @@ from sysid_node.gap.estimation.predictive_density import fit_on_other_flight
 from sysid_node.gap.instruments.excitation import external_excitation
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Standard deviations above chance below which coherence is taken as chance.
 CHANCE_DEVIATIONS = 4.0
-
-#: Time constants through which commands act, s; zero is directly.
-_LAGS = (0.0, 0.06, 0.2, 0.6)
-
-#: Frequencies at which what is not the airframe's may ring, Hz, and the damping that makes each reach the next.
-_RINGING, _DAMPING = (0.6, 0.9, 1.35, 2.0, 3.0), 0.2
 
 #: Signals (N, M) for forces and moments, and for air data and attitude, of zero mean and unit spread; or none.
 Instruments = Callable[[ResidualModel], tuple[Array, Array]]
@@ -300,16 +295,16 @@ def _foretelling(model: ResidualModel, given: Array) -> list[Array]:
 def _rung(model: ResidualModel, given: Array) -> list[Array]:
     """Signals (N, m) through each resonator, where it is and how fast it moves."""
     found = []
-    for omega in 2.0 * np.pi * np.array(_RINGING):
+    for omega in 2.0 * np.pi * np.array(THRESHOLDS.instruments.resonances):
         for top in ([omega**2], [omega, 0.0]):
-            b, a = bilinear(top, [1.0, 2.0 * _DAMPING * omega, omega**2], model.simulator.rate)
+            b, a = bilinear(top, [1.0, 2.0 * THRESHOLDS.instruments.damping * omega, omega**2], model.simulator.rate)
             found += [lfilter(b, a, series) for series in given.T]
     return found
 
 
 def _shaped(model: ResidualModel, given: Array) -> list[Array]:
     """Signals (N, m) through lags, and their squares and cubes."""
-    columns = [_lagged(series, lag, model.simulator.step) for series in given.T for lag in _LAGS]
+    columns = [_lagged(series, lag, model.simulator.step) for series in given.T for lag in THRESHOLDS.instruments.lags]
     return [*columns, *(series**power for series in given.T for power in (2, 3))]
 
 

@@ -10,16 +10,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.residual_model import ResidualModel
-
-#: Travel below which no surface counts as moved, rad.
-_TRAVEL = 0.004
-
-#: Ratio of measured to expected mean lift beyond which a flight is another aircraft's, unless a vane that is off by so
-#: much (rad) would account for it.
-_LIFT, _VANE = 2.5, 0.1
-
-#: Mean angle of attack from which lift that is missing may be stalled, rad.
-_STALLING = 0.15
+from sysid_node.gap.thresholds import THRESHOLDS, Admission
 
 
 def require_distinct_flights(flights: Sequence[GapFlight], holdouts: Sequence[GapFlight]) -> None:
@@ -35,20 +26,21 @@ def require_distinct_flights(flights: Sequence[GapFlight], holdouts: Sequence[Ga
                 )
 
 
-def require_admissible(model: ResidualModel) -> ResidualModel:
+def require_admissible(model: ResidualModel, limits: Admission = THRESHOLDS.admission) -> ResidualModel:
     """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
     commands = model.commands[:, :-1]
     travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
-    if (travel < _TRAVEL).all():
+    if (travel < limits.least_travel).all():
         raise InputError(
             f"{model.flight.source}: no control surface moves by more than {travel.max():.2g} rad; fly a manoeuvre "
             "(sysid excite designs one)"
         )
     lift, expected = model.series[:, 0].mean(), model.predicted_series(model.simulator.neutral())[:, 0].mean()
     slope = model.simulator.aircraft.derivatives.get("CL_alpha")
-    by_a_vane = slope is not None and abs(lift - expected) < _VANE * slope.value and not model.flight.inferred
-    stalled = lift < expected and not model.flight.inferred and model.record["alpha"].mean() > _STALLING
-    if not (1.0 / _LIFT < lift / expected < _LIFT or by_a_vane or stalled):
+    measured = not model.flight.inferred
+    by_a_vane = slope is not None and abs(lift - expected) < limits.vane_error * slope.value and measured
+    stalled = lift < expected and measured and model.record["alpha"].mean() > limits.stall_angle
+    if not (1.0 / limits.lift_ratio < lift / expected < limits.lift_ratio or by_a_vane or stalled):
         raise InputError(
             f"{model.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
             f"{model.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "

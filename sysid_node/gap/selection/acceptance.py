@@ -21,31 +21,13 @@ from sysid_node.gap.instruments.overidentification import overidentification_of
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.candidate_fitter import Trial
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
-
-#: Probability, against doing without, from which an effect is accepted.
-_SURE = 0.95
-
-#: The same in nats.
-_SURELY = float(np.log(_SURE / (1.0 - _SURE)))
-
-#: What an effect must make up for having been picked from so many, in nats.
-_MANY = float(np.log(len(EFFECTS)))
-
-#: Share of the power left over that an effect must take away on the axis where it does most, and share of what
-#: derivatives and biases leave there that comes back without it: a fifth of the gap's size.
-MATERIAL, MATERIAL_OF_ALL = 0.25, 0.04
-
-#: Error, as a share of the motion, that nobody would look for.
-NOTICED = 0.05
-
-#: Error, as a share of the motion, whose end matters however much weather is left.
-_PLAIN = 0.2
 
 
 def likelier(trial: Trial, other: Trial) -> bool:
     """Whether a trial predicts better than another, beyond doubt."""
-    return bool(probabilities([trial.evidence.scores, other.evidence.scores])[0] > _SURE)
+    return bool(probabilities([trial.evidence.scores, other.evidence.scores])[0] > THRESHOLDS.acceptance.probability)
 
 
 def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
@@ -57,16 +39,22 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     if _trifling(trial) or not likelier(trial, without):
         return False
     matters = _matters_in_gusts(without, trial) if _in_gusts(trial) else _matters(without, trial)
-    if not np.any(matters & (_contributed(base, without, trial) > MATERIAL_OF_ALL)):
+    if not np.any(matters & (_contributed(base, without, trial) > THRESHOLDS.acceptance.share_of_gap)):
         return False
-    return log_bayes_factor(trial.fit, without.fit) > _SURELY + _MANY
+    return log_bayes_factor(trial.fit, without.fit) > THRESHOLDS.acceptance.log_bayes_factor(len(EFFECTS))
 
 
 def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     """Channels (12,) on which a trial takes enough of the remainder away."""
     left, motion = power_left(without.evidence), _motion(trial)
     gone = left - power_left(trial.evidence)
-    return np.asarray(((gone > MATERIAL * left) & (gone > NOTICED**2 * motion)) | (gone > _PLAIN**2 * motion))
+    return np.asarray(
+        (
+            (gone > THRESHOLDS.acceptance.share_of_remainder * left)
+            & (gone > THRESHOLDS.acceptance.noticeable_error**2 * motion)
+        )
+        | (gone > THRESHOLDS.acceptance.large_error**2 * motion)
+    )
 
 
 def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
@@ -74,7 +62,9 @@ def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     before, after = overidentification_of(without.fit, trial.fit), overidentification_of(trial.fit)
     scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
     gone = before.coherent - after.coherent
-    structured = (gone > MATERIAL * before.coherent) & (gone * scale > NOTICED**2 * _motion(trial))
+    structured = (gone > THRESHOLDS.acceptance.share_of_remainder * before.coherent) & (
+        gone * scale > THRESHOLDS.acceptance.noticeable_error**2 * _motion(trial)
+    )
     forces = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
     return np.where(forces, structured | _shifts(without, trial), _matters(without, trial))
 
@@ -82,7 +72,10 @@ def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
 def _shifts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     """Channels (12,) on which a trial takes enough of what is off on average away: gusts average out."""
     left, now = (_power_of_means(t.evidence) for t in (without, trial))
-    return np.asarray((left - now > MATERIAL * left) & (left - now > NOTICED**2 * _motion(trial)))
+    return np.asarray(
+        (left - now > THRESHOLDS.acceptance.share_of_remainder * left)
+        & (left - now > THRESHOLDS.acceptance.noticeable_error**2 * _motion(trial))
+    )
 
 
 def _power_of_means(evidence: Evidence) -> Array:

@@ -9,15 +9,7 @@ from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import accepted
 from sysid_node.gap.selection.candidate_fitter import Trial, Trier
-
-#: Rivals of a cause that are fitted to the end.
-_RIVALS = 4
-
-#: Times that the causes stand against their rivals, at most.
-_SWEEPS = 3
-
-#: Nats of both kinds by which another explanation must be better to take the place of one.
-_CLEARLY = 1.0
+from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -43,7 +35,7 @@ def refined(
     """
     tried = [t.added for trials in stages for t in trials if t.added]
     pool = list({candidate.label: candidate for candidate in (*tried, *late)}.values())
-    for _ in range(_SWEEPS):
+    for _ in range(THRESHOLDS.search.sweeps):
         places = tuple(_place(trier, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
         better = _replacement(base, chosen, places, barred)
         if better is None:
@@ -60,7 +52,7 @@ def _place(
     without = trier.trial(chosen.fit, others) if others else base
     rest = [c for c in pool if c.effect not in without.fit.effects]
     looks = trier.looks_upon([without], rest, lambda s, t: None)
-    likely = looks[:_RIVALS] if others else []
+    likely = looks[: THRESHOLDS.search.alternatives] if others else []
     late = [(t, look) for t, look in looks[len(likely) :] if {look[1].effect, candidate.effect} <= RESPONSE_DELAYS]
     rivals = {t.added.label: t for _, t in trier.finish([*likely, *late], lambda s, t: None) if t.added}
     known = {} if others else {t.added.label: t for t in first if t.added}
@@ -77,4 +69,4 @@ def _replacement(base: Trial, chosen: Trial, places: Sequence[Place], barred: fr
     rivals = [t for p, t in new if accepted(base, p.without, t)]
     ahead = {id(t): t.evidence.total - chosen.evidence.total + log_bayes_factor(t.fit, chosen.fit) for t in rivals}
     best = max(rivals, key=lambda trial: ahead[id(trial)], default=None)
-    return best if best is not None and ahead[id(best)] > _CLEARLY else None
+    return best if best is not None and ahead[id(best)] > THRESHOLDS.search.lead else None

@@ -14,27 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.selection.misspecification import Adequacy
-
-#: Effects that work through the file's own derivatives, as other values of these: together they bend to much that is
-#: something else.
-PLIABLE = frozenset({DERIVATIVE_ERROR, "inertia_error", "mass_error", "cg_shift"})
-
-#: Weights of a constant, of the logarithm of the nats, and of pliability (bench/gap_credence.py).
-WEIGHTS = (-4.02, 1.18, -1.12)
-
-#: Amplitude of what goes with a cause and is left, as a share of what it does, from which its law is refuted.
-REFUTED = 0.3
-
-#: Probability below which a cause is not named.
-LIKELY = 0.5
-
-#: Standard deviations above chance from which what is left goes with a cause.
-_DEVIATIONS = 4.5
-
-#: Share of all that a cause does from which what it does to one channel counts.
-_COUNTS = 0.1
+from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -48,9 +29,11 @@ class Grounds:
     @classmethod
     def of(cls, effect: str, foretold: float, adequacy: Adequacy) -> Grounds:
         """From the effect, the nats, and what it leaves."""
-        seen = (adequacy.done > _COUNTS * adequacy.done.sum()) & (adequacy.deviations > _DEVIATIONS)
+        seen = (adequacy.done > THRESHOLDS.calibration.counted * adequacy.done.sum()) & (
+            adequacy.deviations > THRESHOLDS.calibration.deviations
+        )
         misfit = np.sqrt(adequacy.left[seen].sum() / adequacy.done[seen].sum()) if seen.any() else 0.0
-        return cls(foretold, float(misfit), effect in PLIABLE)
+        return cls(foretold, float(misfit), effect in THRESHOLDS.calibration.flexible_effects)
 
     @property
     def regressors(self) -> tuple[float, float, float]:
@@ -60,7 +43,7 @@ class Grounds:
     @property
     def refuted(self) -> bool:
         """Whether what is left goes with the cause by too much: then the law is another, however many the nats."""
-        return self.misfit > REFUTED
+        return self.misfit > THRESHOLDS.calibration.misfit
 
     @property
     def credence(self) -> float:
@@ -70,13 +53,13 @@ class Grounds:
     @property
     def wanting(self) -> bool:
         """Whether it would be believed but for its law: then something is there, but not this."""
-        return self.refuted and self._by_nats >= LIKELY
+        return self.refuted and self._by_nats >= THRESHOLDS.calibration.probability
 
     @property
     def _by_nats(self) -> float:
-        return 1.0 / (1.0 + float(np.exp(-np.dot(WEIGHTS, self.regressors))))
+        return 1.0 / (1.0 + float(np.exp(-np.dot(THRESHOLDS.calibration.weights, self.regressors))))
 
 
 def prior(effect: str) -> float:
     """Odds of an effect before any flight, beside those that are not pliable."""
-    return float(np.exp(WEIGHTS[2])) if effect in PLIABLE else 1.0
+    return float(np.exp(THRESHOLDS.calibration.flexible)) if effect in THRESHOLDS.calibration.flexible_effects else 1.0

@@ -18,9 +18,7 @@ from sysid_node.gap.estimation.nuisances import Nuisances
 from sysid_node.gap.estimation.predictive_density import Evidence, competing_evidence
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.onset import sought
-
-#: Of these, as many of one effect: it may act on several controls or coefficients.
-_SHAPES = 2
+from sysid_node.gap.thresholds import THRESHOLDS
 
 Progress = Callable[[float, str], None]
 
@@ -130,7 +128,7 @@ def likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Tria
     kept = []
     for current, look in looks:
         effect = look[1].effect
-        if seen[id(current), ""] < most and seen[id(current), effect] < _SHAPES:
+        if seen[id(current), ""] < most and seen[id(current), effect] < THRESHOLDS.search.per_effect:
             seen.update([(id(current), ""), (id(current), effect)])
             kept.append((current, look))
     return kept

@@ -14,15 +14,13 @@ from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import accepted, power_left
 from sysid_node.gap.selection.alternatives import Place, refined
-from sysid_node.gap.selection.calibration import LIKELY, Grounds, prior
+from sysid_node.gap.selection.calibration import Grounds, prior
 from sysid_node.gap.selection.candidate_fitter import Trial, Trier
 from sysid_node.gap.selection.misspecification import adequacy_of
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Effects by which commands are on another clock than the IMU.
 _COMMANDS_CLOCK = frozenset({"command_delay", "actuator_stamp_delay"})
-
-#: Probability in a cause's stead from which a rival is also tried beside it.
-_WORTH_TRYING = 0.01
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ def believed(
         causes = [_cause(trier, chosen, place, barred) for place in places]
         second = [cause for cause in causes if cause.likelier and cause.candidate.label not in yielded]
         worst = min(causes, key=lambda cause: cause.grounds.credence, default=None)
-        unlikely = worst is not None and worst.grounds.credence < LIKELY
+        unlikely = worst is not None and worst.grounds.credence < THRESHOLDS.calibration.probability
         out = second[0] if second else worst if unlikely else None
         if out is None:
             causes = [_beside_its_twin(cause, chosen) for cause in causes]
@@ -92,7 +90,7 @@ def _instead(base: Trial, place: Place, cause: Cause, barred: frozenset[str]) ->
     likely = dict(cause.alternatives)
     rivals = [t for t in place.rivals if t.added and t.added.label not in barred and accepted(base, place.without, t)]
     for trial in sorted(rivals, key=lambda t: (-likely.get(t.added.effect if t.added else "", 0.0), -t.evidence.total)):
-        if _grounds(trial, place.without, trial.added).credence >= LIKELY:
+        if _grounds(trial, place.without, trial.added).credence >= THRESHOLDS.calibration.probability:
             return trial
     return None
 
@@ -113,7 +111,7 @@ def _cause(trier: Trier, chosen: Trial, place: Place, barred: frozenset[str]) ->
     others = barred | {candidate.label}
     rivals = [t for t in place.rivals if t.added is not None and t.added.label not in others]
     instead = _shares([chosen], rivals)[1:]
-    strong = [t for t, share in zip(rivals, instead, strict=True) if share > _WORTH_TRYING]
+    strong = [t for t, share in zip(rivals, instead, strict=True) if share > THRESHOLDS.search.tried_beside]
     tried = [trier.beside(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
     sets = [chosen, *(trial for trial in tried if trial is not None)]
     odds = [prior(candidate.effect)] * len(sets) + [prior(t.added.effect) for t in rivals if t.added] + [1.0]

@@ -25,10 +25,7 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import accepted, likelier
 from sysid_node.gap.selection.candidate_fitter import Progress, Trial, Trier, likeliest, narrowed
 from sysid_node.gap.selection.causes import Cause, believed
-
-#: For the first, second and third effect: explanations that it is tried upon (the best single one need not belong to
-#: the best pair), and candidates that are fitted to the end upon each after a first look at all.
-_STAGES = ((1, 6), (3, 4), (2, 3))
+from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ def attribute(
     progress(0.0, "derivatives within their tolerances")
     base = trier.trial(unfitted(models, nuisances), [])
     chosen, stages, frontier = base, [], [base]
-    for count, (width, most) in enumerate(_STAGES):
+    for count, (width, most) in enumerate(THRESHOLDS.search.stages):
         looks = trier.looks_upon(frontier[:width], candidates, _share_of(progress, count))
         tried = trier.finish(likeliest(looks, most), _share_of(progress, count))
         candidates = narrowed(candidates, [look for _, look in looks])
@@ -123,7 +120,7 @@ def attribute(
 
 def _share_of(progress: Progress, count: int) -> Progress:
     """Progress of one of the stages as that of all."""
-    return lambda share, text: progress((count + share) / (len(_STAGES) + 1.0), text)
+    return lambda share, text: progress((count + share) / (len(THRESHOLDS.search.stages) + 1.0), text)
 
 
 def _ranked(base: Trial, trials: Sequence[Trial]) -> tuple[tuple[str, float], ...]:

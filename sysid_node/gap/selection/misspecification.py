@@ -17,9 +17,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
-
-#: Power of a contribution to a channel, in noise levels, below which nothing can be said of it.
-_SEEN = 20.0
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Penalty on the added regressors, as a share of their power: they may be nearly alike.
 _RIDGE = 1e-6
@@ -47,7 +45,7 @@ def adequacy_of(fit: CandidateFit, candidate: Candidate) -> Adequacy:
         for axis in np.flatnonzero(model.axes & (contribution.std(axis=0) > 0.0)):
             own, kept = contribution[:, axis], (weight[:, axis] > 0.0)
             whole, *added = (_rows(model, x, weight[:, axis]) for x in (own, *_modulated(own, model.record.time)))
-            if whole @ whole < _SEEN:
+            if whole @ whole < THRESHOLDS.calibration.least_power:
                 continue
             J = (unknowns[:, :, axis] * kept[:, None]).reshape(-1, slopes.shape[2])
             done[axis] += float(whole @ whole)

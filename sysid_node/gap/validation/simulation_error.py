@@ -19,6 +19,7 @@ from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.validation.multiple_shooting import Course, beside, course_of, off
 from sysid_node.gap.validation.noise_floor import unavoidable
 from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
@@ -34,12 +35,6 @@ _COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
 
 #: What a flight without lateral measurements shows.
 _LONGITUDINAL = frozenset({"ax", "az", "q", "theta", "V", "alpha"})
-
-#: A reading counts where it moved by so many times the power of its noise.
-_MOVED = 4.0
-
-#: How much larger than foreseen an error may be by chance: the scatter of half a minute of turbulence is a quarter.
-BY_CHANCE = 1.5
 
 #: Bootstrap draws, and short flights in a row that are drawn together.
 _DRAWS, _BLOCK = 2000, 2
@@ -70,7 +65,7 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
     unread = {angle for model in final.models for angle in model.flight.inferred}
     unread |= thrust.THRUST_READINGS if any(not model.flight.metered for model in final.models) else set()
     counted = np.array([(lateral or name in _LONGITUDINAL) and name not in unread for name in READINGS])
-    counted &= motion.mean(axis=0) > _MOVED * noise.mean(axis=0)
+    counted &= motion.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
     if not counted.any():
         return None
     return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
@@ -85,7 +80,7 @@ def foreseen(models: Sequence[ResidualModel]) -> bool:
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
     _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
-    return bool((before <= BY_CHANCE**2 * np.mean(floors, axis=0)).all())
+    return bool((before <= THRESHOLDS.validation.chance**2 * np.mean(floors, axis=0)).all())
 
 
 def shows(model: ResidualModel) -> bool:

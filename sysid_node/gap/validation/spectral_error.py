@@ -17,9 +17,7 @@ from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.instruments.overidentification import OveridentificationTest
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex, power_of
-
-#: A channel counts where its own power is so many times the sensors' noise.
-_MOVED = 4.0
+from sysid_node.gap.thresholds import THRESHOLDS
 
 _DRAWS = 2000
 
@@ -56,7 +54,7 @@ def gap_of(
     measured = np.array([(np.abs(models[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
     noise = np.array([len(g) * (models[i].noise.sum(axis=0) - 0.5 * models[i].noise[0]) for i, g in groups])
     stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
-    counted = models[0].axes & (measured.sum(axis=0) > _MOVED * noise.sum(axis=0))
+    counted = models[0].axes & (measured.sum(axis=0) > THRESHOLDS.validation.motion * noise.sum(axis=0))
 
     def errors(weight: Array, share: Array) -> Array:
         """Overall errors (4,) at weights (G,) of the groups, where such a share (12,) of the remainder is structure."""

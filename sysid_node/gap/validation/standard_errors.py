@@ -19,14 +19,12 @@ from sysid_node.gap.estimation.fit import CandidateFit, onset_places
 from sysid_node.gap.estimation.predictive_density import window_groups
 from sysid_node.gap.instruments.liml import influence
 from sysid_node.gap.selection.onset import uncertainty
-
-#: Share of itself by which a size is off beyond chance, 1 sigma.
-DISCREPANCY = 0.03
+from sysid_node.gap.thresholds import THRESHOLDS
 
 
 def stated(name: str, value: float, error: float) -> list[float]:
     """A parameter's value and its standard error by chance and by the model together; a moment in time is no size."""
-    return [value, error if name == "onset" else float(np.hypot(error, DISCREPANCY * value))]
+    return [value, error if name == "onset" else float(np.hypot(error, THRESHOLDS.validation.discrepancy * value))]
 
 
 def standard_errors(fit: CandidateFit) -> Array:

@@ -16,47 +16,30 @@ from sysid_node.gap.instruments.overidentification import CHANCE_DEVIATIONS
 from sysid_node.gap.residuals.admissibility import signal_to_noise
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.acceptance import NOTICED, power_left
+from sysid_node.gap.selection.acceptance import power_left
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.forward_selection import Attribution
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.validation.holdout import Check
-from sysid_node.gap.validation.simulation_error import BY_CHANCE
-
-#: Probability from which an effect counts as told apart from its rivals.
-_TOLD_APART = 0.8
-
-#: Standard deviations above chance from which what is left on some axis is structure, of twelve axes.
-_DEVIATIONS = 4.5
-
-#: Share of what tolerances and noise leave that the effects must take away for them to be the explanation.
-_EXPLAINED = 0.8
-
-#: Percentage of what could be closed, below which what was found surely falls short of it.
-_ALL_BUT = 90.0
-
-#: Error beyond the noise, as a share of the motion, that derivatives within their tolerances may not leave.
-_LEFT = 0.1
-
-#: A rival with this probability is named.
-_NAMED = 0.03
-
-#: Power over the sensors' noise below which a flight tells nothing.
-_TELLING = 6.0
 
 
 def verdict_of(models: Sequence[ResidualModel], attribution: Attribution, check: Check) -> str:
     """One of gap.json's five words."""
-    if max(signal_to_noise(model).max() for model in models) < _TELLING:
+    if max(signal_to_noise(model).max() for model in models) < THRESHOLDS.admission.excitation:
         return "unsupported"
     if check.foreseen or not any(externally_excited(model) for model in models):
         return "no_gap" if check.foreseen else "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
-    if short(check) or check.final.total <= check.base.total or explained(attribution) < _EXPLAINED:
+    if short(check) or check.final.total <= check.base.total or explained(attribution) < THRESHOLDS.verdict.explained:
         return "unknown_effect"
     if unexplained(attribution) or wanting(attribution):
         return "unknown_effect"
-    return "explained" if all(cause.share >= _TOLD_APART for cause in attribution.causes) else "ambiguous"
+    return (
+        "explained"
+        if all(cause.share >= THRESHOLDS.verdict.told_apart for cause in attribution.causes)
+        else "ambiguous"
+    )
 
 
 def structured(attribution: Attribution) -> bool:
@@ -78,14 +61,21 @@ def far_off(check: Check) -> bool:
     However much of the gap the derivatives close, where surely a tenth of the motion is left beyond the noise.
     """
     gap = check.flown
-    surely = gap is not None and gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > _LEFT**2
+    surely = (
+        gap is not None
+        and gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > THRESHOLDS.verdict.error**2
+    )
     return surely or short(check)
 
 
 def short(check: Check) -> bool:
     """Whether what was found surely falls short of what could be closed, by more than chance leaves."""
     gap = check.flown
-    return gap is not None and gap.after > BY_CHANCE * gap.noise_floor and gap.ci95[1] < _ALL_BUT
+    return (
+        gap is not None
+        and gap.after > THRESHOLDS.validation.chance * gap.noise_floor
+        and gap.ci95[1] < THRESHOLDS.verdict.closed
+    )
 
 
 def unexplained(attribution: Attribution) -> bool:
@@ -98,8 +88,11 @@ def unexplained(attribution: Attribution) -> bool:
 
 def _structured(attribution: Attribution) -> NDArray[np.bool_]:
     """Channels (12,) on which structure that matters is left."""
-    power, noticed = _structure_left(attribution), NOTICED**2 + _sampling(attribution.chosen.fit)
-    return np.asarray((attribution.left.deviations > _DEVIATIONS) & (power > noticed))
+    power, noticed = (
+        _structure_left(attribution),
+        THRESHOLDS.acceptance.noticeable_error**2 + _sampling(attribution.chosen.fit),
+    )
+    return np.asarray((attribution.left.deviations > THRESHOLDS.verdict.structure) & (power > noticed))
 
 
 def explained(attribution: Attribution) -> float:
@@ -141,4 +134,4 @@ def _motion(evidence: Evidence) -> Array:
 
 def named(cause: Cause) -> list[str]:
     """Effects that are named beside a cause."""
-    return [effect for effect, p in cause.alternatives if p > _NAMED]
+    return [effect for effect, p in cause.alternatives if p > THRESHOLDS.verdict.named]

@@ -13,9 +13,7 @@ from sysid_node.gap.estimation.fit import CandidateFit
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import BAND_EDGES, Complex, power_of
 from sysid_node.gap.selection.forward_selection import Attribution
-
-#: Share of the power that a band, a time or a regime holds when it is named.
-_MOST = 0.8
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Bins of the missing coefficient's shape.
 _BINS = 12
@@ -92,14 +90,14 @@ def _smallest(power: Array) -> tuple[int, int]:
     total, sums = power.sum(), np.concatenate([[0.0], np.cumsum(power)])
     for size in range(1, power.size + 1):
         held = sums[size:] - sums[:-size]
-        if held.max() >= _MOST * total:
+        if held.max() >= THRESHOLDS.verdict.most * total:
             return int(held.argmax()), int(held.argmax()) + size - 1
     return 0, power.size - 1
 
 
 def _regime(model: ResidualModel, by_window: Array) -> dict[str, list[float]]:
     """Range of the signal whose departures go with the gap by window, where one does."""
-    best, found = 0.5, {}
+    best, found = THRESHOLDS.verdict.regime, {}
     for name in _signals(model):
         values = model.record[name]
         pieces = [values[window] for window in model.windows.slices]
@@ -117,9 +115,10 @@ def missing(attribution: Attribution) -> Shape | None:
     """The remainder that derivatives and biases leave, of the coefficient with most structure, against what it depends
     on most; none without structure."""  # fmt: skip
     before = attribution.before
-    if not (before.deviations > 3.0).any():
+    significant = before.deviations > THRESHOLDS.verdict.shape
+    if not significant.any():
         return None
-    axis = int(np.argmax(np.where(before.deviations > 3.0, before.coherent, 0.0)))
+    axis = int(np.argmax(np.where(significant, before.coherent, 0.0)))
     fit = attribution.base.fit
     model, point = fit.models[0], fit.points[0]
     remainder = model.series[:, axis] - model.predicted_series(point)[:, axis]

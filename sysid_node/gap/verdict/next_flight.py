@@ -26,6 +26,7 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import Trial
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.forward_selection import Attribution
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.verdict.decision import named
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
@@ -43,9 +44,6 @@ _PROPOSALS = (
     ("3-2-1-1 on each surface in turn at half the usual deflection", "3211", 0.3, 0.5, False),
     ("3-2-1-1 on each surface in turn while the throttle is stepped up and down", "3211", 0.3, 1.0, True),
 )
-
-#: Separation, in standard deviations, from which a flight tells two effects apart.
-_PARTED = 3.0
 
 #: What to fly where no pair of effects is in doubt.
 _LARGER = "3-2-1-1 on each surface in turn, larger and at two airspeeds, in still air"
@@ -73,7 +71,7 @@ def advice(verdict: str, attribution: Attribution) -> str:
     best = propose(attribution.chosen.fit, pairs)
     if best is None:
         return _LARGER
-    if best.separation < _PARTED:
+    if best.separation < THRESHOLDS.verdict.separated:
         return (
             f"no manoeuvre parts {_listed(attribution)} (at most {best.separation:.2g} standard deviations): what they "
             "do in flight is the same; measure on the ground"

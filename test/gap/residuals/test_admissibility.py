@@ -6,9 +6,9 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.errors import InputError
-from sysid_node.gap.residuals import admissibility
 from sysid_node.gap.residuals.admissibility import require_admissible
 from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.thresholds import Admission
 from sysid_node.sim import Simulator
 
 
@@ -26,16 +26,14 @@ def test_a_vane_that_is_three_degrees_off_is_no_other_aircraft(aircraft) -> None
 
 
 @pytest.mark.parametrize(("alpha", "stalled"), [(0.05, False), (0.2, True)])
-def test_a_third_of_the_lift_is_a_stall_at_large_angles_only(
-    plain_model, monkeypatch: pytest.MonkeyPatch, alpha: float, stalled: bool
-) -> None:
-    monkeypatch.setattr(admissibility, "_VANE", 0.0)  # no vane is off
+def test_a_third_of_the_lift_is_a_stall_at_large_angles_only(plain_model, alpha: float, stalled: bool) -> None:
+    exact_vane = Admission(vane_error=0.0)
     record, series = plain_model.record, plain_model.series.copy()
     series[:, 0] = plain_model.predicted_series(plain_model.simulator.neutral())[:, 0] / 3.0
     turned = record["alpha"] - record["alpha"].mean() + alpha
     model = replace(plain_model, series=series, record=replace(record, columns={**record.columns, "alpha": turned}))
     if stalled:
-        assert require_admissible(model) is model
+        assert require_admissible(model, exact_vane) is model
     else:
         with pytest.raises(InputError, match="another aircraft's flight"):
-            require_admissible(model)
+            require_admissible(model, exact_vane)

@@ -3,8 +3,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid_node.gap.selection.calibration import LIKELY, REFUTED, Grounds
+from sysid_node.gap.selection.calibration import Grounds
+from sysid_node.gap.thresholds import THRESHOLDS
 
+LIKELY, REFUTED = THRESHOLDS.calibration.probability, THRESHOLDS.calibration.misfit
 NATS, MISFITS = st.floats(-1e3, 1e6), st.floats(0.0, 2.0)
 
 

@@ -10,7 +10,8 @@ from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import Trier
-from sysid_node.gap.validation.standard_errors import DISCREPANCY, standard_errors, stated
+from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.gap.validation.standard_errors import standard_errors, stated
 from sysid_node.sim import Simulator
 
 
@@ -37,6 +38,6 @@ def test_what_changes_in_flight_is_less_certain(aircraft, make_flight, turbulenc
 
 
 def test_a_size_is_no_better_known_than_the_model_and_a_moment_is_no_size() -> None:
-    assert stated("time_constant", 0.1, 0.0) == [0.1, pytest.approx(DISCREPANCY * 0.1)]
-    assert stated("arm", -0.2, 0.01) == [-0.2, pytest.approx(np.hypot(0.01, DISCREPANCY * 0.2))]
+    assert stated("time_constant", 0.1, 0.0) == [0.1, pytest.approx(THRESHOLDS.validation.discrepancy * 0.1)]
+    assert stated("arm", -0.2, 0.01) == [-0.2, pytest.approx(np.hypot(0.01, THRESHOLDS.validation.discrepancy * 0.2))]
     assert stated("onset", 30.0, 0.02) == [30.0, 0.02]
