@@ -11,7 +11,7 @@ from sysid_node.gap.thresholds import THRESHOLDS, Acceptance, table
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("threshold", table(), ids=lambda threshold: threshold.name)
+@pytest.mark.parametrize("threshold", list(table()), ids=lambda threshold: threshold.name)
 def test_each_has_a_meaning_a_unit_and_a_source(threshold) -> None:
     assert threshold.meaning
     assert threshold.unit or isinstance(threshold.value, frozenset)
