@@ -27,6 +27,13 @@ BELOW = {
 BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["cli"] = {*BELOW["report"], "report"}
 
+#: The rooms of a layer (sub-packages, and modules beside them), lowest first: a room imports itself and those before it.
+ROOMS = {
+    "batch": (
+        "settings", "results", "regression", "models", "likelihood", "methods", "data_compatibility", "identify",
+    ),
+}  # fmt: skip
+
 ROS_PACKAGES = {"rclpy", "ament_index_python", "rosidl_runtime_py", "launch", "launch_ros", "sysid_msgs"}
 # the last two are SciPy's own and, where it happens to be installed, what NumPy's f2py takes along
 ONLINE_PACKAGES = {"numpy", "scipy", "cython_runtime", "charset_normalizer"}
@@ -63,6 +70,20 @@ def test_imports_point_downwards(layer: str) -> None:
             parts = name.split(".")
             if parts[0] == "sysid_node" and len(parts) > 1 and (PACKAGE / parts[1]).is_dir():
                 assert parts[1] in {layer, *BELOW[layer]}, f"{path.relative_to(PACKAGE)} imports {name}"
+
+
+@pytest.mark.parametrize("layer", sorted(ROOMS))
+def test_rooms_of_a_layer_import_in_one_direction(layer: str) -> None:
+    order = ROOMS[layer]
+    for path in (PACKAGE / layer).rglob("*.py"):
+        room = path.relative_to(PACKAGE / layer).with_suffix("").parts[0]
+        if room == "__init__":
+            continue
+        assert room in order, f"{layer}/{room} has no place in ROOMS"
+        for name in imports(path):
+            parts = name.split(".")
+            if parts[:2] == ["sysid_node", layer] and len(parts) > 2 and parts[2] in order:
+                assert order.index(parts[2]) <= order.index(room), f"{path.relative_to(PACKAGE)} imports {name}"
 
 
 def test_modules_outside_layers_import_none() -> None:

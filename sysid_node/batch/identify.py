@@ -10,15 +10,16 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.data_compatibility import check_sensors, corrected
 from sysid_node.batch.methods.constrained_least_squares import constrained_least_squares
-from sysid_node.batch.methods.equation_error import equation_error, regressor_matrix
+from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
 from sysid_node.batch.methods.state_space import StateSpaceEstimation
-from sysid_node.batch.methods.stepwise import StepwiseSelection, supported_model
 from sysid_node.batch.regression.filtering import lowpass
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
+from sysid_node.batch.regression.regressors import regressor_matrix
+from sysid_node.batch.regression.stepwise import StepwiseSelection, supported_model
 from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings

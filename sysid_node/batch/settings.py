@@ -7,10 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
-from sysid_node.batch.methods.equation_error import DEFAULT_LOW_PASS
-from sysid_node.batch.methods.frequency_equation_error import DEFAULT_FREQUENCIES, Frequencies
 from sysid_node.errors import InputError
 from sysid_node.setting import check_frequencies, parsed
+
+#: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
+DEFAULT_LOW_PASS = 3.0
+
+#: Hz: first line, step, last line.
+Frequencies = tuple[float, float, float]
+
+#: The short-period band of most aircraft; below it trim and phugoid, above it noise.
+DEFAULT_FREQUENCIES: Frequencies = (0.1, 0.04, 2.0)
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import pytest
 from made_flight import KESTREL, TRUTH, clean, flight, scores
 
 from sysid_node.batch.identify import METHODS, identify
-from sysid_node.batch.methods.state_space import model_for_flights
 from sysid_node.batch.models.manoeuvres import cut_into_segments
+from sysid_node.batch.models.model_for_flights import model_for_flights
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord

@@ -20,8 +20,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import identify, predicted_coefficients
 from sysid_node.batch.methods import kalman_filters
-from sysid_node.batch.methods.state_space import model_for_flights
 from sysid_node.batch.models.manoeuvres import manoeuvre_data
+from sysid_node.batch.models.model_for_flights import model_for_flights
 from sysid_node.batch.regression.filtering import block_averaged
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.recursive_least_squares import sequential_fit
+from sysid_node.batch.regression.sequential import sequential_fit
 from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.flight.record import Array, FlightRecord
 

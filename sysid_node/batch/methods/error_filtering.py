@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.recursive_least_squares import recursion, sequential_fit
+from sysid_node.batch.regression.sequential import recursion, sequential_fit
 from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.flight.record import Array, FlightRecord
 

@@ -16,12 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import (
-    combined_fit,
-    regressor_matrix,
-    regressors_by_coefficient,
-    sensor_noises,
-)
+from sysid_node.batch.regression.combined_fit import combined_fit
 from sysid_node.batch.regression.errors_in_variables import ErrorsInVariables, SensorNoise
 from sysid_node.batch.regression.linear_regression import Regression, regress
 from sysid_node.batch.regression.measured_coefficients import (
@@ -30,15 +25,11 @@ from sysid_node.batch.regression.measured_coefficients import (
     measured_coefficients,
     sensitivity_to_readings,
 )
+from sysid_node.batch.regression.regressors import regressor_matrix, regressors_by_coefficient, sensor_noises
 from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.settings import DEFAULT_FREQUENCIES, Frequencies
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
-
-#: Hz: first line, step, last line.
-Frequencies = tuple[float, float, float]
-
-#: The short-period band of most aircraft; below it trim and phugoid, above it noise.
-DEFAULT_FREQUENCIES: Frequencies = (0.1, 0.04, 2.0)
 
 #: A signal that moves by no more of its size than this does not move.
 _ROUNDING = 1e-9

@@ -21,19 +21,16 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import (
-    DEFAULT_LOW_PASS,
-    combined_fit,
-    regressor_matrix,
-    regressors_by_coefficient,
-)
-from sysid_node.batch.methods.recursive_least_squares import regression_of
 from sysid_node.batch.regression.coloured_residuals import coloured_covariance
+from sysid_node.batch.regression.combined_fit import combined_fit
 from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
 from sysid_node.batch.regression.filtering import block_averaged, differentiate, lowpass
 from sysid_node.batch.regression.linear_regression import Regression
 from sysid_node.batch.regression.measured_coefficients import MeasuredCoefficients, at_cg, measured_coefficients
+from sysid_node.batch.regression.regressors import regressor_matrix, regressors_by_coefficient
+from sysid_node.batch.regression.sequential import regression_of
 from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.settings import DEFAULT_LOW_PASS
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 

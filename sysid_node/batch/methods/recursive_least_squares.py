@@ -7,29 +7,12 @@ errors are its own: honest where the residual is white, which it hardly ever is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
-import numpy as np
+from collections.abc import Sequence
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.methods.equation_error import (
-    DEFAULT_LOW_PASS,
-    combined_fit,
-    regressor_matrix,
-    regressors_by_coefficient,
-)
-from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
-from sysid_node.batch.regression.linear_regression import Regression
-from sysid_node.batch.regression.measured_coefficients import measured_coefficients
-from sysid_node.batch.results.batch_fit import BatchFit, ParameterEstimate, confidence_interval
-from sysid_node.batch.results.identifiability import UnidentifiableGroups, identifiability_status, unidentifiable_groups
+from sysid_node.batch.regression.sequential import recursion, sequential_fit
+from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.flight.record import Array, FlightRecord
-
-#: Variance of the start values over the residual's: nothing is known.
-_VAGUE = 1e8
-
-#: ``(names, y (N,), X (N, p), step s) -> values (p,), covariance (p, p)``: one pass along the flights.
-Pass = Callable[[Sequence[str], Array, Array, float], tuple[Array, Array]]
 
 
 def recursive_least_squares(aircraft: Aircraft, records: Sequence[FlightRecord], forgetting: float = 1.0) -> BatchFit:
@@ -42,63 +25,3 @@ def recursive_least_squares(aircraft: Aircraft, records: Sequence[FlightRecord],
         return recursion(y, X, forgetting, lambda error: error)
 
     return sequential_fit("recursive_least_squares", aircraft, records, along)
-
-
-def recursion(y: Array, X: Array, forgetting: float, shaped: Callable[[float], float]) -> tuple[Array, Array]:
-    """Values and covariance for a residual's variance of one; ``shaped`` makes the error that corrects of the error."""
-    values, P = np.zeros(X.shape[1]), _VAGUE * np.eye(X.shape[1])
-    for row, measured in zip(X, y, strict=True):
-        across = P @ row
-        gain = across / (forgetting + row @ across)
-        values = values + gain * shaped(float(measured - row @ values))
-        P = (P - np.outer(gain, across)) / forgetting
-        P = 0.5 * (P + P.T)
-    return values, P
-
-
-def sequential_fit(method: str, aircraft: Aircraft, records: Sequence[FlightRecord], along: Pass) -> BatchFit:
-    """All coefficients, each in one pass along the flights one after the other.
-
-    Raises InputError where the flights are too short for one: faster than the aircraft moves there is only noise.
-    """
-    flights = [measured_coefficients(aircraft, record) for record in records]
-    step = float(np.median(np.diff(flights[0].time)))
-    fits = {}
-    for coefficient, regressors in regressors_by_coefficient(aircraft, flights).items():
-        names = [f"{coefficient}_{name}" for name in regressors]
-        effective_degrees_of_freedom(names, [flight.time for flight in flights], DEFAULT_LOW_PASS)
-        Xs = [regressor_matrix(flight, regressors) for flight in flights]
-        ys = [flight.coefficients[coefficient] for flight in flights]
-        values, covariance = along(names, np.concatenate(ys), np.concatenate(Xs), step)
-        fits[coefficient] = regression_of(names, values, covariance, ys, Xs)
-    return combined_fit(method, fits, flights)
-
-
-def regression_of(
-    names: Sequence[str], values: Array, covariance: Array, ys: Sequence[Array], Xs: Sequence[Array]
-) -> Regression:
-    """The outcome of a pass; ``covariance`` (p, p) is for a residual's variance of one."""
-    modelled = [X @ values for X in Xs]
-    residual = np.concatenate([y - m for y, m in zip(ys, modelled, strict=True)])
-    noise = float(np.sqrt(np.mean(residual**2)))
-    lost = unidentifiable_groups(np.asarray(sum(X.T @ X for X in Xs)), names)
-    errors = noise * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    freedom = float(residual.size - len(names))
-    estimates = {
-        name: _estimate(name, float(value), float(error), freedom, lost)
-        for name, value, error in zip(names, values, errors, strict=True)
-    }
-    return Regression(estimates, noise**2 * covariance, modelled, noise, lost)
-
-
-def _estimate(name: str, value: float, error: float, freedom: float, lost: UnidentifiableGroups) -> ParameterEstimate:
-    status = identifiability_status(name, lost)
-    return ParameterEstimate(
-        name,
-        value,
-        error,
-        *confidence_interval(value, error, freedom),
-        status == "ok",
-        status,
-        error,
-    )

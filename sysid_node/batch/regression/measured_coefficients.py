@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, Vector3
-from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.batch.regression.filtering import differentiate
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -229,12 +228,3 @@ def _regressors(aircraft: Aircraft, s: Mapping[str, Array], lift: Array) -> dict
     }
     regressors |= {name: s[name] for name in ("alpha", "beta") if name in s}
     return regressors | {symbol: s[symbol] for symbol in aircraft.control_symbols if symbol in s}
-
-
-def formable_regressors(aircraft: Aircraft, flights: list[MeasuredCoefficients]) -> dict[str, tuple[str, ...]]:
-    """The aircraft's model as far as every flight can form it: regressors by coefficient."""
-    return {
-        name: aircraft.structure[name]
-        for name in COEFFICIENTS
-        if name in aircraft.structure and all(name in flight.coefficients for flight in flights)
-    }

@@ -10,7 +10,8 @@ from sysid_node.batch.methods.constrained_least_squares import constrained_least
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
-from sysid_node.batch.methods.recursive_least_squares import recursion, recursive_least_squares
+from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
+from sysid_node.batch.regression.sequential import recursion
 from sysid_node.errors import InputError
 
 WATCHED = ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")

@@ -15,10 +15,11 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
-from sysid_node.batch.methods.equation_error import DEFAULT_LOW_PASS, regressor_matrix, regressors_by_coefficient
 from sysid_node.batch.regression.filtering import lowpass
 from sysid_node.batch.regression.linear_regression import regress
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
+from sysid_node.batch.regression.regressors import regressor_matrix, regressors_by_coefficient
+from sysid_node.batch.settings import DEFAULT_LOW_PASS
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 

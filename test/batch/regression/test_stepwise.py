@@ -7,7 +7,7 @@ import pytest
 from made_flight import KESTREL, clean, flight
 
 from sysid_node.aircraft.model import Derivative
-from sysid_node.batch.methods.stepwise import CRITERIA, select_regressors, supported_model
+from sysid_node.batch.regression.stepwise import CRITERIA, select_regressors, supported_model
 from sysid_node.errors import InputError
 
 NAMES = ("0", "a", "b", "c", "d")
