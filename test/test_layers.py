@@ -27,7 +27,7 @@ BELOW = {
 BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["cli"] = {*BELOW["report"], "report"}
 
-#: The rooms of a layer (sub-packages, and modules beside them), lowest first: a room imports itself and those before it.
+#: The rooms of a layer (sub-packages and modules), lowest first: a room may import itself and those before it.
 ROOMS = {
     "batch": (
         "settings", "results", "regression", "models", "likelihood", "methods", "data_compatibility", "identify",
