@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from rosbags.rosbag2 import Reader
 
-from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.cdr.decode import decode
+from sysid_node.flight.bag.message_types import definitions_of, type_store
+from sysid_node.flight.cdr.decoding import decode
 from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS
 
 #: Where commands are recorded (``docs/bags.md``), and their type: that of the positions.
@@ -30,7 +30,7 @@ def read_commands(path: str | Path) -> list[JointMessage]:
         chosen = [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]
         found = [(log_ns, data) for _, log_ns, data in reader.messages(chosen)] if chosen else []
     messages = []
-    for places, fields in decode(type_store(), COMMANDS_TYPE, [data for _, data in found]):
+    for places, fields in decode(definitions_of(type_store()), COMMANDS_TYPE, [data for _, data in found]):
         seconds, fraction = (fields.numbers(f"header.stamp.{part}").tolist() for part in ("sec", "nanosec"))
         names = fields.strings("name")
         rows = zip(places.tolist(), seconds, fraction, fields.numbers("position").tolist(), strict=True)

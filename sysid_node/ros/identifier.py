@@ -22,7 +22,7 @@ from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
-from sysid_node.flight.cdr.single import SingleReader
+from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import conversion, inputs
 from sysid_node.ros.declaring import declare, refusal, values_of
@@ -108,7 +108,7 @@ class Identifier(CarefulNode):
 
         Messages come serialised: making objects of all their parts would take longer than the estimator does.
         """
-        monitor, reader = self._monitors[topic], SingleReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic])
+        monitor, reader = self._monitors[topic], MessageReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic])
 
         def on_message(raw: bytes) -> None:
             monitor.arrived()

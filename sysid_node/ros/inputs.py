@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sysid_node.flight.cdr.single import Text
+from sysid_node.flight.cdr.message_reader import Text
 from sysid_node.flight.frames import tilt_from_quaternion
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 

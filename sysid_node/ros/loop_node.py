@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
-from sysid_node.flight.cdr.single import SingleReader
+from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.ros import conversion, inputs
 from sysid_node.ros.declaring import declare, values_of
 from sysid_node.ros.inputs import Fields, Numbers, Texts
@@ -76,7 +76,7 @@ class LoopNode(Node, ABC):
 
         Making objects of all their parts would take longer than what is done with them.
         """
-        reader = SingleReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *fields)
+        reader = MessageReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *fields)
 
         def on_message(raw: bytes) -> None:
             try:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from rosbags.typesys.store import Typestore
 
 from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
@@ -52,3 +55,8 @@ def made_streams(seconds: float = 2.0, seed: int = 0, start_s: float = 100.0) ->
         JointStream(joints, JOINTS, np.column_stack([rng.random(len(joints)), rng.normal(0, 0.1, (len(joints), 5))])),
         "made flight",
     )
+
+
+def header(store: Typestore, frame_id: str) -> Any:
+    """A std_msgs/Header with a stamp of zero, as rosbags has it."""
+    return store.types["std_msgs/msg/Header"](store.types["builtin_interfaces/msg/Time"](0, 0), frame_id)

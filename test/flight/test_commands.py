@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
-from made_flights import made_streams
+from made_flights import header, made_streams
 
 from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.bag.writer import add_topic, header, new_bag, write_streams
+from sysid_node.flight.bag.writer import add_topic, new_bag, write_streams
 from sysid_node.flight.commands import COMMANDS, COMMANDS_TYPE, JointMessage, read_commands
 
 TOLD = [

@@ -9,7 +9,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from sysid_msgs.msg import AirData
 
-from sysid_node.flight.cdr.single import SingleReader
+from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.ros import inputs
 from sysid_node.ros.conversion import axes_sign, stamp_message
@@ -20,7 +20,7 @@ FRAMES = ("", "imu", "a/frame/of/another/length")
 
 
 def read(topic: str, message: object) -> tuple[inputs.Numbers, inputs.Texts]:
-    return SingleReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic]).read(serialize_message(message))
+    return MessageReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic]).read(serialize_message(message))
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -54,7 +54,7 @@ def test_attitude(frame: str) -> None:
         linear_acceleration=Vector3(z=9.8),
         angular_velocity=Vector3(x=0.1),
     )
-    reader = SingleReader(fields_of, INPUT_TOPICS[IMU], *inputs.ATTITUDE_FIELDS)
+    reader = MessageReader(fields_of, INPUT_TOPICS[IMU], *inputs.ATTITUDE_FIELDS)
     stamp, values, (roll, pitch) = inputs.imu_and_attitude(reader.read(serialize_message(message))[0])
     assert (stamp, values) == (STAMP, (0.0, 0.0, -9.8, 0.1, 0.0, 0.0))
     assert (roll, pitch) == pytest.approx((0.0, 0.2), abs=1e-12)

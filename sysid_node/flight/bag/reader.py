@@ -1,4 +1,4 @@
-"""Bags to streams: rosbag2 recordings (sqlite3 and mcap), read through rosbags without ROS."""
+"""Reads rosbag2 recordings, sqlite3 or mcap, as streams, through rosbags and without ROS."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 
 from sysid_node.errors import InputError
-from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.bag.raw_messages import Messages, read_messages
-from sysid_node.flight.cdr.decode import Fields, decode
+from sysid_node.flight.bag.message_types import definitions_of, type_store
+from sysid_node.flight.bag.raw_messages import RawMessages, read_messages
+from sysid_node.flight.cdr.decoding import DecodedMessages, decode
 from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Stamps, Streams
@@ -33,17 +33,17 @@ def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, fram
     a topic.
     """
     path, topics = Path(path), topics or topic_names()
-    said = f"bag {path.name}"
+    name = f"bag {path.name}"
     with open_bag(path) as reader, reading(path):
-        raw = _read_messages(reader, topics, said)
+        raw = _read_messages(reader, topics, name)
         return Streams(
-            _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA]), _joint_stream(raw[ACTUATORS]), said
+            _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA]), _joint_stream(raw[ACTUATORS]), name
         )
 
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Reader]:
-    """A bag, open for reading. Raises InputError where it is missing, empty or damaged; see ``reading``."""
+    """A bag that is open for reading. Raises InputError where it is missing, empty or damaged; see ``reading``."""
     with ExitStack() as stack:
         with reading(path):
             reader = stack.enter_context(Reader(path))
@@ -54,16 +54,15 @@ def open_bag(path: Path) -> Iterator[Reader]:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turns what goes wrong in reading a bag into an InputError: one line with a remedy."""
-    said = f"bag {path.name}"
+    """A context in which every error in reading a bag becomes an InputError: one line, with a remedy."""
     try:
         yield
     except InputError:
         raise
     except FileNotFoundError as error:
-        raise InputError(f"{said}: {_not_found(path)}") from error
+        raise InputError(f"bag {path.name}: {_not_found(path)}") from error
     except Exception as error:  # a damaged file makes its parsers fail in any way there is
-        raise InputError(f"{said}: cannot be read: {_one_line(error)}; {_remedy(path)}") from error
+        raise InputError(f"bag {path.name}: cannot be read: {_one_line(error)}; {_remedy(path)}") from error
 
 
 def _not_found(path: Path) -> str:
@@ -85,54 +84,54 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _read_messages(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, Messages]:
+def _read_messages(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, RawMessages]:
     """The bytes of all messages of the input topics."""
-    messages = read_messages(reader, _choose(reader, topics, said))
-    for topic, some in messages.items():
-        if not some.data:
-            raise InputError(f"{said}: no messages on {topics[topic]}; record that topic too")
+    messages = read_messages(reader, _choose(reader, topics, bag))
+    for topic, raw in messages.items():
+        if not raw.data:
+            raise InputError(f"{bag}: no messages on {topics[topic]}; record that topic too")
     return messages
 
 
-def _choose(reader: Reader, topics: Mapping[str, str], said: str) -> dict[str, list[Connection]]:
+def _choose(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, list[Connection]]:
     """The connections of each input topic. Raises InputError where one is missing or of another type."""
-    there = {name: {c.msgtype for c in info.connections} for name, info in reader.topics.items()}
+    recorded = {name: {c.msgtype for c in info.connections} for name, info in reader.topics.items()}
     for topic, name in topics.items():
         wanted = INPUT_TOPICS[topic]
-        if name not in there:
-            present = ", ".join(f"{other} ({'/'.join(sorted(types))})" for other, types in there.items())
-            alike = [other for other, types in there.items() if wanted in types and other not in topics.values()]
+        if name not in recorded:
+            present = ", ".join(f"{other} ({'/'.join(sorted(types))})" for other, types in recorded.items())
+            alike = [other for other, types in recorded.items() if wanted in types and other not in topics.values()]
             example = f"--topic {topic}:={alike[0] if alike else '/its/name'}"
-            raise InputError(f"{said}: no topic {name} ({wanted}); it has {present}; if it is one of these: {example}")
-        if there[name] != {wanted}:
-            raise InputError(f"{said}: topic {name} is {'/'.join(sorted(there[name]))}, expected {wanted}")
+            raise InputError(f"{bag}: no topic {name} ({wanted}); it has {present}; if it is one of these: {example}")
+        if recorded[name] != {wanted}:
+            raise InputError(f"{bag}: topic {name} is {'/'.join(sorted(recorded[name]))}, expected {wanted}")
         known = type_store().hash_rihs01(wanted)
         if any(c.topic == name and c.digest not in {"", known} for c in reader.connections):
-            raise InputError(f"{said}: topic {name} was recorded with another definition of {wanted}; use that version")
+            raise InputError(f"{bag}: topic {name} was recorded with another definition of {wanted}; use that version")
     return {topic: [c for c in reader.connections if c.topic == name] for topic, name in topics.items()}
 
 
-def _arrival(raw: Messages, stamp_ns: Stamps) -> Arrival:
+def _arrival(raw: RawMessages, stamp_ns: Stamps) -> Arrival:
     return Arrival(stamp_ns, raw.log_ns, raw.order)
 
 
-def _stamps(fields: Fields) -> Stamps:
+def _stamps(fields: DecodedMessages) -> Stamps:
     """Header stamps, ns."""
     seconds = fields.numbers("header.stamp.sec").astype(np.int64)
     nanoseconds: Stamps = seconds * 1_000_000_000 + fields.numbers("header.stamp.nanosec")
     return nanoseconds
 
 
-def _columns(fields: Fields, *paths: str) -> Array:
+def _columns(fields: DecodedMessages, *paths: str) -> Array:
     """Numbers at several paths, side by side (n, len(paths))."""
     return np.column_stack([fields.numbers(path) for path in paths]).astype(np.float64, copy=False)
 
 
-def _imu_stream(raw: Messages, frame: BodyFrame) -> ImuStream:
+def _imu_stream(raw: RawMessages, frame: BodyFrame) -> ImuStream:
     count = len(raw.data)
     stamps, values, attitude = np.empty(count, np.int64), np.empty((count, 6)), np.empty((count, 3))
     frame_id = ""
-    for at, fields in decode(type_store(), INPUT_TOPICS[IMU], raw.data):
+    for at, fields in decode(definitions_of(type_store()), INPUT_TOPICS[IMU], raw.data):
         stamps[at] = _stamps(fields)
         force = _columns(fields, *(f"linear_acceleration.{axis}" for axis in "xyz"))
         rates = _columns(fields, *(f"angular_velocity.{axis}" for axis in "xyz"))
@@ -142,8 +141,8 @@ def _imu_stream(raw: Messages, frame: BodyFrame) -> ImuStream:
     return ImuStream(_arrival(raw, stamps), values, attitude, frame_id)
 
 
-def _attitude(fields: Fields, frame: BodyFrame) -> Array:
-    """Euler angles; NaN where the message says (sensor_msgs/Imu) or shows that there is no orientation."""
+def _attitude(fields: DecodedMessages, frame: BodyFrame) -> Array:
+    """Euler angles (n, 3) rad; NaN where the covariance (sensor_msgs/Imu) or the quaternion marks them unknown."""
     euler = euler_from_quaternion(_columns(fields, *(f"orientation.{axis}" for axis in "xyzw")), frame)
     covariance = fields.numbers("orientation_covariance")
     euler[covariance[:, 0] == -1.0] = np.nan
@@ -151,24 +150,24 @@ def _attitude(fields: Fields, frame: BodyFrame) -> Array:
     return euler
 
 
-def _air_data_stream(raw: Messages) -> AirDataStream:
+def _air_data_stream(raw: RawMessages) -> AirDataStream:
     stamps, values = np.empty(len(raw.data), np.int64), np.empty((len(raw.data), 4))
-    for at, fields in decode(type_store(), INPUT_TOPICS[AIR_DATA], raw.data):
+    for at, fields in decode(definitions_of(type_store()), INPUT_TOPICS[AIR_DATA], raw.data):
         stamps[at] = _stamps(fields)
         values[at] = _columns(fields, "true_airspeed", "angle_of_attack", "sideslip", "air_density")
     return AirDataStream(_arrival(raw, stamps), values)
 
 
-def _joint_stream(raw: Messages) -> JointStream:
+def _joint_stream(raw: RawMessages) -> JointStream:
     stamps = np.empty(len(raw.data), np.int64)
     parts: list[tuple[NDArray[np.intp], Sequence[str], NDArray[Any]]] = []
-    for at, fields in decode(type_store(), INPUT_TOPICS[ACTUATORS], raw.data):
+    for at, fields in decode(definitions_of(type_store()), INPUT_TOPICS[ACTUATORS], raw.data):
         stamps[at] = _stamps(fields)
         parts.append((at, fields.strings("name"), fields.numbers("position")))
-    names = tuple(dict.fromkeys(name for _, some, _ in parts for name in some))
+    names = tuple(dict.fromkeys(name for _, part_names, _ in parts for name in part_names))
     positions = np.full((len(raw.data), len(names)), np.nan)
-    for at, some, values in parts:
-        # Of a name given twice the first counts; a name without a position stays NaN.
-        for i in reversed(range(min(len(some), values.shape[1]))):
-            positions[at, names.index(some[i])] = values[:, i]
+    for at, part_names, values in parts:
+        # The first position of a name that is given twice counts; a name without a position stays NaN.
+        for i in reversed(range(min(len(part_names), values.shape[1]))):
+            positions[at, names.index(part_names[i])] = values[:, i]
     return JointStream(_arrival(raw, stamps), names, positions)

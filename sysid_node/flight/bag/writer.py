@@ -1,24 +1,22 @@
-"""Streams and estimates to bags: rosbag2, sqlite3 or mcap, written through rosbags without ROS."""
+"""Writes streams as rosbag2 recordings, sqlite3 or mcap, through rosbags and without ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
-from rosbags.typesys.store import Typestore
 
 from sysid_node.errors import InputError
-from sysid_node.flight.bag.message_types import message_layout, type_store
+from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.reader import HEADING_UNKNOWN
-from sysid_node.flight.cdr.decode import encode
+from sysid_node.flight.cdr.template import Templates, Values
 from sysid_node.flight.frames import BodyFrame, quaternion_from_euler, turn_vectors
-from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Stamps, Stream, Streams
+from sysid_node.flight.record import Array
+from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Stream, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
 STORAGES: Mapping[str, StoragePlugin] = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
@@ -26,7 +24,7 @@ STORAGES: Mapping[str, StoragePlugin] = {"mcap": StoragePlugin.MCAP, "sqlite3": 
 
 @contextmanager
 def new_bag(path: str | Path, storage: str = "mcap") -> Iterator[Writer]:
-    """A bag to write: a folder that does not exist yet. Raises InputError where it does or cannot be made."""
+    """A bag to write: a folder that does not exist yet. Raises InputError where it exists or cannot be made."""
     if storage not in STORAGES:
         raise InputError(f"storage {storage!r}: expected {' or '.join(STORAGES)}")
     try:
@@ -39,25 +37,25 @@ def new_bag(path: str | Path, storage: str = "mcap") -> Iterator[Writer]:
 
 
 def write_streams(path: str | Path, streams: Streams, storage: str = "mcap", frame: BodyFrame = "flu") -> None:
-    """A bag of the three input topics, in log order; ``frame`` is that of its IMU messages.
+    """Write a bag of the three input topics, in log order; ``frame`` is that of its IMU messages.
 
     Raises InputError where the bag exists or cannot be written.
     """
-    store, topics = type_store(), topic_names()
+    topics = topic_names()
     messages = {
-        IMU: _imu_messages(store, streams.imu, frame),
-        AIR_DATA: _air_data_messages(store, streams.air_data),
-        ACTUATORS: _joint_messages(store, streams.actuators),
+        IMU: imu_messages(streams.imu, frame),
+        AIR_DATA: air_data_messages(streams.air_data),
+        ACTUATORS: joint_messages(streams.actuators),
     }
     with new_bag(path, storage) as writer:
-        into = {topic: add_topic(writer, topics[topic], INPUT_TOPICS[topic]) for topic in messages}
-        every = (
+        connections = {topic: add_topic(writer, topics[topic], INPUT_TOPICS[topic]) for topic in messages}
+        recorded = (
             (int(order), int(log_ns), topic, data)
             for topic, stream in streams.by_topic.items()
             for order, log_ns, data in zip(stream.arrival.order, stream.arrival.log_ns, messages[topic], strict=True)
         )
-        for _, log_ns, topic, data in sorted(every, key=lambda message: message[0]):
-            writer.write(into[topic], log_ns, data)
+        for _, log_ns, topic, data in sorted(recorded, key=lambda message: message[0]):
+            writer.write(connections[topic], log_ns, data)
 
 
 def add_topic(writer: Writer, topic: str, msgtype: str) -> Connection:
@@ -65,52 +63,38 @@ def add_topic(writer: Writer, topic: str, msgtype: str) -> Connection:
     return writer.add_connection(topic, msgtype, typestore=type_store())
 
 
-def header(store: Typestore, frame_id: str) -> Any:
-    """A std_msgs/Header without a stamp."""
-    time = store.types["builtin_interfaces/msg/Time"](0, 0)
-    return store.types["std_msgs/msg/Header"](time, frame_id)
-
-
-def stamp_columns(stamps: Stamps) -> dict[str, NDArray[Any]]:
-    """The header's columns."""
-    return {"header.stamp.sec": stamps // 1_000_000_000, "header.stamp.nanosec": stamps % 1_000_000_000}
-
-
-def _encode(store: Typestore, msgtype: str, template: Any, stream: Stream, columns: Mapping[str, Any]) -> list[bytes]:
-    layout = message_layout(store, msgtype, template)
-    return encode(layout, {**stamp_columns(stream.arrival.stamp_ns), **columns}, len(stream.arrival))
-
-
-def _imu_messages(store: Typestore, stream: ImuStream, frame: BodyFrame) -> list[bytes]:
-    """sensor_msgs/Imu: no orientation where roll or pitch are not known; a great variance where the heading is not."""
-    msgtype, types = INPUT_TOPICS[IMU], store.types
-    vector, quaternion = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
-    none = np.zeros(9)
-    template = types[msgtype](
-        header(store, stream.frame_id), quaternion(0, 0, 0, 1), none, vector(0, 0, 0), none, vector(0, 0, 0), none
-    )
+def imu_messages(stream: ImuStream, frame: BodyFrame) -> list[bytes]:
+    """sensor_msgs/Imu: no orientation where roll or pitch is unknown, a large variance where the heading is unknown."""
     known = np.isfinite(stream.attitude)
     rotation = quaternion_from_euler(np.where(known, stream.attitude, 0.0), frame)
-    covariance = np.zeros((len(stream.arrival), 9))
+    no_covariance = np.zeros((len(stream.arrival), 9))
+    covariance = no_covariance.copy()
     covariance[~known[:, 2], 8] = 10.0 * HEADING_UNKNOWN
     absent = ~known[:, :2].all(axis=1)
     rotation[absent] = 0.0
     covariance[absent, 0] = -1.0
-    columns = {"orientation_covariance": covariance}
-    columns |= {f"orientation.{axis}": rotation[:, i] for i, axis in enumerate("xyzw")}
-    for name, vectors in (("linear_acceleration", stream.values[:, :3]), ("angular_velocity", stream.values[:, 3:])):
-        columns |= {f"{name}.{axis}": turn_vectors(vectors, frame)[:, i] for i, axis in enumerate("xyz")}
-    return _encode(store, msgtype, template, stream, columns)
+    force, rates = (turn_vectors(vectors, frame) for vectors in (stream.values[:, :3], stream.values[:, 3:]))
+    columns = np.hstack([rotation, covariance, rates, no_covariance, force, no_covariance])
+    vector, matrix = (0.0,) * 3, (0.0,) * 9
+    body = ((0.0,) * 4, matrix, vector, matrix, vector, matrix)
+    return _stamped(IMU, stream, stream.frame_id, body, columns)
 
 
-def _air_data_messages(store: Typestore, stream: AirDataStream) -> list[bytes]:
-    msgtype = INPUT_TOPICS[AIR_DATA]
-    names = ("true_airspeed", "angle_of_attack", "sideslip", "air_density")
-    template = store.types[msgtype](header(store, "air_data"), 0.0, 0.0, 0.0, 0.0)
-    return _encode(store, msgtype, template, stream, dict(zip(names, stream.values.T, strict=True)))
+def air_data_messages(stream: AirDataStream) -> list[bytes]:
+    """sysid_msgs/AirData."""
+    return _stamped(AIR_DATA, stream, "air_data", (0.0,) * 4, stream.values)
 
 
-def _joint_messages(store: Typestore, stream: JointStream) -> list[bytes]:
-    msgtype, none = INPUT_TOPICS[ACTUATORS], np.zeros(0)
-    template = store.types[msgtype](header(store, ""), list(stream.names), np.zeros(len(stream.names)), none, none)
-    return _encode(store, msgtype, template, stream, {"position": stream.positions})
+def joint_messages(stream: JointStream) -> list[bytes]:
+    """sensor_msgs/JointState with positions alone."""
+    return _stamped(ACTUATORS, stream, "", (stream.names, (0.0,) * len(stream.names), (), ()), stream.positions)
+
+
+def _stamped(topic: str, stream: Stream, frame_id: str, body: Values, columns: Array) -> list[bytes]:
+    """N messages of an input topic: a header, then ``body``, whose float64 numbers are the rows of ``columns``."""
+    templates = Templates(definitions_of(type_store()))
+    template = templates.template(INPUT_TOPICS[topic], (((0, 0), frame_id), *body))
+    seconds, nanoseconds = np.divmod(stream.arrival.stamp_ns[:, np.newaxis], 1_000_000_000)
+    if not columns.shape[1]:
+        return template.write(i4=seconds, u4=nanoseconds)
+    return template.write(i4=seconds, u4=nanoseconds, f8=columns)

@@ -1,6 +1,11 @@
-"""CDR: serialised ROS messages to numbers and back.
+"""Serialised ROS messages (CDR) to numbers and back, without ROS and without an object for each part of a message.
 
-``layout`` works out where each number of a message type lies, ``decode`` reads thousands of messages at once,
-``single`` one at a time in flight. ``template`` writes messages whose strings are known in advance. ``bag`` and the
-nodes use these.
+``layout`` finds where the numbers of a message lie. ``decoding`` reads all messages of a recording at once as columns,
+``message_reader`` reads single messages in flight; both apply a layout. ``template`` writes messages, one or thousands,
+in flight and into bags.
+
+Measured by ``bench/read.py`` (240,000 messages, one core): to decode a bag as columns takes a fifth of the time of
+rosbags' own deserialisation message by message, and half of that of ``message_reader`` message by message. In flight
+``message_reader`` reads an IMU message in 0.02 of the time of rclpy's deserialisation, and a template writes a message
+of estimates in 0.2 of the time of rclpy's objects and serialisation.
 """

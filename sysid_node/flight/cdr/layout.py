@@ -1,7 +1,8 @@
-"""Where a serialised message's numbers lie (OMG CDR, XCDR1), worked out along the definition of its type.
+"""Where the numbers of a serialised message lie, found by a walk along the definition of its type.
 
-A message begins with an encapsulation of 4 bytes; every number is aligned to its own size. Its strings and the lengths
-of its sequences alone decide how it is laid out.
+The format is CDR (OMG Common Data Representation, plain CDR version 1, as in DDS-XTypes 1.3, section 7.4.3): 4 bytes of
+encapsulation, then the fields in order, every number aligned to its own size. The strings and the lengths of the
+sequences alone decide where the numbers lie, so that messages that agree in those bytes have one layout.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from numpy.typing import NDArray
 
 
 class DamageError(ValueError):
-    """Bytes that are no whole message of the type."""
+    """Raised where bytes are not a whole message of the expected type."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number by NumPy's code: f8, i4, u1."""
+    """A number, by NumPy's code: f8, i4, u1."""
 
     code: str
 
@@ -56,8 +57,8 @@ NUMBERS: Mapping[str, Number] = {
 }
 
 
-#: What ``struct`` calls the numbers that NumPy calls so.
-CODES: Mapping[str, str] = {
+#: NumPy's codes of numbers -> those of the standard library's ``struct``.
+STRUCT_CODES: Mapping[str, str] = {
     **{"f8": "d", "i8": "q", "u8": "Q"},
     **{"f4": "f", "i4": "i", "u4": "I"},
     **{"i2": "h", "u2": "H", "i1": "b", "u1": "B"},
@@ -66,15 +67,19 @@ CODES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Layout:
-    """The places of a message's numbers, by dotted path: ``header.stamp.sec``, ``derivatives.3.value``."""
+    """Where a message's numbers lie, by dotted path: ``header.stamp.sec``, ``derivatives.3.value``."""
 
-    template: bytes
+    template: bytes  # the message that the layout was found in
     dtype: np.dtype[Any]  # structured; arrays and sequences of numbers are subarrays
-    strings: Mapping[str, str]  # by dotted path
+    strings: Mapping[str, str]  # by dotted path; those of a sequence by its path and their place: ``name.0``
     fixed: NDArray[np.intp]  # positions of the bytes that decide the layout
 
+    def texts(self, path: str) -> tuple[str, ...]:
+        """The string, or all strings of the sequence, at a path."""
+        return tuple(text for at, text in self.strings.items() if at == path or at.startswith(f"{path}."))
+
     def matches(self, block: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Which of the messages (N, length) are laid out like this one, and hold the same strings."""
+        """Which of the messages (N, length) have this layout and the same strings: (N,)."""
         wanted = np.frombuffer(self.template, np.uint8)[self.fixed]
         same: NDArray[np.bool_] = (block[:, self.fixed] == wanted).all(axis=1)
         return same
@@ -83,7 +88,7 @@ class Layout:
 def layout_of(definitions: Definitions, msgtype: str, raw: bytes, spare: bool = False) -> Layout:
     """The layout of one message. Raises DamageError where it is no whole message of the type.
 
-    ``spare``: bytes may follow that mean nothing, as in a buffer that was larger than the message; they are left out.
+    ``spare``: ignore bytes after the message's end, as a buffer that is larger than the message has.
     """
     if len(raw) < 4 or raw[0] != 0 or raw[1] not in {0, 1}:
         raise DamageError(f"{msgtype}: not a CDR message")
@@ -103,7 +108,7 @@ def layout_of(definitions: Definitions, msgtype: str, raw: bytes, spare: bool = 
 
 @dataclass
 class _Walk:
-    """A walk through one message along its definition."""
+    """The state of a walk through one message along its definition."""
 
     definitions: Definitions
     raw: bytes
@@ -153,7 +158,7 @@ class _Walk:
         return self.raw[start : start + max(count - 1, 0)].decode()
 
     def length(self) -> int:
-        """The length that stands before a string or a sequence."""
+        """The length that precedes a string or a sequence."""
         self.align(4)
         start = self.position
         self.skip(4)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sysid_node.faults.recorded_flight import Said
-from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.writer import add_topic, new_bag
-from sysid_node.flight.cdr.decode import definitions_of
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE
 from sysid_node.online.types import Estimates

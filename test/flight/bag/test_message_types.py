@@ -28,19 +28,16 @@ def test_every_msg_file_is_a_type_with_its_fields():
 def test_found_where_the_package_is_installed(tmp_path, monkeypatch):
     share = tmp_path / "share" / "sysid_msgs" / "msg"
     shutil.copytree(SOURCE, share)
-    monkeypatch.setattr(
-        message_types, "__file__", str(tmp_path / "site-packages/sysid_node/flight/bag/message_types.py")
-    )
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
-    assert message_types.message_folder() == share
+    installed = tmp_path / "site-packages/sysid_node/flight/bag/message_types.py"
+    assert message_types.message_folder(installed) == share
 
 
 def test_not_found_says_what_to_build(tmp_path, monkeypatch):
-    monkeypatch.setattr(message_types, "__file__", str(tmp_path / "a/b/c/messages.py"))
     monkeypatch.setenv("AMENT_PREFIX_PATH", "")
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     with pytest.raises(InputError, match=r"sysid_msgs.*build"):
-        message_types.message_folder()
+        message_types.message_folder(tmp_path / "a/b/c/messages.py")
 
 
 def test_types_are_those_that_ros_itself_generated():

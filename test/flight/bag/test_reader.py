@@ -5,15 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_flights import JOINTS, made_streams
+from made_flights import JOINTS, header, made_streams
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from sysid_node.errors import InputError
-from sysid_node.flight.bag import writer as bag_writer
 from sysid_node.flight.bag.message_types import type_store
 from sysid_node.flight.bag.reader import read_streams
-from sysid_node.flight.bag.writer import add_topic, header, new_bag, write_streams
+from sysid_node.flight.bag.writer import add_topic, air_data_messages, imu_messages, new_bag, write_streams
 from sysid_node.flight.streams import Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
@@ -112,8 +111,8 @@ def test_joints_that_come_and_go(tmp_path, streams):
     vector = np.array([0.1, 0.2])
     with new_bag(tmp_path / "flight") as writer:
         for topic, messages in (
-            (IMU, bag_writer._imu_messages(STORE, streams.imu, "flu")),
-            (AIR_DATA, bag_writer._air_data_messages(STORE, streams.air_data)),
+            (IMU, imu_messages(streams.imu, "flu")),
+            (AIR_DATA, air_data_messages(streams.air_data)),
         ):
             put(writer, topic, messages)
         connection = add_topic(writer, "/actuators", INPUT_TOPICS[ACTUATORS])
@@ -214,7 +213,7 @@ def test_topic_without_messages(tmp_path, streams):
     with new_bag(tmp_path / "flight") as writer:
         for topic in (IMU, ACTUATORS):
             add_topic(writer, f"/{topic}", INPUT_TOPICS[topic])
-        messages = bag_writer._air_data_messages(STORE, streams.air_data)
+        messages = air_data_messages(streams.air_data)
         put(writer, AIR_DATA, messages)
     assert "no messages on /imu/data" in error_of(tmp_path / "flight")
 

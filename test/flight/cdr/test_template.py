@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.cdr.decode import definitions_of
+from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.cdr.template import Templates
 from sysid_node.flight.topics import DERIVATIVES_TYPE
 

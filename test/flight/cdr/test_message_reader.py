@@ -5,10 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.cdr.decode import definitions_of
+from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.cdr.layout import DamageError
-from sysid_node.flight.cdr.single import SingleReader
+from sysid_node.flight.cdr.message_reader import MessageReader
 
 STORE = type_store()
 FIELDS = definitions_of(STORE)
@@ -24,7 +23,7 @@ def joints(names: list[str], positions: list[float], seconds: int = 7, big: bool
 
 
 def test_numbers_and_strings_are_those_that_were_written() -> None:
-    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"), ("name", "header.frame_id"))
+    reader = MessageReader(FIELDS, JOINTS, (*STAMP, "position"), ("name", "header.frame_id"))
     for seconds, names in ((1, ["elevator", "aileron"]), (2, ["a", "throttle"]), (3, ["elevator", "aileron"]), (4, [])):
         positions = [0.125 * seconds, -1e-300][: len(names)]
         numbers, strings = reader.read(joints(names, positions, seconds))
@@ -33,7 +32,7 @@ def test_numbers_and_strings_are_those_that_were_written() -> None:
 
 
 def test_other_byte_orders_and_more_layouts_than_are_remembered() -> None:
-    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"), ("name",))
+    reader = MessageReader(FIELDS, JOINTS, (*STAMP, "position"), ("name",))
     for i in range(60):
         names = [f"{'x' * (i % 25)}{i % 20}", "rudder"]
         numbers, strings = reader.read(joints(names, [i, -i], i, big=i % 3 == 0))
@@ -42,7 +41,7 @@ def test_other_byte_orders_and_more_layouts_than_are_remembered() -> None:
 
 @pytest.mark.parametrize("spoil", [lambda raw: raw[:-9], lambda raw: b"", lambda raw: b"\1" + raw])
 def test_what_is_no_whole_message_is_refused(spoil: Callable[[bytes], bytes]) -> None:
-    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"))
+    reader = MessageReader(FIELDS, JOINTS, (*STAMP, "position"))
     raw = joints(["elevator"], [0.5])
     reader.read(raw)
     with pytest.raises(DamageError):
@@ -51,6 +50,6 @@ def test_what_is_no_whole_message_is_refused(spoil: Callable[[bytes], bytes]) ->
 
 def test_bytes_behind_a_message_mean_nothing() -> None:
     """ROS serialises into buffers that may be larger than the message."""
-    reader = SingleReader(FIELDS, JOINTS, (*STAMP, "position"))
+    reader = MessageReader(FIELDS, JOINTS, (*STAMP, "position"))
     for extra in (b"", b"\1" * 8, b"\2" * 3):
         assert reader.read(joints(["elevator"], [0.5]) + extra)[0] == (7, 250, 0.5)

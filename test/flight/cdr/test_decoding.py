@@ -1,4 +1,4 @@
-"""CDR in bulk against rosbags' serialiser, message by message."""
+"""Messages decoded together. Truth: rosbags' own serialisation, message by message."""
 
 from operator import attrgetter
 
@@ -7,25 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.cdr.decode import decode, definitions_of, encode
-from sysid_node.flight.cdr.layout import DamageError, layout_of
+from sysid_node.flight.bag.message_types import definitions_of, type_store
+from sysid_node.flight.cdr.decoding import decode
+from sysid_node.flight.cdr.layout import DamageError
 
 JOINTS = "sensor_msgs/msg/JointState"
-ESTIMATES = "sysid_msgs/msg/DerivativeEstimates"
 STORE = type_store()
+DEFINITIONS = definitions_of(STORE)
 
 
 def joint_state(sec, frame, names, *arrays):
     header = STORE.types["std_msgs/msg/Header"](STORE.types["builtin_interfaces/msg/Time"](sec, 7), frame)
     return STORE.types[JOINTS](header, names, *(np.array(values, np.float64) for values in arrays))
-
-
-def estimates(names, values):
-    derivative, fit = STORE.types["sysid_msgs/msg/DerivativeEstimate"], STORE.types["sysid_msgs/msg/FitQuality"]
-    header = STORE.types["std_msgs/msg/Header"](STORE.types["builtin_interfaces/msg/Time"](1, 2), "imu")
-    derivatives = [derivative(n, v, 0.1, v - 0.2, v + 0.2, True, "ok") for n, v in zip(names, values, strict=True)]
-    return STORE.types[ESTIMATES](header, "made", "sls_rft", derivatives, [fit("Cm", 0.9, 0.01, 30.0, 99)])
 
 
 def raw_of(message, msgtype, little_endian=True):
@@ -42,7 +35,7 @@ joint_states = st.builds(joint_state, st.integers(-(2**31), 2**31 - 1), st.text(
 def test_decodes_what_rosbags_wrote_whatever_the_layouts(messages):
     raw = [raw_of(message, JOINTS, little) for message, little in messages]
     seen = []
-    for at, fields in decode(STORE, JOINTS, raw):
+    for at, fields in decode(DEFINITIONS, JOINTS, raw):
         for i, place in enumerate(at):
             message, _ = messages[place]
             seen.append(place)
@@ -53,28 +46,10 @@ def test_decodes_what_rosbags_wrote_whatever_the_layouts(messages):
     assert sorted(seen) == list(range(len(messages)))
 
 
-@settings(max_examples=40, deadline=None)
-@given(names.filter(bool), st.data())
-def test_encodes_what_rosbags_reads(derivatives, data):
-    count = data.draw(st.integers(1, 5))
-    values = np.array(data.draw(st.lists(st.floats(allow_nan=False), min_size=count, max_size=count)))
-    template = layout_of(
-        definitions_of(STORE), ESTIMATES, raw_of(estimates(derivatives, [0.0] * len(derivatives)), ESTIMATES)
-    )
-    last = len(derivatives) - 1
-    columns = {f"derivatives.{last}.value": values, "fits.0.samples": np.arange(count)}
-    for i, raw in enumerate(encode(template, columns, count)):
-        message = STORE.deserialize_cdr(raw, ESTIMATES)
-        assert message.derivatives[last].value == values[i]
-        assert message.fits[0].samples == i
-        assert [d.name for d in message.derivatives] == derivatives
-        assert message.fits[0].degrees_of_freedom == 30.0
-
-
 def test_more_layouts_than_are_looked_for_are_still_read():
     raw = [raw_of(joint_state(i, f"{i:04d}", ["a"], [float(i)], [], []), JOINTS) for i in range(60)]
     positions = np.empty(60)
-    groups = list(decode(STORE, JOINTS, raw))
+    groups = list(decode(DEFINITIONS, JOINTS, raw))
     for at, fields in groups:
         positions[at] = fields.numbers("position")[:, 0]
     assert positions.tolist() == list(range(60))
@@ -83,7 +58,7 @@ def test_more_layouts_than_are_looked_for_are_still_read():
 
 def test_one_group_where_the_layout_is_fixed():
     raw = [raw_of(joint_state(i, "x", ["a", "b"], [i, -i], [], []), JOINTS) for i in range(500)]
-    ((at, fields),) = decode(STORE, JOINTS, raw)
+    ((at, fields),) = decode(DEFINITIONS, JOINTS, raw)
     assert at.size == 500
     assert fields.numbers("position")[:, 1].tolist() == [-float(i) for i in range(500)]
 
@@ -92,11 +67,11 @@ def test_one_group_where_the_layout_is_fixed():
 def test_a_message_cut_short_is_damaged(cut):
     raw = raw_of(joint_state(1, "x", ["a", "b"], [1, 2], [], [3, 4]), JOINTS)
     with pytest.raises(DamageError):
-        list(decode(STORE, JOINTS, [raw[:cut]]))
+        list(decode(DEFINITIONS, JOINTS, [raw[:cut]]))
 
 
 def test_a_length_beyond_the_message_is_damage():
     raw = bytearray(raw_of(joint_state(1, "x", ["a"], [1], [], []), JOINTS))
     raw[12:16] = b"\xff\xff\xff\x7f"
     with pytest.raises(DamageError):
-        list(decode(STORE, JOINTS, [bytes(raw)]))
+        list(decode(DEFINITIONS, JOINTS, [bytes(raw)]))
