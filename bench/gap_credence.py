@@ -21,7 +21,7 @@ from scipy.optimize import minimize
 from withheld import ledger
 from withheld.scoreboard import calibration
 
-from sysid_node.gap.selection.calibration import Grounds
+from sysid_node.gap.selection.calibration import CauseEvidence
 from sysid_node.gap.thresholds import THRESHOLDS
 
 Array = NDArray[np.float64]
@@ -35,20 +35,24 @@ def main() -> None:
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     known = [row for text in args.sets for row in causes(text)]
-    found = [row for row in known if not row[1].refuted]
+    found = [row for row in known if not row[1].misspecified]
     X = np.array([grounds.regressors for _, grounds, _ in found])
     right = np.array([there for _, _, there in found], float)
-    refuted = [there for _, grounds, there in known if grounds.refuted]
+    refuted = [there for _, grounds, there in known if grounds.misspecified]
     publish("bench/gap_credence.py", page([case for case, _, _ in found], X, right, refuted), args.page)
 
 
-def causes(text: str) -> Iterator[tuple[str, Grounds, bool]]:
+def causes(text: str) -> Iterator[tuple[str, CauseEvidence, bool]]:
     """Case, grounds, and whether it was there, of every cause of a ledger."""
     name, _, seeds = text.partition(":")
     first, last = (int(part) for part in seeds.split("-")) if seeds else (0, 10**9)
     for seed, (effect, nats, misfit, there) in ledger.causes(Path(name)):
         if first <= seed <= last:
-            yield f"{name}/{seed}", Grounds(nats, misfit, effect in THRESHOLDS.calibration.flexible_effects), there
+            yield (
+                f"{name}/{seed}",
+                CauseEvidence(nats, misfit, effect in THRESHOLDS.calibration.flexible_effects),
+                there,
+            )
 
 
 def learned(X: Array, right: Array) -> Array:

@@ -26,7 +26,7 @@ from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, compl
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.validation.simulation_error import flown
+from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import Recorder
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
@@ -103,7 +103,7 @@ def outcome(aircraft: Aircraft, case: int, turbulence: str) -> Outcome:
     base, final = (held_out_evidence(fit, [second], own) for fit in fitted(first, next(iter(effects))))
     groups = len(window_groups(second))
     right = Evidence(np.zeros(groups), (), (second,), ((simulator.vector(truth),) * groups,))
-    stated, best = flown(base, final), flown(base, right)
+    stated, best = simulation_gap(base, final), simulation_gap(base, right)
     assert stated is not None and best is not None
     return Outcome(stated.before, stated.after, stated.noise_floor, best.after, stated.ci95)
 

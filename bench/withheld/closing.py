@@ -21,7 +21,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.validation.simulation_error import flown
+from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
 
 from .drawing import FOREIGN, Case
@@ -93,7 +93,7 @@ def _beside_record(label: Mapping[str, Any], case: Path) -> dict[str, float]:
     model = residual_model_of(simulator, load_gap_flight(case / "held", aircraft, None, "flu"))
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     points = (vector(simulator, corrected, effects) for effects in (found, label["effects"]))
-    gap = flown(*(everywhere((model,), point) for point in points))
+    gap = simulation_gap(*(everywhere((model,), point) for point in points))
     return {"before": gap.before, "after": gap.tolerances, "true_effect": gap.after} if gap else {}
 
 

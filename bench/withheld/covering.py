@@ -21,7 +21,7 @@ from sysid_node.flight.bag.writer import write_streams
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.validation.simulation_error import flown
+from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
 
 from .closing import effects_of
@@ -45,7 +45,7 @@ def main(which: str, seed: int, folder: Path) -> None:
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     after = vector(simulator, load_aircraft(str(case / "out" / "corrected.yaml")), found)
     before, corrected = (everywhere(models, point) for point in (simulator.neutral(), after))
-    gap = flown(before, corrected)
+    gap = simulation_gap(before, corrected)
     errors = asdict(gap) if gap else {}
     kept = {name: errors[name] for name in ("before", "after", "noise_floor", "shrink_percent") if errors}
     (case / "covered.json").write_text(json.dumps(kept), encoding="utf-8")

@@ -20,7 +20,7 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import Progress
 from sysid_node.gap.selection.confusion import Confusion, confusion_of
 from sysid_node.gap.selection.forward_selection import Attribution, attribute
-from sysid_node.gap.validation.holdout import settled
+from sysid_node.gap.validation.holdout import validate
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.verdict import localisation
 from sysid_node.gap.verdict.decision import verdict_of
@@ -36,7 +36,7 @@ class Diagnosis:
     aircraft: Aircraft
     verdict: str
     gap: Gap  # of forces, moments and kinematics by frequency
-    flown: Gap | None  # of short flights
+    simulation_gap: Gap | None  # of short flights
     where: list[dict[str, Any]]
     attribution: Attribution
     shape: Shape | None
@@ -51,7 +51,7 @@ class Diagnosis:
     @property
     def size(self) -> Gap:
         """The gap as it is told: of short flights, of forces and kinematics where the flight shows none."""
-        return self.flown or self.gap
+        return self.simulation_gap or self.gap
 
 
 def diagnose(
@@ -79,7 +79,7 @@ def diagnose(
     steps = Checkpoint.of(keep, models)
     attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
     progress(0.92, "the gap on flight not fitted")
-    attribution, checked = settled(attribution, models, unseen, own)
+    attribution, checked = validate(attribution, models, unseen, own)
     verdict = verdict_of(models, attribution, checked)
     progress(0.95, "short flights beside the flight, and what to fly next")
     found = localisation.where(attribution, [v.residual(simulator.neutral()) for v in models])
@@ -87,7 +87,7 @@ def diagnose(
     flight = advice(verdict, attribution)
     steps.forget()
     return Diagnosis(
-        aircraft, verdict, checked.gap, checked.flown, found, attribution,
+        aircraft, verdict, checked.gap, checked.simulation_gap, found, attribution,
         localisation.missing(attribution), checked.models, checked.base, checked.final, flight, bool(holdouts),
-        confusion_of(attribution.base, attribution.trials), air,
+        confusion_of(attribution.base, attribution.first_stage), air,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
@@ -12,21 +11,21 @@ from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.validation.simulation_error import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
-from sysid_node.gap.validation.standard_errors import standard_errors, stated
+from sysid_node.gap.validation.standard_errors import standard_errors, with_standard_error
 from sysid_node.gap.verdict.decision import explained, named, structured, wanting
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
     """The content of gap.json."""
     attribution = found.attribution
-    left = attribution.left
+    left = attribution.structure_left
     return {
         "verdict": found.verdict,
         "aircraft": found.aircraft.name,
         "gap": {
             **_gap(found.size),
-            "measured_by": "short_flights" if found.flown else "forces_and_kinematics",
-            "window_s": WINDOW if found.flown else found.models[0].windows.length,
+            "measured_by": "short_flights" if found.simulation_gap else "forces_and_kinematics",
+            "window_s": WINDOW if found.simulation_gap else found.models[0].windows.length,
             "held_out": found.held_out,
             "forces_and_kinematics": {**_gap(found.gap), "window_s": found.models[0].windows.length},
         },
@@ -54,11 +53,13 @@ def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
     has no probability.
     """
     attribution = found.attribution
-    effects = {t.added.label: t.added.effect for t in attribution.trials if t.added}
+    effects = {t.added.label: t.added.effect for t in attribution.first_stage if t.added}
     weighed = (*attribution.doubted, *attribution.causes)
-    instead = {e: share * cause.grounds.credence for cause in weighed for e, share in cause.alternatives}
+    instead = {
+        e: share * cause.evidence.probability_by_evidence for cause in weighed for e, share in cause.alternatives
+    }
     own = {cause.candidate.label: cause.probability for cause in weighed}
-    return [(label, own.get(label, instead.get(effects.get(label, ""))), p) for label, p in attribution.table]
+    return [(label, own.get(label, instead.get(effects.get(label, ""))), p) for label, p in attribution.ranking]
 
 
 def _gap(gap: Gap) -> dict[str, Any]:
@@ -79,11 +80,11 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
         "station": cause.candidate.station,
-        "parameters": parameters(found.attribution.sized, cause),
+        "parameters": parameters(found.attribution.size_fit, cause),
         "probability": cause.probability,
         "gap_after": found.size.after,
         "indistinguishable_from": named(cause),
-        "grounds": {"share": cause.share, **asdict(cause.grounds)},
+        "grounds": _grounds(cause),
     }
 
 
@@ -95,7 +96,18 @@ def _doubted(cause: Cause) -> dict[str, Any]:
         "parameters": parameters(liml_estimate(cause.fit), cause),
         "probability": cause.probability,
         "indistinguishable_from": named(cause),
-        "grounds": {"share": cause.share, **asdict(cause.grounds)},
+        "grounds": _grounds(cause),
+    }
+
+
+def _grounds(cause: Cause) -> dict[str, Any]:
+    """What the probability of a cause follows from."""
+    evidence = cause.evidence
+    return {
+        "share": cause.share,
+        "foretold": evidence.log_bayes_factor,
+        "misfit": evidence.misfit,
+        "pliable": evidence.flexible,
     }
 
 
@@ -109,4 +121,6 @@ def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
         places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
         own = tuple(i for i in ordered if i in cause.candidate.widened)
     errors, names = standard_errors(fit), {i: simulator.parameters[i][1].name for i in own}
-    return {name: stated(name, float(fit.points[0][i]), float(errors[places[i]])) for i, name in names.items()}
+    return {
+        name: with_standard_error(name, float(fit.points[0][i]), float(errors[places[i]])) for i, name in names.items()
+    }

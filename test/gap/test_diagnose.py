@@ -43,13 +43,13 @@ def test_the_gap_closes_on_flight_held_out(lagging) -> None:
 def test_effects_that_surely_leave_a_part_of_the_gap_open_do_not_explain_it(lagging) -> None:
     check = Check(lagging.models, lagging.base, lagging.final, lagging.gap)
     assert verdict_of(lagging.models, lagging.attribution, check) == "explained"
-    floor = lagging.flown.noise_floor
+    floor = lagging.simulation_gap.noise_floor
     for after, ci95, verdict in [
         (2.0 * floor, (72.0, 88.0), "unknown_effect"),
         (2.0 * floor, (72.0, 95.0), "explained"),  # it may be all
         (1.2 * floor, (72.0, 88.0), "explained"),  # chance leaves as much
     ]:
-        check.__dict__["flown"] = replace(lagging.flown, after=after, ci95=ci95)
+        check.__dict__["simulation_gap"] = replace(lagging.simulation_gap, after=after, ci95=ci95)
         assert verdict_of(lagging.models, lagging.attribution, check) == verdict
 
 
@@ -76,7 +76,7 @@ def test_its_report_is_drawn_without_a_complaint(lagging, tmp_path, browse) -> N
     write_gap_report(tmp_path / "report.html", lagging)
     page = browse(tmp_path / "report.html")
     assert page.complaints == []
-    assert page.drawn == page.plots > len(lagging.flown.per_channel)
+    assert page.drawn == page.plots > len(lagging.simulation_gap.per_channel)
 
 
 def test_what_is_doubted_is_told(lagging) -> None:

@@ -35,9 +35,6 @@ from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS, Resi
 from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 from sysid_node.gap.thresholds import THRESHOLDS
 
-#: Standard deviations above chance below which coherence is taken as chance.
-CHANCE_DEVIATIONS = 4.0
-
 #: Signals (N, M) for forces and moments, and for air data and attitude, of zero mean and unit spread; or none.
 Instruments = Callable[[ResidualModel], tuple[Array, Array]]
 
@@ -86,7 +83,7 @@ def pooled_overidentification(
         pooled([overidentification_of(f, reweighted(f, by), by) for f in fits])
         for by in (gust_free_instruments, resonator_instruments)
     )
-    more = rings.deviations > np.maximum(usual.deviations, CHANCE_DEVIATIONS)
+    more = rings.deviations > np.maximum(usual.deviations, THRESHOLDS.instruments.chance)
     found = {
         f.name: np.where(more, getattr(rings, f.name), getattr(usual, f.name)) for f in fields(OveridentificationTest)
     }

@@ -20,17 +20,17 @@ from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.instruments.overidentification import overidentification_of
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.candidate_fitter import Trial
+from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
 
 
-def likelier(trial: Trial, other: Trial) -> bool:
+def likelier(trial: FittedSet, other: FittedSet) -> bool:
     """Whether a trial predicts better than another, beyond doubt."""
     return bool(probabilities([trial.evidence.scores, other.evidence.scores])[0] > THRESHOLDS.acceptance.probability)
 
 
-def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
+def accepted(base: FittedSet, without: FittedSet, trial: FittedSet) -> bool:
     """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter.
 
     Also of what the commands foretell, having been picked from so many: gusts can fake the rest, and where the model is
@@ -44,7 +44,7 @@ def accepted(base: Trial, without: Trial, trial: Trial) -> bool:
     return log_bayes_factor(trial.fit, without.fit) > THRESHOLDS.acceptance.log_bayes_factor(len(EFFECTS))
 
 
-def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+def _matters(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
     """Channels (12,) on which a trial takes enough of the remainder away."""
     left, motion = power_left(without.evidence), _motion(trial)
     gone = left - power_left(trial.evidence)
@@ -57,7 +57,7 @@ def _matters(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     )
 
 
-def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+def _matters_in_gusts(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
     """The same, of forces and moments by what of the remainder is structure: the rest is weather."""
     before, after = overidentification_of(without.fit, trial.fit), overidentification_of(trial.fit)
     scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
@@ -69,7 +69,7 @@ def _matters_in_gusts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
     return np.where(forces, structured | _shifts(without, trial), _matters(without, trial))
 
 
-def _shifts(without: Trial, trial: Trial) -> NDArray[np.bool_]:
+def _shifts(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
     """Channels (12,) on which a trial takes enough of what is off on average away: gusts average out."""
     left, now = (_power_of_means(t.evidence) for t in (without, trial))
     return np.asarray(
@@ -83,16 +83,16 @@ def _power_of_means(evidence: Evidence) -> Array:
     return np.asarray(sum(0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in evidence.residuals))
 
 
-def _motion(trial: Trial) -> Array:
+def _motion(trial: FittedSet) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
     return np.asarray(sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.models))
 
 
-def _in_gusts(trial: Trial) -> bool:
+def _in_gusts(trial: FittedSet) -> bool:
     return any(is_gusty(model) for model in trial.fit.models)
 
 
-def _contributed(base: Trial, without: Trial, trial: Trial) -> Array:
+def _contributed(base: FittedSet, without: FittedSet, trial: FittedSet) -> Array:
     """Power (12,) that comes back when what a trial has more than another is taken away, the others as they are.
 
     As a share of what nuisances alone leave, which do their best. The others would bend to hold what is gone: a lag
@@ -115,7 +115,7 @@ def _powers(fit: CandidateFit, points: Sequence[Array]) -> Array:
     return np.array([sum(power_of(r) for r in some) for some in (residuals, swinging)])
 
 
-def _trifling(trial: Trial) -> bool:
+def _trifling(trial: FittedSet) -> bool:
     """Whether what was added is a time within one sample of the slowest topic: a matter of sampling."""
     if trial.added is None or trial.added.effect not in TIME_EFFECTS:
         return False

@@ -14,20 +14,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid_node.gap.selection.misspecification import Adequacy
+from sysid_node.gap.selection.misspecification import Misspecification
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
-class Grounds:
+class CauseEvidence:
     """What speaks for a cause and against it."""
 
-    foretold: float  # nats by which it accounts better for what the commands foretell, the other causes given
+    log_bayes_factor: float  # nats by which it accounts better for what the commands foretell, the other causes given
     misfit: float  # of what it does, what is left that goes with it: amplitude, on the channels where any is left
-    pliable: bool  # as what works through the file's own derivatives is
+    flexible: bool  # as what works through the file's own derivatives is
 
     @classmethod
-    def of(cls, effect: str, foretold: float, adequacy: Adequacy) -> Grounds:
+    def of(cls, effect: str, foretold: float, adequacy: Misspecification) -> CauseEvidence:
         """From the effect, the nats, and what it leaves."""
         seen = (adequacy.done > THRESHOLDS.calibration.counted * adequacy.done.sum()) & (
             adequacy.deviations > THRESHOLDS.calibration.deviations
@@ -38,28 +38,28 @@ class Grounds:
     @property
     def regressors(self) -> tuple[float, float, float]:
         """What the weights belong to."""
-        return 1.0, float(np.log(max(self.foretold, 1.0))), float(self.pliable)
+        return 1.0, float(np.log(max(self.log_bayes_factor, 1.0))), float(self.flexible)
 
     @property
-    def refuted(self) -> bool:
+    def misspecified(self) -> bool:
         """Whether what is left goes with the cause by too much: then the law is another, however many the nats."""
         return self.misfit > THRESHOLDS.calibration.misfit
 
     @property
-    def credence(self) -> float:
+    def probability_by_evidence(self) -> float:
         """Probability that the cause, or a rival named with it, is there."""
-        return 0.0 if self.refuted else self._by_nats
+        return 0.0 if self.misspecified else self._by_nats
 
     @property
-    def wanting(self) -> bool:
+    def supported_but_misspecified(self) -> bool:
         """Whether it would be believed but for its law: then something is there, but not this."""
-        return self.refuted and self._by_nats >= THRESHOLDS.calibration.probability
+        return self.misspecified and self._by_nats >= THRESHOLDS.calibration.probability
 
     @property
     def _by_nats(self) -> float:
         return 1.0 / (1.0 + float(np.exp(-np.dot(THRESHOLDS.calibration.weights, self.regressors))))
 
 
-def prior(effect: str) -> float:
-    """Odds of an effect before any flight, beside those that are not pliable."""
+def prior_odds(effect: str) -> float:
+    """Odds of an effect before any flight, beside those that are not flexible."""
     return float(np.exp(THRESHOLDS.calibration.flexible)) if effect in THRESHOLDS.calibration.flexible_effects else 1.0

@@ -17,20 +17,20 @@ from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, with
 from sysid_node.gap.estimation.nuisances import Nuisances
 from sysid_node.gap.estimation.predictive_density import Evidence, competing_evidence
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.onset import sought
+from sysid_node.gap.selection.onset import search_onset
 from sysid_node.gap.thresholds import THRESHOLDS
 
 Progress = Callable[[float, str], None]
 
 #: Deviance that a candidate leaves at a first look, and the values from which its fit starts.
-Look = tuple[float, Candidate, tuple[float, ...]]
+Screened = tuple[float, Candidate, tuple[float, ...]]
 
 _Work = TypeVar("_Work")
 _Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
-class Trial:
+class FittedSet:
     """A set of candidates fitted, and its evidence; ``added`` is what it has more than what it was tried upon."""
 
     fit: CandidateFit
@@ -39,31 +39,31 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Trier:
+class CandidateFitter:
     """Fits sets of candidates, the nuisances always along."""
 
     nuisances: Nuisances
-    steps: Checkpoint
-    unseen: Sequence[ResidualModel] = ()  # flights held out, and what is allowed for in each
-    own: Sequence[Nuisances] = ()
-    known: dict[frozenset[str], Trial] = field(default_factory=dict)  # by the labels of the set
-    seen: dict[frozenset[str], dict[str, Look]] = field(default_factory=dict)  # upon such a set, by label
+    checkpoint: Checkpoint
+    holdouts: Sequence[ResidualModel] = ()  # flights held out, and what is allowed for in each
+    holdout_nuisances: Sequence[Nuisances] = ()
+    fitted: dict[frozenset[str], FittedSet] = field(default_factory=dict)  # by the labels of the set
+    screened: dict[frozenset[str], dict[str, Screened]] = field(default_factory=dict)  # upon such a set, by label
 
-    def trial(self, fit: CandidateFit, candidates: Sequence[Candidate], look: Look | None = None) -> Trial:
+    def fit_set(self, fit: CandidateFit, candidates: Sequence[Candidate], look: Screened | None = None) -> FittedSet:
         """A set of candidates fitted from where another fit stands; what is added to the set starts at its look."""
         _, added, start = look or (0.0, None, ())
         wanted = [*candidates, *([added] if added else [])]
         labels = frozenset(c.label for c in wanted)
-        if labels not in self.known:
-            done = self.steps.polished(with_candidates(fit, wanted, self.nuisances, start))
-            if added is not None and (moved := sought(done, added)) is not done:
-                done = self.steps.polished(moved)
-            self.known[labels] = Trial(done, competing_evidence(done, self.unseen, self.own))
-        return replace(self.known[labels], added=added)
+        if labels not in self.fitted:
+            done = self.checkpoint.polished(with_candidates(fit, wanted, self.nuisances, start))
+            if added is not None and (moved := search_onset(done, added)) is not done:
+                done = self.checkpoint.polished(moved)
+            self.fitted[labels] = FittedSet(done, competing_evidence(done, self.holdouts, self.holdout_nuisances))
+        return replace(self.fitted[labels], added=added)
 
-    def looks(self, current: Trial, candidates: Sequence[Candidate], progress: Progress) -> list[Look]:
+    def screen(self, current: FittedSet, candidates: Sequence[Candidate], progress: Progress) -> list[Screened]:
         """A first look at each, the best first: what it takes away where the nuisances can do no more."""
-        seen = self.seen.setdefault(frozenset(c.label for c in current.fit.candidates), {})
+        seen = self.screened.setdefault(frozenset(c.label for c in current.fit.candidates), {})
         fresh = [c for c in candidates if c.label not in seen]
 
         def work() -> dict[str, list[float]]:
@@ -76,45 +76,47 @@ class Trier:
             return {candidate.label: [cost, *start] for cost, candidate, start in looks}
 
         if fresh:
-            table = self.steps.table(current.fit, [c.label for c in fresh], work)
+            table = self.checkpoint.table(current.fit, [c.label for c in fresh], work)
             seen.update({c.label: (table[c.label][0], c, tuple(table[c.label][1:])) for c in fresh if c.label in table})
         return sorted((seen[c.label] for c in candidates if c.label in seen), key=lambda look: look[0])
 
-    def looks_upon(
-        self, frontier: Sequence[Trial], candidates: Sequence[Candidate], progress: Progress
-    ) -> list[tuple[Trial, Look]]:
+    def screen_upon(
+        self, frontier: Sequence[FittedSet], candidates: Sequence[Candidate], progress: Progress
+    ) -> list[tuple[FittedSet, Screened]]:
         """First looks at each upon each of several explanations, the best first; every set of effects once."""
-        found: list[tuple[Trial, Look]] = []
+        found: list[tuple[FittedSet, Screened]] = []
         for i, current in enumerate(frontier):
             rest = [c for c in candidates if c.effect not in current.fit.effects]
             part = lambda share, text, i=i: progress((i + share) / len(frontier), text)  # noqa: E731
-            found += [(current, look) for look in self.looks(current, rest, part)]
-        best: dict[frozenset[str], tuple[Trial, Look]] = {}
+            found += [(current, look) for look in self.screen(current, rest, part)]
+        best: dict[frozenset[str], tuple[FittedSet, Screened]] = {}
         for current, look in sorted(found, key=lambda pair: pair[1][0]):
             labels = frozenset({look[1].label, *(c.label for c in current.fit.candidates)})
             best.setdefault(labels, (current, look))
         return list(best.values())
 
-    def upon(self, current: Trial, look: Look) -> Trial | None:
+    def add(self, current: FittedSet, look: Screened) -> FittedSet | None:
         """A candidate added to an explanation; None where no numbers come of it.
 
         Where slopes grow without end a set predicts nothing, and is no explanation.
         """
         try:
             with _endless():
-                return self.trial(current.fit, current.fit.candidates, look)
+                return self.fit_set(current.fit, current.fit.candidates, look)
         except np.linalg.LinAlgError:
             return None
 
-    def beside(self, chosen: Trial, rival: Candidate) -> Trial | None:
+    def add_candidate(self, chosen: FittedSet, rival: Candidate) -> FittedSet | None:
         """A rival added to what was chosen; None where no numbers come of it."""
-        (look,) = self.looks(chosen, [rival], lambda s, t: None)
-        return self.upon(chosen, look)
+        (look,) = self.screen(chosen, [rival], lambda s, t: None)
+        return self.add(chosen, look)
 
-    def finish(self, looks: Sequence[tuple[Trial, Look]], progress: Progress) -> list[tuple[Trial, Trial]]:
+    def fit_screened(
+        self, looks: Sequence[tuple[FittedSet, Screened]], progress: Progress
+    ) -> list[tuple[FittedSet, FittedSet]]:
         """What was looked at, fitted to the end, after what it was looked at upon; the most probable first."""
         trials = _spread(
-            lambda pair: (pair[0], self.upon(*pair)),
+            lambda pair: (pair[0], self.add(*pair)),
             looks,
             lambda s: progress(0.5 + 0.5 * s, "the likeliest effects"),
         )
@@ -122,7 +124,7 @@ class Trier:
         return sorted(done, key=lambda pair: -pair[1].evidence.total)
 
 
-def likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Trial, Look]]:
+def best_screened(looks: Sequence[tuple[FittedSet, Screened]], most: int) -> list[tuple[FittedSet, Screened]]:
     """The best looks upon each explanation; one effect in many shapes leaves room for others."""
     seen: Counter[tuple[int, str]] = Counter()
     kept = []
@@ -134,7 +136,7 @@ def likeliest(looks: Sequence[tuple[Trial, Look]], most: int) -> list[tuple[Tria
     return kept
 
 
-def narrowed(candidates: Sequence[Candidate], looks: Sequence[Look]) -> list[Candidate]:
+def with_found_onsets(candidates: Sequence[Candidate], looks: Sequence[Screened]) -> list[Candidate]:
     """The candidates with one start each where it is the onset that they differ in: looking at all again costs most."""
     best = {candidate.label: start for _, candidate, start in reversed(looks)}
     return [
@@ -164,7 +166,7 @@ def _spread(
     return done
 
 
-def _first_look_or_none(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Look:
+def _first_look_or_none(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Screened:
     """The first look; infinitely much is left where no numbers come of it."""
     try:
         return _first_look(fit, problem, candidate)
@@ -172,7 +174,7 @@ def _first_look_or_none(fit: CandidateFit, problem: VariableProjection, candidat
         return np.inf, candidate, candidate.starts[0]
 
 
-def _first_look(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Look:
+def _first_look(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Screened:
     """What is left after one Gauss-Newton step from the best start, of the candidate and of all that is known so far.
 
     What is known so far must be let move along: alone it has bent to hold the other's share, and would hide it.
@@ -182,7 +184,7 @@ def _first_look(fit: CandidateFit, problem: VariableProjection, candidate: Candi
         problem = VariableProjection(widened)
         return problem.deviance(problem.residual(widened.values)), candidate, ()
     low, high = bounds(fit.models[0].simulator, (*fit.indices, *candidate.indices))
-    best: Look = (np.inf, candidate, candidate.starts[0])
+    best: Screened = (np.inf, candidate, candidate.starts[0])
     look = problem.looking(candidate)
     for start in candidate.starts:
         values = np.concatenate([fit.values, start])

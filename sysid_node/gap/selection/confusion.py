@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
-from sysid_node.gap.selection.candidate_fitter import Trial
+from sysid_node.gap.selection.candidate_fitter import FittedSet
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Confusion:
     cosines: Array
 
 
-def confusion_of(base: Trial, trials: Sequence[Trial]) -> Confusion:
+def confusion_of(base: FittedSet, trials: Sequence[FittedSet]) -> Confusion:
     """One: the two change the simulated flight in the same way, and no data of this flight part them."""
     left = _rows(base.fit, base.fit)
     taken = [left - _rows(trial.fit, base.fit) for trial in trials]

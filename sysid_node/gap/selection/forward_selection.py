@@ -23,8 +23,14 @@ from sysid_node.gap.instruments.overidentification import (
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import accepted, likelier
-from sysid_node.gap.selection.candidate_fitter import Progress, Trial, Trier, likeliest, narrowed
-from sysid_node.gap.selection.causes import Cause, believed
+from sysid_node.gap.selection.candidate_fitter import (
+    CandidateFitter,
+    FittedSet,
+    Progress,
+    best_screened,
+    with_found_onsets,
+)
+from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
@@ -32,59 +38,73 @@ from sysid_node.gap.thresholds import THRESHOLDS
 class Attribution:
     """The explanation, what it was built on, and what is left."""
 
-    base: Trial  # nuisances only
-    chosen: Trial
+    base: FittedSet  # nuisances only
+    chosen: FittedSet
     corrected: CandidateFit  # chosen, its unknowns as gusts do not bias them
-    before: OveridentificationTest  # of what the nuisances leave
-    left: OveridentificationTest  # of what the chosen effects leave
+    structure_before: OveridentificationTest  # of what the nuisances leave
+    structure_left: OveridentificationTest  # of what the chosen effects leave
     causes: tuple[Cause, ...]
     doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
-    table: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
-    trials: tuple[Trial, ...] = field(default=())  # of the first stage
-    unseen: tuple[ResidualModel, ...] = ()  # flights held out, and what is allowed for in each
-    own: tuple[Nuisances, ...] = ()
-    beside: CandidateFit | None = None  # what the sizes are from, where the corrected fit has the file's derivatives
+    ranking: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
+    first_stage: tuple[FittedSet, ...] = field(default=())  # of the first stage
+    holdouts: tuple[ResidualModel, ...] = ()  # flights held out, and what is allowed for in each
+    holdout_nuisances: tuple[Nuisances, ...] = ()
+    size_source: CandidateFit | None = (
+        None  # what the sizes are from, where the corrected fit has the file's derivatives
+    )
 
     @property
-    def filed(self) -> bool:
+    def keeps_file_derivatives(self) -> bool:
         """Whether derivatives are the file's, beside causes."""
-        return self.beside is not None
+        return self.size_source is not None
 
     @property
-    def sized(self) -> CandidateFit:
+    def size_fit(self) -> CandidateFit:
         """The fit that sizes and their errors are from."""
-        return self.beside or self.corrected
+        return self.size_source or self.corrected
 
-    def as_filed(self) -> Attribution:
+    def as_in_file(self) -> Attribution:
         """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
         neutral = tuple(model.simulator.neutral() for model in self.base.fit.models)
         return replace(self, corrected=linearised(replace(self.base.fit, points=neutral)))
 
-    def beside_the_file(self) -> Attribution:
+    def with_file_derivatives(self) -> Attribution:
         """The causes beside the file's own derivatives: where those that were fitted predict worse."""
         fit, neutral = self.corrected, self.corrected.models[0].simulator.neutral()
         own, points = [*fit.indices, *fit.widened], tuple(neutral.copy() for _ in fit.points)
         for point, found in zip(points, fit.points, strict=True):
             point[own] = found[own]
         moved = replace(linearised(replace(fit, points=points)), information=fit.information)
-        return replace(self, corrected=moved, beside=fit)
+        return replace(self, corrected=moved, size_source=fit)
 
     def by_least_squares(self) -> Attribution:
         """Sizes as least squares has them: where those without bias predict nothing."""
-        return replace(self, corrected=self.chosen.fit, beside=None)
+        return replace(self, corrected=self.chosen.fit, size_source=None)
 
-    def without_the_weakest(self) -> Attribution:
+    def without_least_probable(self) -> Attribution:
         """Without the cause that is the least probable."""
         weakest = min(self.causes, key=lambda cause: cause.probability)
         fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
-        return replace(self, chosen=weakest.without, corrected=liml_estimate(fit), beside=None,
-                       left=pooled_overidentification(fit, self.unseen, self.own), causes=causes)  # fmt: skip
+        return replace(
+            self,
+            chosen=weakest.without,
+            corrected=liml_estimate(fit),
+            size_source=None,
+            structure_left=pooled_overidentification(fit, self.holdouts, self.holdout_nuisances),
+            causes=causes,
+        )
 
     def without_causes(self) -> Attribution:
         """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
         corrected = liml_estimate(self.base.fit)
-        return replace(self, chosen=self.base, corrected=corrected, beside=None,
-                       left=pooled_overidentification(self.base.fit, self.unseen, self.own), causes=())  # fmt: skip
+        return replace(
+            self,
+            chosen=self.base,
+            corrected=corrected,
+            size_source=None,
+            structure_left=pooled_overidentification(self.base.fit, self.holdouts, self.holdout_nuisances),
+            causes=(),
+        )
 
 
 def attribute(
@@ -96,14 +116,17 @@ def attribute(
     own: Sequence[Nuisances] = (),
 ) -> Attribution:
     """Fits everything that has to be, and chooses; flights held out, with ``own`` nuisances, have a say but no fit."""
-    candidates, trier = candidates_of(models[0].simulator, models), Trier(nuisances, steps or Checkpoint(), unseen, own)
+    candidates, fitter = (
+        candidates_of(models[0].simulator, models),
+        CandidateFitter(nuisances, steps or Checkpoint(), unseen, own),
+    )
     progress(0.0, "derivatives within their tolerances")
-    base = trier.trial(unfitted(models, nuisances), [])
+    base = fitter.fit_set(unfitted(models, nuisances), [])
     chosen, stages, frontier = base, [], [base]
     for count, (width, most) in enumerate(THRESHOLDS.search.stages):
-        looks = trier.looks_upon(frontier[:width], candidates, _share_of(progress, count))
-        tried = trier.finish(likeliest(looks, most), _share_of(progress, count))
-        candidates = narrowed(candidates, [look for _, look in looks])
+        looks = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
+        tried = fitter.fit_screened(best_screened(looks, most), _share_of(progress, count))
+        candidates = with_found_onsets(candidates, [look for _, look in looks])
         stages.append([trial for _, trial in tried])
         better = [t for upon, t in tried if likelier(t, chosen) and accepted(base, upon, t)]
         if not better:
@@ -111,11 +134,11 @@ def attribute(
         chosen, frontier = better[0], better
     progress(0.8, "whether another effect would do as well")
     late = [candidate for candidate in candidates if candidate.effect in RESPONSE_DELAYS]
-    chosen, causes, doubted = believed(trier, base, chosen, stages, late)
+    chosen, causes, doubted = select_causes(fitter, base, chosen, stages, late)
     before, left = overidentification_of(base.fit, chosen.fit), pooled_overidentification(chosen.fit, unseen, own)
     ranked, corrected = _ranked(base, stages[0]), liml_estimate(chosen.fit)
     found = Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
-    return replace(found, unseen=tuple(unseen), own=tuple(own))
+    return replace(found, holdouts=tuple(unseen), holdout_nuisances=tuple(own))
 
 
 def _share_of(progress: Progress, count: int) -> Progress:
@@ -123,7 +146,7 @@ def _share_of(progress: Progress, count: int) -> Progress:
     return lambda share, text: progress((count + share) / (len(THRESHOLDS.search.stages) + 1.0), text)
 
 
-def _ranked(base: Trial, trials: Sequence[Trial]) -> tuple[tuple[str, float], ...]:
+def _ranked(base: FittedSet, trials: Sequence[FittedSet]) -> tuple[tuple[str, float], ...]:
     """Every effect that was fitted to the end as the only one, with its probability; none among them."""
     scores = [*(t.evidence.scores for t in trials), base.evidence.scores]
     shares = probabilities(scores)

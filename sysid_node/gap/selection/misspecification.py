@@ -24,7 +24,7 @@ _RIDGE = 1e-6
 
 
 @dataclass(frozen=True)
-class Adequacy:
+class Misspecification:
     """By channel (12,), powers in noise levels: of what an effect does, and of what of the remainder goes with it."""
 
     done: Array
@@ -32,7 +32,7 @@ class Adequacy:
     deviations: Array  # how many standard deviations that lies above chance
 
 
-def adequacy_of(fit: CandidateFit, candidate: Candidate) -> Adequacy:
+def misspecification_of(fit: CandidateFit, candidate: Candidate) -> Misspecification:
     """Of one of a fit's candidates, over its flights, all its unknowns left free to move."""
     done, found, size = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     assert fit.information is not None
@@ -52,7 +52,7 @@ def adequacy_of(fit: CandidateFit, candidate: Candidate) -> Adequacy:
             found[axis] += _explained(np.column_stack(added), (parts[:, :, axis] * kept).ravel(), J, fit.information)
             size[axis] += len(added)
     beyond = found - size
-    return Adequacy(done, np.maximum(beyond, 0.0), beyond / np.sqrt(2.0 * np.maximum(size, 1.0)))
+    return Misspecification(done, np.maximum(beyond, 0.0), beyond / np.sqrt(2.0 * np.maximum(size, 1.0)))
 
 
 def _contribution(model: ResidualModel, point: Array, candidate: Candidate) -> Array:

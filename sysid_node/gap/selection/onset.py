@@ -23,7 +23,7 @@ _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
 _GRAIN = 0.5
 
 
-def sought(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
+def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     """The fit with the onset of one of its candidates where it leaves least; as it was where that is best."""
     names = fit.models[0].simulator.names
     places = [fit.indices.index(i) for i in candidate.indices if names[i].endswith(".onset")]
@@ -43,7 +43,7 @@ def sought(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     return replace(fit, points=points)
 
 
-def uncertainty(fit: CandidateFit, place: int) -> float:
+def onset_uncertainty(fit: CandidateFit, place: int) -> float:
     """How far (s, rms) the time at this place of the values may be from where it stands, by all times' likelihood.
 
     A surface that rests tells nothing of when it failed, but that it did before it moved again; in moving air, at rest

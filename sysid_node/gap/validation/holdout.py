@@ -16,8 +16,8 @@ from sysid_node.gap.instruments.overidentification import OveridentificationTest
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation import spectral_error
-from sysid_node.gap.validation.kfold import parted
-from sysid_node.gap.validation.simulation_error import flown, foreseen
+from sysid_node.gap.validation.kfold import kfold_evidence
+from sysid_node.gap.validation.simulation_error import simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
 
 
@@ -29,19 +29,19 @@ class Check:
     base: Evidence
     final: Evidence
     gap: Gap  # of forces, moments and kinematics by frequency
-    foreseen: bool = False  # whether weather and sensors' noise are all of it
+    weather_suffices: bool = False  # whether weather and sensors' noise are all of it
 
     @cached_property
-    def flown(self) -> Gap | None:
+    def simulation_gap(self) -> Gap | None:
         """The gap of short flights."""
-        return flown(self.base, self.final)
+        return simulation_gap(self.base, self.final)
 
     @property
     def gaps(self) -> list[Gap]:
         """By either measure."""
-        return [self.gap, *([self.flown] if self.flown else [])]
+        return [self.gap, *([self.simulation_gap] if self.simulation_gap else [])]
 
-    def as_filed(self, left: OveridentificationTest) -> Check:
+    def as_in_file(self, left: OveridentificationTest) -> Check:
         """The same of the aircraft file as it is."""
         before = tuple(v.residual(v.simulator.neutral()) for v in self.models)
         filed = tuple((v.simulator.neutral(),) * len(window_groups(v)) for v in self.models)
@@ -56,14 +56,16 @@ def check(attribution: Attribution, unseen: Sequence[ResidualModel], own: Sequen
             held_out_evidence(f, unseen, own) for f in (liml_estimate(attribution.base.fit), attribution.corrected)
         )
     else:
-        base = parted(attribution.base.evidence, liml_estimate(attribution.base.fit))
-        final = parted(attribution.chosen.evidence, attribution.corrected, filed=attribution.filed)
+        base = kfold_evidence(attribution.base.evidence, liml_estimate(attribution.base.fit))
+        final = kfold_evidence(
+            attribution.chosen.evidence, attribution.corrected, filed=attribution.keeps_file_derivatives
+        )
     models = base.models
     before = [v.residual(v.simulator.neutral()) for v in models]
-    return Check(models, base, final, spectral_error.gap_of(models, before, base, final, attribution.left))
+    return Check(models, base, final, spectral_error.gap_of(models, before, base, final, attribution.structure_left))
 
 
-def settled(
+def validate(
     attribution: Attribution, models: Sequence[ResidualModel], unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
     """What flight not fitted leaves of an explanation.
@@ -74,14 +76,16 @@ def settled(
     frequency.)
     """
     with ThreadPoolExecutor(1) as pool:
-        weather = pool.submit(foreseen, [*models, *unseen])
+        weather = pool.submit(weather_suffices, [*models, *unseen])
         attribution, checked = _standing(attribution, unseen, own)
     if weather.result():
-        attribution = attribution.without_causes().as_filed()
-        return attribution, replace(check(attribution, unseen, own).as_filed(attribution.left), foreseen=True)
+        attribution = attribution.without_causes().as_in_file()
+        return attribution, replace(
+            check(attribution, unseen, own).as_in_file(attribution.structure_left), weather_suffices=True
+        )
     if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
-        attribution = attribution.as_filed()
-        checked = checked.as_filed(attribution.left)
+        attribution = attribution.as_in_file()
+        checked = checked.as_in_file(attribution.structure_left)
     return attribution, checked
 
 
@@ -114,7 +118,7 @@ def _explanations(attribution: Attribution) -> Iterator[Attribution]:
         if attribution.corrected is not attribution.chosen.fit:
             yield attribution.by_least_squares()
     if len(attribution.causes) > 1:
-        yield attribution.without_the_weakest()
+        yield attribution.without_least_probable()
 
 
 def _better(checked: Check) -> bool:
@@ -126,13 +130,16 @@ def _beside_the_file(
     attribution: Attribution, checked: Check, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
 ) -> tuple[Attribution, Check]:
     """The causes beside the file's own derivatives, where these do better than the derivatives that were fitted."""
-    explanation = attribution.beside_the_file()
+    explanation = attribution.with_file_derivatives()
     try:
         found = check(explanation, unseen, own)
     except np.linalg.LinAlgError:
         return attribution, checked
     if not found.gaps[-1].after < checked.gaps[-1].after:
         return attribution, checked
-    before, filed = [v.residual(v.simulator.neutral()) for v in found.models], found.as_filed(attribution.left)
-    gap = spectral_error.gap_of(found.models, before, filed.base, found.final, attribution.left)
+    before, filed = (
+        [v.residual(v.simulator.neutral()) for v in found.models],
+        found.as_in_file(attribution.structure_left),
+    )
+    gap = spectral_error.gap_of(found.models, before, filed.base, found.final, attribution.structure_left)
     return explanation, replace(found, base=replace(filed.base, scores=found.base.scores), gap=gap)

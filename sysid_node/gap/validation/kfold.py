@@ -20,7 +20,7 @@ from sysid_node.gap.instruments.liml import at_least_prior, moment_weights
 from sysid_node.gap.instruments.overidentification import prior_terms
 
 
-def parted(evidence: Evidence, fit: CandidateFit, *, filed: bool = False) -> Evidence:
+def kfold_evidence(evidence: Evidence, fit: CandidateFit, *, filed: bool = False) -> Evidence:
     """Evidence with the residuals and parameters of each part as the others have it, about a fit that is ``unbiased``.
 
     ``filed``: nuisances stay where they are. The scores stay: they compare explanations of the same flights.

@@ -53,7 +53,7 @@ class _Start(NamedTuple):
     probe: Scalar  # (3,) what the lagged probe held then
 
 
-class Beside(NamedTuple):
+class Readings(NamedTuple):
     """The simulator beside a flight, N samples, all at the time of the motion: readings, columns ``layout.OUTPUTS``.
 
     Where the parameters say that messages are late, the measured readings are moved.
@@ -65,7 +65,7 @@ class Beside(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Beside:
+def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Readings:
     """The simulator of parameters (P,) beside a flight; pure."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
     samples = corrected_motion(chain, course.motion)
@@ -76,7 +76,7 @@ def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scala
     first, _ = begin(chain, starts.body[0], arriving[0], gusts[0], ())
     coming = (starts, gusts, _next(arriving), _next(gusts), step * jnp.arange(1, len(arriving) + 1))
     _, (readings, *_) = jax.lax.scan(lambda carry, new: _advance(chain, carry, *new), first, coming)
-    return Beside(readings, _measured(chain, course.motion), air)
+    return Readings(readings, _measured(chain, course.motion), air)
 
 
 def _advance(
@@ -147,7 +147,7 @@ def course_of(model: ResidualModel, size: int) -> Course:
     return Course(given.motion, given.signals.commands, altitude, still, still, begins)
 
 
-def beside(model: ResidualModel, theta: Array, course: Course) -> tuple[Array, Array, Array]:
+def simulate_beside(model: ResidualModel, theta: Array, course: Course) -> tuple[Array, Array, Array]:
     """Simulated (N, 12), measured (N, 12) and the air's motion (N, 3), as ``Beside`` has them, for parameters (P,)."""
     s, samples = model.simulator, len(model.record)
     flown = fly(s.layout, s.model, jnp.asarray(theta), course, jnp.asarray(s.step))
@@ -155,9 +155,9 @@ def beside(model: ResidualModel, theta: Array, course: Course) -> tuple[Array, A
     return simulated, measured, air
 
 
-def off(model: ResidualModel, theta: Array, course: Course) -> Array:
+def simulation_error(model: ResidualModel, theta: Array, course: Course) -> Array:
     """Measured minus simulated (N, 12); angles within half a turn."""
-    simulated, measured, _ = beside(model, theta, course)
+    simulated, measured, _ = simulate_beside(model, theta, course)
     error: Array = measured - simulated
     error[:, _ANGLES] = (error[:, _ANGLES] + np.pi) % (2.0 * np.pi) - np.pi
     return error

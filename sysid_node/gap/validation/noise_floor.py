@@ -19,7 +19,7 @@ from sysid_node.gap.flightdata.gap_flight import resampled
 from sysid_node.gap.residuals.build import with_added_noise
 from sysid_node.gap.residuals.flight_path_reconstruction import Motion
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.validation.multiple_shooting import Course, beside, off
+from sysid_node.gap.validation.multiple_shooting import Course, simulate_beside, simulation_error
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import Dryden
 
@@ -33,18 +33,25 @@ _HEIGHT = 100.0
 _CLOCKS = ("imu_delay.delay", "air_data_delay.delay")
 
 
-def unavoidable(model: ResidualModel, theta: Array, course: Course, seed: int = 0) -> Iterator[tuple[Array, Array]]:
+def noise_floor_errors(
+    model: ResidualModel, theta: Array, course: Course, seed: int = 0
+) -> Iterator[tuple[Array, Array]]:
     """Errors (N, 12) of a few flights of parameters (P,), and the sensors' noise (N, 12) that was added."""
     random, prompt = np.random.default_rng(seed), theta.copy()
     prompt[[model.simulator.names.index(name) for name in _CLOCKS]] = 0.0
-    _, _, shown = beside(model, theta, course)
+    _, _, shown = simulate_beside(model, theta, course)
     for _ in range(_REALISATIONS):
         again = resampled(with_added_noise(model, random), model.simulator.rate)
         added = {n: values - model.record[n] for n, values in again.columns.items()}
         noise = np.column_stack([added.get(name, np.zeros(len(model.record))) for name in OUTPUTS])
         moving, turning = _hidden_air(model, course, shown, noise, random)
-        own, _, _ = beside(model, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning)))
-        yield off(model, prompt, _recorded(model, course, own - _unseen(model, moving) + noise, added)), noise
+        own, _, _ = simulate_beside(
+            model, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning))
+        )
+        yield (
+            simulation_error(model, prompt, _recorded(model, course, own - _unseen(model, moving) + noise, added)),
+            noise,
+        )
 
 
 def _hidden_air(

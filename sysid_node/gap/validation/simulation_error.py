@@ -20,8 +20,8 @@ from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.gap.validation.multiple_shooting import Course, beside, course_of, off
-from sysid_node.gap.validation.noise_floor import unavoidable
+from sysid_node.gap.validation.multiple_shooting import Course, course_of, simulate_beside, simulation_error
+from sysid_node.gap.validation.noise_floor import noise_floor_errors
 from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
 from sysid_node.sim.model.layout import OUTPUTS
 
@@ -41,7 +41,7 @@ _DRAWS, _BLOCK = 2000, 2
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SideBySide:
     """A flight and the simulator beside it, N samples: readings (N, 12), columns ``layout.OUTPUTS``."""
 
     time: Array  # s
@@ -51,13 +51,13 @@ class Drawn:
     begins: NDArray[np.bool_]
 
 
-def flown(base: Evidence, final: Evidence) -> Gap | None:
+def simulation_gap(base: Evidence, final: Evidence) -> Gap | None:
     """The gap on the flights of some evidence.
 
     None without attitude, where no flight is long enough, or where the simulator departs within a short flight.
     """
     found = zip(final.models, base.points, final.points, strict=True)
-    tables = [_table(*parts) for parts in found if shows(parts[0])]
+    tables = [_table(*parts) for parts in found if can_be_simulated(parts[0])]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return None
     motion, noise, *errors = np.concatenate(tables, axis=1)
@@ -71,29 +71,29 @@ def flown(base: Evidence, final: Evidence) -> Gap | None:
     return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
 
 
-def foreseen(models: Sequence[ResidualModel]) -> bool:
+def weather_suffices(models: Sequence[ResidualModel]) -> bool:
     """Whether the file's own simulator, in such air and with such sensors, would be off as far in every reading.
 
     Then there is nothing to blame, however well an effect would mimic the weather.
     """
-    tables = [_table(v, *[[v.simulator.neutral()] * len(window_groups(v))] * 2) for v in models if shows(v)]
+    tables = [_table(v, *[[v.simulator.neutral()] * len(window_groups(v))] * 2) for v in models if can_be_simulated(v)]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
     _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
     return bool((before <= THRESHOLDS.validation.chance**2 * np.mean(floors, axis=0)).all())
 
 
-def shows(model: ResidualModel) -> bool:
+def can_be_simulated(model: ResidualModel) -> bool:
     """Whether a flight can be flown beside: its attitude was measured, and it is long enough."""
     return motion_of(model.record) is not None and len(model.record) >= _size(model)
 
 
-def drawn(model: ResidualModel, points: Sequence[Array]) -> Drawn:
+def side_by_side(model: ResidualModel, points: Sequence[Array]) -> SideBySide:
     """A flight with the file's simulator and the corrected one beside it; ``points`` by group of windows."""
     course, neutral = course_of(model, _size(model)), model.simulator.neutral()
-    _, measured, _ = beside(model, neutral, course)
-    before, after = (measured - e for e in (off(model, neutral, course), _errors(model, points, course)))
-    return Drawn(model.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
+    _, measured, _ = simulate_beside(model, neutral, course)
+    before, after = (measured - e for e in (simulation_error(model, neutral, course), _errors(model, points, course)))
+    return SideBySide(model.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
 
 
 def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
@@ -141,9 +141,9 @@ def _table(model: ResidualModel, base: Sequence[Array], final: Sequence[Array]) 
     the causes, and of what is left of each of K flights of the simulator itself.
     """
     course, neutral = course_of(model, _size(model)), model.simulator.neutral()
-    measured = _cut(model, beside(model, neutral, course)[1])
+    measured = _cut(model, simulate_beside(model, neutral, course)[1])
     errors = [_squares(model, _errors(model, points, course)) for points in ([neutral] * len(base), base, final)]
-    floors, noise = zip(*unavoidable(model, final[len(final) // 2], course), strict=True)
+    floors, noise = zip(*noise_floor_errors(model, final[len(final) // 2], course), strict=True)
     motion = ((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
     sensors = np.mean([_squares(model, each) for each in noise], axis=0)
     return np.stack([motion, sensors, *errors, *(_squares(model, floor) for floor in floors)])
@@ -158,7 +158,7 @@ def _errors(model: ResidualModel, points: Sequence[Array], course: Course) -> Ar
     error = np.empty((len(model.record), len(OUTPUTS)))
     for mine, theta in _distinct(points):
         chosen = np.isin(owner, mine)
-        error[chosen] = off(model, theta, course)[chosen]
+        error[chosen] = simulation_error(model, theta, course)[chosen]
     return error
 
 

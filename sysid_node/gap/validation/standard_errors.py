@@ -18,11 +18,11 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.fit import CandidateFit, onset_places
 from sysid_node.gap.estimation.predictive_density import window_groups
 from sysid_node.gap.instruments.liml import influence
-from sysid_node.gap.selection.onset import uncertainty
+from sysid_node.gap.selection.onset import onset_uncertainty
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
-def stated(name: str, value: float, error: float) -> list[float]:
+def with_standard_error(name: str, value: float, error: float) -> list[float]:
     """A parameter's value and its standard error by chance and by the model together; a moment in time is no size."""
     return [value, error if name == "onset" else float(np.hypot(error, THRESHOLDS.validation.discrepancy * value))]
 
@@ -35,5 +35,5 @@ def standard_errors(fit: CandidateFit) -> Array:
     scatter = (steps**2).sum(axis=0) * len(steps) / max(len(steps) - 1, 1)
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), scatter))
     for place in onset_places(fit):
-        errors[place] = uncertainty(fit, place)
+        errors[place] = onset_uncertainty(fit, place)
     return np.asarray(errors)

@@ -12,7 +12,6 @@ from sysid_node.gap.estimation.fit import CandidateFit
 from sysid_node.gap.estimation.nuisances import CLOCKS
 from sysid_node.gap.estimation.predictive_density import Evidence
 from sysid_node.gap.instruments.excitation import externally_excited
-from sysid_node.gap.instruments.overidentification import CHANCE_DEVIATIONS
 from sysid_node.gap.residuals.admissibility import signal_to_noise
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import power_of
@@ -27,8 +26,8 @@ def verdict_of(models: Sequence[ResidualModel], attribution: Attribution, check:
     """One of gap.json's five words."""
     if max(signal_to_noise(model).max() for model in models) < THRESHOLDS.admission.excitation:
         return "unsupported"
-    if check.foreseen or not any(externally_excited(model) for model in models):
-        return "no_gap" if check.foreseen else "unsupported"
+    if check.weather_suffices or not any(externally_excited(model) for model in models):
+        return "no_gap" if check.weather_suffices else "unsupported"
     if not attribution.causes:
         return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
     if short(check) or check.final.total <= check.base.total or explained(attribution) < THRESHOLDS.verdict.explained:
@@ -52,7 +51,7 @@ def wanting(attribution: Attribution) -> bool:
 
     Not where another took its place: that is what is there.
     """
-    return any(cause.grounds.wanting and not cause.made_way for cause in attribution.doubted)
+    return any(cause.evidence.supported_but_misspecified and not cause.replaced for cause in attribution.doubted)
 
 
 def far_off(check: Check) -> bool:
@@ -60,7 +59,7 @@ def far_off(check: Check) -> bool:
 
     However much of the gap the derivatives close, where surely a tenth of the motion is left beyond the noise.
     """
-    gap = check.flown
+    gap = check.simulation_gap
     surely = (
         gap is not None
         and gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > THRESHOLDS.verdict.error**2
@@ -70,7 +69,7 @@ def far_off(check: Check) -> bool:
 
 def short(check: Check) -> bool:
     """Whether what was found surely falls short of what could be closed, by more than chance leaves."""
-    gap = check.flown
+    gap = check.simulation_gap
     return (
         gap is not None
         and gap.after > THRESHOLDS.validation.chance * gap.noise_floor
@@ -80,7 +79,7 @@ def short(check: Check) -> bool:
 
 def unexplained(attribution: Attribution) -> bool:
     """Whether on some channel structure that matters is left, and more of it than all causes take away there."""
-    more = _structure_left(attribution) > sum(cause.taken for cause in attribution.causes) / _motion(
+    more = _structure_left(attribution) > sum(cause.power_removed for cause in attribution.causes) / _motion(
         attribution.chosen.evidence
     )
     return bool(np.any(_structured(attribution) & more))
@@ -92,7 +91,7 @@ def _structured(attribution: Attribution) -> NDArray[np.bool_]:
         _structure_left(attribution),
         THRESHOLDS.acceptance.noticeable_error**2 + _sampling(attribution.chosen.fit),
     )
-    return np.asarray((attribution.left.deviations > THRESHOLDS.verdict.structure) & (power > noticed))
+    return np.asarray((attribution.structure_left.deviations > THRESHOLDS.verdict.structure) & (power > noticed))
 
 
 def explained(attribution: Attribution) -> float:
@@ -106,8 +105,8 @@ def explained(attribution: Attribution) -> float:
 
 def _structure_left(attribution: Attribution) -> Array:
     """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
-    left, evidence = attribution.left, attribution.chosen.evidence
-    share = np.where(left.deviations > CHANCE_DEVIATIONS, left.share, 0.0)
+    left, evidence = attribution.structure_left, attribution.chosen.evidence
+    share = np.where(left.deviations > THRESHOLDS.instruments.chance, left.share, 0.0)
     return np.asarray(share * power_left(evidence) / _motion(evidence))
 
 

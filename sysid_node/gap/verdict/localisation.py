@@ -47,8 +47,8 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
             parts[station, axis] = parts.get((station, axis), 0.0) + float(gone)
     remainder = powers[-1] / np.maximum(scale, 1e-300)
     for axis in range(len(CHANNELS)):
-        parts["unexplained", axis] = float(remainder[axis] * attribution.left.share[axis])
-        parts["noise", axis] = float(remainder[axis] * (1.0 - attribution.left.share[axis]))
+        parts["unexplained", axis] = float(remainder[axis] * attribution.structure_left.share[axis])
+        parts["noise", axis] = float(remainder[axis] * (1.0 - attribution.structure_left.share[axis]))
     total = sum(parts.values()) or 1.0
     kept = sorted(((k, p / total) for k, p in parts.items() if p > 0.0), key=lambda pair: -pair[1])
     return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(models, before, a)} for (s, a), share in kept]
@@ -114,7 +114,7 @@ def _regime(model: ResidualModel, by_window: Array) -> dict[str, list[float]]:
 def missing(attribution: Attribution) -> Shape | None:
     """The remainder that derivatives and biases leave, of the coefficient with most structure, against what it depends
     on most; none without structure."""  # fmt: skip
-    before = attribution.before
+    before = attribution.structure_before
     significant = before.deviations > THRESHOLDS.verdict.shape
     if not significant.any():
         return None

@@ -23,7 +23,7 @@ from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
 from sysid_node.gap.flightdata.gap_flight import resampled
 from sysid_node.gap.residuals.build import residual_model_like
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.candidate_fitter import Trial
+from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -93,10 +93,10 @@ def _listed(attribution: Attribution) -> str:
     return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause))))
 
 
-def _confused(cause: Cause) -> list[Trial]:
+def _confused(cause: Cause) -> list[FittedSet]:
     """The best trial of each effect that is named beside a cause."""
-    best: dict[str, Trial] = {}
-    for trial in cause.rivals:
+    best: dict[str, FittedSet] = {}
+    for trial in cause.alternative_sets:
         if trial.added is not None and trial.added.effect in named(cause):
             best.setdefault(trial.added.effect, trial)
     return list(best.values())

@@ -12,8 +12,8 @@ from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.validation.multiple_shooting import course_of, off
-from sysid_node.gap.validation.noise_floor import unavoidable
+from sysid_node.gap.validation.multiple_shooting import course_of, simulation_error
+from sysid_node.gap.validation.noise_floor import noise_floor_errors
 from sysid_node.sim import Simulator
 
 
@@ -108,8 +108,8 @@ def test_the_floor_without_vanes_knows_of_gusts(aircraft, make_flight) -> None:
         flight = blind(aircraft, make_flight({}, seed=3, turbulence=turbulence), "alpha", "beta")
         model = residual_model_of(Simulator(aircraft, 50.0), flight)
         course = course_of(model, 100)
-        error, _ = next(unavoidable(model, model.simulator.neutral(), course))
-        mine = off(model, model.simulator.neutral(), course)
+        error, _ = next(noise_floor_errors(model, model.simulator.neutral(), course))
+        mine = simulation_error(model, model.simulator.neutral(), course)
         floors.append((np.sqrt((error[:, 4] ** 2).mean()), np.sqrt((mine[:, 4] ** 2).mean())))
     (calm, calm_flown), (rough, rough_flown) = floors
     assert rough > 3.0 * calm and rough_flown > 3.0 * calm_flown

@@ -8,7 +8,7 @@ from sysid_node.gap.estimation.fit import unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.candidate_fitter import Trier
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.sim import Simulator
 
 
@@ -20,10 +20,10 @@ def tried(aircraft, make_flight):
         flight = make_flight(effects, seed=9, turbulence="moderate", duration=40.0)
         model = residual_model_of(Simulator(aircraft, 50.0), flight)
         nuisances = nuisances_of(aircraft, model)
-        trier = Trier(nuisances, Checkpoint())
-        base = trier.trial(unfitted([model], nuisances), [])
+        fitter = CandidateFitter(nuisances, Checkpoint())
+        base = fitter.fit_set(unfitted([model], nuisances), [])
         (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == label)
-        return base, trier.beside(base, candidate)
+        return base, fitter.add_candidate(base, candidate)
 
     return fits
 

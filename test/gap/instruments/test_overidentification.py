@@ -13,7 +13,6 @@ from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments import overidentification as structure
 from sysid_node.gap.instruments.excitation import external_excitation
 from sysid_node.gap.instruments.overidentification import (
-    CHANCE_DEVIATIONS,
     OveridentificationTest,
     command_instruments,
     gust_free_instruments,
@@ -24,6 +23,7 @@ from sysid_node.gap.instruments.overidentification import (
 )
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
 
 DIRECTIONS, ROWS = 37, 400
@@ -115,5 +115,5 @@ def test_gusts_that_pass_for_derivatives_make_no_structure_of_sharp_steps() -> N
     model = residual_model_of(Simulator(aircraft, 50.0), flight)
     fit = converged(unfitted([model], nuisances_of(aircraft, model)))
     roll = COEFFICIENTS.index("Cl")
-    assert overidentification_of(fit, by=gust_free_instruments).deviations[roll] > CHANCE_DEVIATIONS
-    assert pooled_overidentification(fit).deviations[roll] < 0.6 * CHANCE_DEVIATIONS
+    assert overidentification_of(fit, by=gust_free_instruments).deviations[roll] > THRESHOLDS.instruments.chance
+    assert pooled_overidentification(fit).deviations[roll] < 0.6 * THRESHOLDS.instruments.chance

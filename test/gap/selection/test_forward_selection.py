@@ -11,7 +11,7 @@ from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection import acceptance
 from sysid_node.gap.selection import candidate_fitter as module
-from sysid_node.gap.selection.candidate_fitter import Trier
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.forward_selection import attribute
 from sysid_node.sim import Simulator
 
@@ -45,14 +45,14 @@ def test_what_gives_no_numbers_is_no_explanation(plain_model, monkeypatch) -> No
         raise np.linalg.LinAlgError("not positive definite")
 
     nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
-    trier = Trier(nuisances, Checkpoint())
-    base = trier.trial(unfitted([plain_model], nuisances), [])
+    fitter = CandidateFitter(nuisances, Checkpoint())
+    base = fitter.fit_set(unfitted([plain_model], nuisances), [])
     (candidate,) = (c for c in candidates_of(plain_model.simulator, [plain_model]) if c.label == "command_delay")
     with monkeypatch.context() as patch:
         patch.setattr(module, "competing_evidence", endless)
-        assert trier.upon(base, (0.0, candidate, (0.02,))) is None
+        assert fitter.add(base, (0.0, candidate, (0.02,))) is None
     monkeypatch.setattr(module, "_first_look", endless)
-    ((left, looked_at, _),) = trier.looks(base, [candidate], lambda share, text: None)
+    ((left, looked_at, _),) = fitter.screen(base, [candidate], lambda share, text: None)
     assert left == np.inf and looked_at is candidate
 
 

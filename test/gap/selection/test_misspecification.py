@@ -10,9 +10,9 @@ from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.fit import unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.calibration import Grounds
-from sysid_node.gap.selection.candidate_fitter import Trier
-from sysid_node.gap.selection.misspecification import adequacy_of
+from sysid_node.gap.selection.calibration import CauseEvidence
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
+from sysid_node.gap.selection.misspecification import misspecification_of
 from sysid_node.sim import Simulator
 
 
@@ -23,10 +23,12 @@ def misfit(aircraft):
     def of(flight):
         model = residual_model_of(Simulator(aircraft, 50.0), flight)
         nuisances = nuisances_of(aircraft, model)
-        trier = Trier(nuisances, Checkpoint())
-        base = trier.trial(unfitted([model], nuisances), [])
+        fitter = CandidateFitter(nuisances, Checkpoint())
+        base = fitter.fit_set(unfitted([model], nuisances), [])
         (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "imu_scale")
-        return Grounds.of("imu_scale", 1000.0, adequacy_of(trier.beside(base, candidate).fit, candidate))
+        return CauseEvidence.of(
+            "imu_scale", 1000.0, misspecification_of(fitter.add_candidate(base, candidate).fit, candidate)
+        )
 
     return of
 
@@ -35,7 +37,7 @@ def misfit(aircraft):
 def test_a_gyro_that_reads_low_is_one(misfit, make_flight, turbulence) -> None:
     grounds = misfit(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
     assert grounds.misfit < 0.2
-    assert grounds.credence > 0.9
+    assert grounds.probability_by_evidence > 0.9
 
 
 @pytest.mark.parametrize("turbulence", ["none", "light"])
@@ -46,4 +48,4 @@ def test_a_gyro_that_saturates_is_not_one_that_reads_low(misfit, make_flight, tu
     clipped = replace(flight.record, columns={**flight.record.columns, "p": cut})
     grounds = misfit(replace(flight, record=clipped))
     assert grounds.misfit > 0.4
-    assert grounds.wanting
+    assert grounds.supported_but_misspecified

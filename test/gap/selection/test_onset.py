@@ -9,7 +9,7 @@ from sysid_node.gap.estimation.fit import CandidateFit, converged, unfitted, wit
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.onset import sought
+from sysid_node.gap.selection.onset import search_onset
 from sysid_node.gap.validation.standard_errors import standard_errors
 from sysid_node.sim import Simulator
 
@@ -28,7 +28,7 @@ def test_an_onset_is_found_though_the_fit_starts_seconds_away(aircraft) -> None:
     far, candidate = fitted(aircraft, 18.0, 6.0)
     loss, onset = (far.indices.index(i) for i in candidate.indices)
     assert abs(far.values[onset] - 18.0) > 2.0
-    found = converged(sought(far, candidate))
+    found = converged(search_onset(far, candidate))
     assert found.values[onset] == pytest.approx(18.0, abs=0.5)
     errors = standard_errors(found)
     assert errors[onset] < 0.3
@@ -39,7 +39,7 @@ def test_of_an_onset_while_the_surface_rests_the_gusts_tell_little(aircraft) -> 
     """No elevator is flown from 11 to 17 s; what it lost is known as well as it is from after that."""
     far, candidate = fitted(aircraft, 13.0, 16.0, "light")
     loss, onset = (far.indices.index(i) for i in candidate.indices)
-    found = liml_estimate(converged(sought(far, candidate)))
+    found = liml_estimate(converged(search_onset(far, candidate)))
     errors = standard_errors(found)
     assert 0.8 < errors[onset] < 5.0
     assert abs(found.values[onset] - 13.0) < 2.0 * errors[onset]

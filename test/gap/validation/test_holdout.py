@@ -25,7 +25,7 @@ class Explanation:
     def by_least_squares(self) -> "Explanation":
         return Explanation(self.chosen.fit)
 
-    def without_the_weakest(self) -> "Explanation":
+    def without_least_probable(self) -> "Explanation":
         return Explanation(2.0 * np.eye(2))
 
     def without_causes(self) -> "Explanation":
@@ -61,7 +61,7 @@ def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it(monkeyp
     monkeypatch.setattr(holdout, "check", by_cholesky)
     wild = -np.eye(2)
     explanation = Explanation(wild, SimpleNamespace(fit=wild), ("sound", "wild"))
-    monkeypatch.setattr(Explanation, "without_the_weakest", lambda self: Explanation(4.0 * np.eye(2)))
+    monkeypatch.setattr(Explanation, "without_least_probable", lambda self: Explanation(4.0 * np.eye(2)))
     _, checked = holdout._standing(explanation, (), ())
     assert checked.size == pytest.approx(4.0)
 
@@ -69,10 +69,12 @@ def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it(monkeyp
 def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(aircraft) -> None:
     flights = [fly(aircraft, {"actuator_lag": {"time_constant": 0.08}, "derivative_error": WRONG}, s) for s in (5, 6)]
     attribution = diagnose(aircraft, flights[:1], flights[1:]).attribution
-    beside = attribution.beside_the_file()
+    beside = attribution.with_file_derivatives()
     fit = beside.corrected
     (lag,) = fit.indices
-    assert beside.filed and fit.points[0][lag] == attribution.corrected.points[0][lag] == pytest.approx(0.08, rel=0.1)
+    assert beside.keeps_file_derivatives and fit.points[0][lag] == attribution.corrected.points[0][
+        lag
+    ] == pytest.approx(0.08, rel=0.1)
     assert np.flatnonzero(fit.points[0] != fit.models[0].simulator.neutral()).tolist() == [lag]
 
 

@@ -9,7 +9,7 @@ from sysid_node.gap.estimation.fit import converged, unfitted, with_candidates
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, window_groups, with_neighbours
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.validation.kfold import _steps, parted
+from sysid_node.gap.validation.kfold import _steps, kfold_evidence
 from sysid_node.sim import Simulator
 
 
@@ -27,7 +27,7 @@ def test_each_part_is_left_out_of_what_predicts_it(aircraft, plain_model) -> Non
 
 def test_nuisances_may_be_held(aircraft, plain_model) -> None:
     fit = converged(unfitted([plain_model], nuisances_of(aircraft, plain_model)))
-    evidence = parted(cross_validated_evidence(fit), fit, filed=True)
+    evidence = kfold_evidence(cross_validated_evidence(fit), fit, filed=True)
     own = [i for i, name in enumerate(plain_model.simulator.names) if name.startswith("derivative_error")]
     for point in evidence.points[0]:
         np.testing.assert_allclose(point[own], fit.points[0][own], rtol=0.0, atol=1e-5 * np.ptp(fit.points[0][own]))
@@ -43,12 +43,12 @@ def test_an_onset_stays_where_the_whole_flight_has_it(aircraft) -> None:
     )
     fit = converged(with_candidates(converged(unfitted([model], nuisances)), [loss], nuisances, [0.5, 12.0]))
     _, onset = loss.indices
-    evidence = parted(cross_validated_evidence(fit), fit)
+    evidence = kfold_evidence(cross_validated_evidence(fit), fit)
     assert [point[onset] for point in evidence.points[0]] == pytest.approx(
         [fit.points[0][onset]] * len(evidence.points[0]), abs=0.01
     )
     bare = converged(unfitted([model], nuisances))
     left, without = (
-        np.abs(e.residuals[0][:, 1:]).max() for e in (evidence, parted(cross_validated_evidence(bare), bare))
+        np.abs(e.residuals[0][:, 1:]).max() for e in (evidence, kfold_evidence(cross_validated_evidence(bare), bare))
     )
     assert left < 2.0 * without

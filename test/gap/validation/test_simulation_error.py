@@ -10,7 +10,7 @@ import pytest
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.validation.simulation_error import WINDOW, drawn, flown, foreseen
+from sysid_node.gap.validation.simulation_error import WINDOW, side_by_side, simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.verdict.decision import far_off
 from sysid_node.sim import Simulator
@@ -31,7 +31,7 @@ def evidence(model: ResidualModel, theta) -> Evidence:
 def gap_of(model: ResidualModel, effects: Mapping[str, Mapping[str, float]]):
     """Before: the file; after: with the effects."""
     simulator = model.simulator
-    return flown(evidence(model, simulator.neutral()), evidence(model, simulator.vector(effects)))
+    return simulation_gap(evidence(model, simulator.neutral()), evidence(model, simulator.vector(effects)))
 
 
 @pytest.mark.parametrize("kind", EFFECTS)
@@ -54,7 +54,7 @@ def test_gusts_are_no_gap(aircraft, make_flight) -> None:
 
 def test_short_flights_begin_where_the_flight_is(plain_model) -> None:
     """The simulator reads what was measured at the start of each, and departs from it later."""
-    beside = drawn(plain_model, [plain_model.simulator.vector({"mass_error": {"error": 0.3}})])
+    beside = side_by_side(plain_model, [plain_model.simulator.vector({"mass_error": {"error": 0.3}})])
     begins = np.flatnonzero(beside.begins)
     assert np.diff(begins) == pytest.approx(WINDOW * plain_model.simulator.rate)
     off = np.abs(beside.measured - beside.before)[:, 9]
@@ -72,9 +72,9 @@ def test_weather_is_foreseen_and_effects_are_not(aircraft, make_flight) -> None:
     """Turbulence in which nothing but the autopilot moves the surfaces, and a wing that rings in still air."""
     simulator = Simulator(aircraft, 50.0)
     weather = make_flight({}, seed=5, turbulence="light", manoeuvre=[])
-    assert foreseen([residual_model_of(simulator, weather)])
+    assert weather_suffices([residual_model_of(simulator, weather)])
     slow = make_flight({"structural_mode": {"gain": 0.3}}, seed=6)
-    assert not foreseen([residual_model_of(simulator, slow)])
+    assert not weather_suffices([residual_model_of(simulator, slow)])
 
 
 @pytest.mark.parametrize(("after", "told"), [((0.15, 0.18), True), ((0.09, 0.12), False)])
@@ -82,4 +82,4 @@ def test_a_tenth_of_the_motion_beyond_the_noise_is_far_off_however_much_is_close
     """0.15 less a floor of at most 0.08 leaves 0.13; 0.09 leaves 0.04."""
     intervals = {"before": (2.5, 3.0), "tolerances": after, "after": after, "noise_floor": (0.05, 0.08)}
     gap = Gap(2.7, 0.16, 0.16, 0.066, 96.0, (95.0, 97.0), {}, intervals)
-    assert far_off(SimpleNamespace(flown=gap)) is told
+    assert far_off(SimpleNamespace(simulation_gap=gap)) is told

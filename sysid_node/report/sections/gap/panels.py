@@ -13,7 +13,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, drawn, shows
+from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, can_be_simulated, side_by_side
 from sysid_node.gap.validation.spectral_error import STAGES
 from sysid_node.gap.verdict.decision import structured
 from sysid_node.gap.verdict.localisation import REGIMES
@@ -58,8 +58,8 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
         "text": paragraph(found),
         "facts": facts,
         "next_flight": found.next_flight,
-        "short": bool(found.flown),
-        "window": f"{WINDOW:g} s" if found.flown else f"{found.models[0].windows.length:.2g} s",
+        "short": bool(found.simulation_gap),
+        "window": f"{WINDOW:g} s" if found.simulation_gap else f"{found.models[0].windows.length:.2g} s",
     }
 
 
@@ -125,8 +125,13 @@ def _steps_down(found: Diagnosis) -> list[tuple[str, str, float]]:
 
 def flight(found: Diagnosis) -> Mapping[str, Any]:
     """Measured, as the file has it, and as corrected: short flights where there are any, else forces and moments."""
-    panels = _short_flights(found) if found.flown else _coefficients(found)
-    return {"panels": panels, "held_out": found.held_out, "short": bool(found.flown), "window": f"{WINDOW:g} s"}
+    panels = _short_flights(found) if found.simulation_gap else _coefficients(found)
+    return {
+        "panels": panels,
+        "held_out": found.held_out,
+        "short": bool(found.simulation_gap),
+        "window": f"{WINDOW:g} s",
+    }
 
 
 Panel = tuple[Any, str, Figure]
@@ -134,8 +139,8 @@ Panel = tuple[Any, str, Figure]
 
 def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved, each short flight a line of its own."""
-    place = next(k for k, model in enumerate(found.models) if shows(model))
-    record = drawn(found.models[place], found.final.points[place])
+    place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
+    record = side_by_side(found.models[place], found.final.points[place])
     span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
     begins = record.begins[span].copy()
     panels = []
@@ -243,7 +248,7 @@ def channels(found: Diagnosis) -> Mapping[str, Any]:
         "rows": rows,
         "whole": [whole, ends],
         "held_out": found.held_out,
-        "short": bool(found.flown),
+        "short": bool(found.simulation_gap),
         "window": f"{WINDOW:g} s",
     }
 

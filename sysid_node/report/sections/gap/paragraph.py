@@ -56,7 +56,7 @@ def paragraph(found: Diagnosis) -> str:
 def _off(found: Diagnosis) -> str:
     """How far off the simulator is, and where most: of what is mended, where causes were found."""
     gap = found.size
-    if found.flown:
+    if found.simulation_gap:
         before, after = ({words: _together(gap, n, when) for words, n in _RESPONSES.items()} for when in _TIMES)
         mended = {words: before[words] ** 2 - after[words] ** 2 for words in _RESPONSES}
         sizes = mended if found.attribution.causes else before
