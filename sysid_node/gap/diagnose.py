@@ -10,7 +10,7 @@ from typing import Any
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.predictive_density import Evidence, transferred_parameters
+from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
 from sysid_node.gap.residuals.admissibility import require_admissible, require_distinct_flights
@@ -20,37 +20,55 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import Progress
 from sysid_node.gap.selection.confusion import Confusion, confusion_of
 from sysid_node.gap.selection.forward_selection import Attribution, attribute
-from sysid_node.gap.validation.holdout import validate
+from sysid_node.gap.validation.holdout import Check, validate
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.verdict import localisation
-from sysid_node.gap.verdict.decision import verdict_of
+from sysid_node.gap.verdict.decision import Decision, VerdictScores, decide
 from sysid_node.gap.verdict.localisation import Shape
+from sysid_node.gap.verdict.measurement import measure
 from sysid_node.gap.verdict.next_flight import advice
 from sysid_node.sim import Simulator
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found. ``models`` are the flights on which the gap is measured, with the evidence there."""
+    """The result of a diagnosis: the decision, what it was made from, and what is reported beside it."""
 
     aircraft: Aircraft
-    verdict: str
-    gap: Gap  # of forces, moments and kinematics by frequency
-    simulation_gap: Gap | None  # of short flights
-    where: list[dict[str, Any]]
+    decision: Decision
+    scores: VerdictScores  # from which the verdict was decided
     attribution: Attribution
+    check: Check  # on flight not fitted
+    held_out: bool  # whether that is a flight of its own; else parts of the same flights
+    where: list[dict[str, Any]]
     shape: Shape | None
-    models: tuple[ResidualModel, ...]
-    base: Evidence
-    final: Evidence
-    next_flight: str
-    held_out: bool
     confusion: Confusion
+    next_flight: str
     air_motion: float  # rms of the air's motion across the flight path, m/s
 
     @property
+    def verdict(self) -> str:
+        """One of the five words of gap.json."""
+        return self.decision.verdict
+
+    @property
+    def models(self) -> tuple[ResidualModel, ...]:
+        """The flights on which the gap is measured."""
+        return self.check.models
+
+    @property
+    def gap(self) -> Gap:
+        """The gap of forces, moments and kinematics by frequency."""
+        return self.check.gap
+
+    @property
+    def simulation_gap(self) -> Gap | None:
+        """The gap of short simulated flights; none where none can be simulated."""
+        return self.check.simulation_gap
+
+    @property
     def size(self) -> Gap:
-        """The gap as it is told: of short flights, of forces and kinematics where the flight shows none."""
+        """The gap that is reported first: of short flights, or of forces and kinematics where there are none."""
         return self.simulation_gap or self.gap
 
 
@@ -61,12 +79,12 @@ def diagnose(
     progress: Progress = lambda s, t: None,
     keep: Path | None = None,
 ) -> Diagnosis:
-    """Diagnoses flights, and measures the gap on flights held out; without these, by parts of the same flights.
+    """The diagnosis of flights; the gap is measured on flights held out, or without these on parts of the same flights.
 
-    One flight alone with one manoeuvre is cut down to it (``quiet``). ``keep``: a folder for finished steps, from which
-    an interrupted diagnosis goes on; empty again at the end.
-    Raises InputError: an aircraft file without tolerances or of another aircraft, a held-out flight that is also
-    fitted, a flight in which nothing moves.
+    A single flight with a single manoeuvre is cut down to it (``manoeuvre_window``). ``keep`` is a folder for finished
+    fits, from which an interrupted diagnosis goes on; its files are removed at the end. Raises InputError for an
+    aircraft file without tolerances or of another aircraft, for a held-out flight that is also fitted, and for a flight
+    in which no control surface moves.
     """
     require_distinct_flights(flights, holdouts)
     progress(0.0, "reading the flights as forces and moments")
@@ -80,14 +98,14 @@ def diagnose(
     attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
     progress(0.92, "the gap on flight not fitted")
     attribution, checked = validate(attribution, models, unseen, own)
-    verdict = verdict_of(models, attribution, checked)
+    scores = measure(models, attribution, checked)
+    decision = decide(scores)
     progress(0.95, "short flights beside the flight, and what to fly next")
     found = localisation.where(attribution, [v.residual(simulator.neutral()) for v in models])
     air = max(gust_speed(v, transferred_parameters(attribution.corrected, v)) for v in (*models, *unseen))
-    flight = advice(verdict, attribution)
+    flight = advice(decision.verdict, attribution)
     steps.forget()
     return Diagnosis(
-        aircraft, verdict, checked.gap, checked.simulation_gap, found, attribution,
-        localisation.missing(attribution), checked.models, checked.base, checked.final, flight, bool(holdouts),
-        confusion_of(attribution.base, attribution.first_stage), air,
+        aircraft, decision, scores, attribution, checked, bool(holdouts), found, localisation.missing(attribution),
+        confusion_of(attribution.base, attribution.first_stage), flight, air,
     )  # fmt: skip

@@ -12,7 +12,8 @@ from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.validation.simulation_error import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.validation.standard_errors import standard_errors, with_standard_error
-from sysid_node.gap.verdict.decision import explained, named, structured, wanting
+from sysid_node.gap.verdict.decision import unexplained_share
+from sysid_node.gap.verdict.next_flight import named
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -37,7 +38,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             {"effect": label, "probability": probability, "share": share} for label, probability, share in ranked(found)
         ],
         "unexplained": {
-            "share": 1.0 - explained(attribution) if structured(attribution) or wanting(attribution) else 0.0,
+            "share": unexplained_share(found.scores),
             "where": [w for w in found.where if w["station"] == "unexplained"][:3],
             "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
         },

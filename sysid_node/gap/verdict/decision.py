@@ -1,136 +1,188 @@
-"""The verdict: from what was accepted, what is left over, and what flight not fitted says of it."""
+"""The verdict, as a pure function of a table of scores and of the thresholds.
+
+``verdict.measurement`` fills the table. The rules stand in the order in which they are applied; the first that holds
+gives the verdict:
+
+1. ``unsupported``: the flight hardly rises above the sensors' noise.
+2. ``no_gap``: weather and the sensors' noise alone account for the simulator's error in every reading.
+3. ``unsupported``: nothing but an autopilot that responds to gusts moves the control surfaces.
+4. Without causes ``no_gap``, or ``unknown_effect`` where the remainder is structured, where a well supported effect is
+   misspecified, or where the simulator's error needs a cause.
+5. With causes ``unknown_effect``, where they close too little of the gap, predict no better than the derivatives,
+   explain too small a share, or leave more structure on some channel than they remove there.
+6. ``explained`` where every cause is told apart from its alternatives, else ``ambiguous``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit
-from sysid_node.gap.estimation.nuisances import CLOCKS
-from sysid_node.gap.estimation.predictive_density import Evidence
-from sysid_node.gap.instruments.excitation import externally_excited
-from sysid_node.gap.residuals.admissibility import signal_to_noise
-from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
-from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.acceptance import power_left
-from sysid_node.gap.selection.causes import Cause
-from sysid_node.gap.selection.forward_selection import Attribution
-from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.gap.validation.holdout import Check
+from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 
 
-def verdict_of(models: Sequence[ResidualModel], attribution: Attribution, check: Check) -> str:
-    """One of gap.json's five words."""
-    if max(signal_to_noise(model).max() for model in models) < THRESHOLDS.admission.excitation:
-        return "unsupported"
-    if check.weather_suffices or not any(externally_excited(model) for model in models):
-        return "no_gap" if check.weather_suffices else "unsupported"
-    if not attribution.causes:
-        return "unknown_effect" if structured(attribution) or wanting(attribution) or far_off(check) else "no_gap"
-    if short(check) or check.final.total <= check.base.total or explained(attribution) < THRESHOLDS.verdict.explained:
-        return "unknown_effect"
-    if unexplained(attribution) or wanting(attribution):
-        return "unknown_effect"
-    return (
-        "explained"
-        if all(cause.share >= THRESHOLDS.verdict.told_apart for cause in attribution.causes)
-        else "ambiguous"
-    )
+@dataclass(frozen=True)
+class CauseScores:
+    """One cause of the explanation."""
+
+    label: str
+    share: float  # of the probability that it has together with its alternatives
+    power_removed: Array  # (12,) that it removes on flight not fitted, the other causes given
 
 
-def structured(attribution: Attribution) -> bool:
-    """Whether what is left holds structure that matters."""
-    return bool(_structured(attribution).any())
+@dataclass(frozen=True)
+class DoubtedScores:
+    """One effect that predicts better, but was not kept as a cause."""
+
+    label: str
+    supported_but_misspecified: bool  # well supported by its log Bayes factor, but its equation is misspecified
+    replaced: bool = False  # an alternative took its place
 
 
-def wanting(attribution: Attribution) -> bool:
-    """Whether something is there that the likeliest effect accounts for by most, but not by its own law.
+@dataclass(frozen=True)
+class SimulationScores:
+    """Errors (rms) of short simulated flights as shares of the motion, on flight not fitted."""
 
-    Not where another took its place: that is what is there.
+    after: float
+    noise_floor: float
+    after_lower: float  # lower end of its 95 % interval
+    noise_floor_upper: float  # upper end of its 95 % interval
+    shrink_upper: float  # upper end of the shrinkage's 95 % interval, %
+
+
+@dataclass(frozen=True)
+class VerdictScores:
+    """All that the verdict depends on. Powers and statistics are by channel (12,), on flight not fitted."""
+
+    signal_to_noise: float  # largest power over the power of the sensors' noise, of all flights and channels
+    weather_suffices: bool  # weather and the sensors' noise account for the simulator's error in every reading
+    externally_excited: bool  # the commands of at least one flight are more than the autopilot's response to gusts
+    causes: tuple[CauseScores, ...]
+    doubted: tuple[DoubtedScores, ...]
+    score_before: float  # log predictive score of the derivatives within their tolerances, nats
+    score_after: float  # the same with the causes
+    motion: Array  # power of what was measured, about the windows' means
+    power_before: Array  # power left by the derivatives within their tolerances
+    power_after: Array  # power left with the causes
+    structure_deviations: Array  # test statistic of over-identification, standard deviations from its mean
+    structure_share: Array  # share of the power left that is structure
+    sampling: Array  # power that stamps leave that are off by chance within a sample, as a share of the motion
+    simulation: SimulationScores | None  # none where no short flight can be simulated
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The verdict, the labels of the causes and of the doubted effects, and the rule that gave the verdict."""
+
+    verdict: str
+    causes: tuple[str, ...]
+    doubted: tuple[str, ...]
+    reason: str
+
+
+def decide(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> Decision:
+    """The verdict: one of ``no_gap``, ``explained``, ``ambiguous``, ``unknown_effect``, ``unsupported``."""
+    verdict, reason = next(_rules(scores, thresholds))
+    causes = tuple(cause.label for cause in scores.causes)
+    return Decision(verdict, causes, tuple(cause.label for cause in scores.doubted), reason)
+
+
+def _rules(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tuple[str, str]]:
+    """The verdicts of all rules that hold, with the rule in words, the first to be applied first."""
+    if scores.signal_to_noise < thresholds.admission.excitation:
+        yield "unsupported", "the flight hardly rises above the sensors' noise"
+    if scores.weather_suffices:
+        yield "no_gap", "weather and the sensors' noise account for the simulator's error"
+    if not scores.externally_excited:
+        yield "unsupported", "only an autopilot that responds to gusts moves the control surfaces"
+    yield from _rules_with_causes(scores, thresholds) if scores.causes else _rules_without(scores, thresholds)
+
+
+def _rules_without(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tuple[str, str]]:
+    """Rules where no cause was kept."""
+    if structured_channels(scores, thresholds).any():
+        yield "unknown_effect", "the remainder is structured, and no effect explains it"
+    if is_misspecified(scores):
+        yield "unknown_effect", "a well supported effect is misspecified"
+    if error_needs_cause(scores.simulation, thresholds):
+        yield "unknown_effect", "the simulator's error is larger than noise and weather make it"
+    yield "no_gap", "nothing that matters is left to explain"
+
+
+def _rules_with_causes(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tuple[str, str]]:
+    """Rules where at least one cause was kept."""
+    if closes_too_little(scores.simulation, thresholds):
+        yield "unknown_effect", "the causes close too little of the gap"
+    if scores.score_after <= scores.score_before:
+        yield "unknown_effect", "the causes predict no better than the derivatives within their tolerances"
+    if explained_share(scores, thresholds) < thresholds.verdict.explained:
+        yield "unknown_effect", "the causes explain too small a share of the gap"
+    if structure_exceeds_causes(scores, thresholds):
+        yield "unknown_effect", "on some channel more structure is left than the causes remove"
+    if is_misspecified(scores):
+        yield "unknown_effect", "a well supported effect is misspecified"
+    if all(cause.share >= thresholds.verdict.told_apart for cause in scores.causes):
+        yield "explained", "every cause is told apart from its alternatives"
+    yield "ambiguous", "an alternative would do nearly as well as a cause"
+
+
+def structured_channels(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> NDArray[np.bool_]:
+    """Channels (12,) on which structure is left that is significant and large enough to matter."""
+    least = thresholds.acceptance.noticeable_error**2 + scores.sampling
+    significant = scores.structure_deviations > thresholds.verdict.structure
+    return np.asarray(significant & (structure_left(scores, thresholds) > least))
+
+
+def structure_left(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> Array:
+    """Power (12,) of what is left and is structure beyond chance, as a share of the motion."""
+    beyond_chance = scores.structure_deviations > thresholds.instruments.chance
+    share = np.where(beyond_chance, scores.structure_share, 0.0)
+    return np.asarray(share * scores.power_after / scores.motion)
+
+
+def is_misspecified(scores: VerdictScores) -> bool:
+    """Whether a well supported effect is misspecified and no alternative took its place.
+
+    Then something is there that resembles the effect, but is not the effect.
     """
-    return any(cause.evidence.supported_but_misspecified and not cause.replaced for cause in attribution.doubted)
+    return any(cause.supported_but_misspecified and not cause.replaced for cause in scores.doubted)
 
 
-def far_off(check: Check) -> bool:
-    """Whether the simulator is further off than chance, noise and weather make it, with nothing found to blame.
-
-    However much of the gap the derivatives close, where surely a tenth of the motion is left beyond the noise.
-    """
-    gap = check.simulation_gap
-    surely = (
-        gap is not None
-        and gap.intervals["after"][0] ** 2 - gap.intervals["noise_floor"][1] ** 2 > THRESHOLDS.verdict.error**2
-    )
-    return surely or short(check)
+def error_needs_cause(simulation: SimulationScores | None, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether the simulator's error is surely larger than noise and weather make it, by its size or by its share."""
+    if simulation is None:
+        return False
+    beyond_noise = simulation.after_lower**2 - simulation.noise_floor_upper**2
+    return beyond_noise > thresholds.verdict.error**2 or closes_too_little(simulation, thresholds)
 
 
-def short(check: Check) -> bool:
-    """Whether what was found surely falls short of what could be closed, by more than chance leaves."""
-    gap = check.simulation_gap
-    return (
-        gap is not None
-        and gap.after > THRESHOLDS.validation.chance * gap.noise_floor
-        and gap.ci95[1] < THRESHOLDS.verdict.closed
-    )
+def closes_too_little(simulation: SimulationScores | None, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether the shrinkage of the gap is surely incomplete, and the error more than chance leaves above the floor."""
+    if simulation is None:
+        return False
+    above_floor = simulation.after > thresholds.validation.chance * simulation.noise_floor
+    return above_floor and simulation.shrink_upper < thresholds.verdict.closed
 
 
-def unexplained(attribution: Attribution) -> bool:
-    """Whether on some channel structure that matters is left, and more of it than all causes take away there."""
-    more = _structure_left(attribution) > sum(cause.power_removed for cause in attribution.causes) / _motion(
-        attribution.chosen.evidence
-    )
-    return bool(np.any(_structured(attribution) & more))
+def structure_exceeds_causes(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether on some channel structure is left that matters, and more of it than all causes remove there."""
+    removed = sum(cause.power_removed for cause in scores.causes) / scores.motion
+    return bool(np.any(structured_channels(scores, thresholds) & (structure_left(scores, thresholds) > removed)))
 
 
-def _structured(attribution: Attribution) -> NDArray[np.bool_]:
-    """Channels (12,) on which structure that matters is left."""
-    power, noticed = (
-        _structure_left(attribution),
-        THRESHOLDS.acceptance.noticeable_error**2 + _sampling(attribution.chosen.fit),
-    )
-    return np.asarray((attribution.structure_left.deviations > THRESHOLDS.verdict.structure) & (power > noticed))
+def explained_share(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Share that the causes remove of what derivatives leave and is not noise, all channels together; 1 of nothing."""
+    removed = max(float(((scores.power_before - scores.power_after) / scores.motion).sum()), 0.0)
+    whole = removed + float(structure_left(scores, thresholds).sum())
+    return removed / whole if whole > 0.0 else 1.0
 
 
-def explained(attribution: Attribution) -> float:
-    """Share that the effects take away of what lies above the tolerances and is not noise, all channels together."""
-    motion = _motion(attribution.chosen.evidence)
-    gone = (power_left(attribution.base.evidence) - power_left(attribution.chosen.evidence)) / motion
-    taken = max(float(gone.sum()), 0.0)
-    whole = taken + float(_structure_left(attribution).sum())
-    return taken / whole if whole > 0.0 else 1.0
-
-
-def _structure_left(attribution: Attribution) -> Array:
-    """Power (12,) of what is left and is structure beyond chance, as shares of the motion."""
-    left, evidence = attribution.structure_left, attribution.chosen.evidence
-    share = np.where(left.deviations > THRESHOLDS.instruments.chance, left.share, 0.0)
-    return np.asarray(share * power_left(evidence) / _motion(evidence))
-
-
-def _sampling(fit: CandidateFit) -> Array:
-    """Power (12,) that stamps leave which are off by chance within a sample, as shares of the motion.
-
-    A step in a command falls anywhere between two messages, each time elsewhere: no clock's error is it, and coherent
-    with the commands it is.
-    """
-    left, motion = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
-    for model, point in zip(fit.models, fit.points, strict=True):
-        rates = np.array([model.flight.actuator_rate, model.flight.air_rate])
-        slopes = model.slopes(point, [model.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
-        left += sum(power_of(slopes[..., i]) / (12.0 * rate**2) for i, rate in enumerate(rates))
-        motion += (np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1))
-    return left / np.maximum(motion, 1e-300)
-
-
-def _motion(evidence: Evidence) -> Array:
-    """Power (12,) of what was measured, about the windows' means."""
-    power = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in evidence.models)
-    return np.asarray(np.maximum(power, 1e-300))
-
-
-def named(cause: Cause) -> list[str]:
-    """Effects that are named beside a cause."""
-    return [effect for effect, p in cause.alternatives if p > THRESHOLDS.verdict.named]
+def unexplained_share(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Share that no cause explains; zero where nothing structured is left and no supported effect is misspecified."""
+    if structured_channels(scores, thresholds).any() or is_misspecified(scores):
+        return 1.0 - explained_share(scores, thresholds)
+    return 0.0

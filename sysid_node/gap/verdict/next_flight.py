@@ -27,7 +27,6 @@ from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.gap.verdict.decision import named
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
 from sysid_node.sim.signals.atmosphere import air_density
@@ -91,6 +90,11 @@ def _listed(attribution: Attribution) -> str:
     """The causes in doubt and what is named beside them."""
     doubtful = [cause for cause in attribution.causes if named(cause)]
     return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause))))
+
+
+def named(cause: Cause) -> list[str]:
+    """Effects that are named beside a cause as alternatives to it."""
+    return [effect for effect, probability in cause.alternatives if probability > THRESHOLDS.verdict.named]
 
 
 def _confused(cause: Cause) -> list[FittedSet]:

@@ -15,7 +15,7 @@ from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, can_be_simulated, side_by_side
 from sysid_node.gap.validation.spectral_error import STAGES
-from sysid_node.gap.verdict.decision import structured
+from sysid_node.gap.verdict.decision import structured_channels
 from sysid_node.gap.verdict.localisation import REGIMES
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, GREEN, INK, MUTED, PALE, PURPLE, VERMILION, Figure
@@ -140,7 +140,7 @@ Panel = tuple[Any, str, Figure]
 def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved, each short flight a line of its own."""
     place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
-    record = side_by_side(found.models[place], found.final.points[place])
+    record = side_by_side(found.models[place], found.check.final.points[place])
     span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
     begins = record.begins[span].copy()
     panels = []
@@ -262,7 +262,7 @@ def shape(found: Diagnosis) -> Mapping[str, Any]:
     """The missing coefficient against what it depends on most."""
     missing = found.shape
     if missing is None:
-        return {"figure": None, "words": "", "left": structured(found.attribution)}
+        return {"figure": None, "words": "", "left": bool(structured_channels(found.scores).any())}
     signal = _signal(missing.signal)
     trace = figures.line(missing.centres, missing.means, missing.axis)
     trace |= {"mode": "lines+markers", "error_y": {"type": "data", "array": (1.96 * missing.errors).tolist()}}
@@ -274,5 +274,5 @@ def shape(found: Diagnosis) -> Mapping[str, Any]:
     return {
         "figure": Figure(words, [trace], layout, 300),
         "words": f"{words}; the bins explain {number(100 * missing.explained, 2)} % of it",
-        "left": structured(found.attribution),
+        "left": bool(structured_channels(found.scores).any()),
     }
