@@ -14,15 +14,16 @@ PACKAGE = Path(__file__).resolve().parents[1] / "sysid_node"
 #: What each layer may import of the package, besides itself.
 BELOW = {
     "aircraft": set(),
-    "flight": {"aircraft"},
-    "sim": {"aircraft", "flight"},
-    "online": {"aircraft", "flight"},
-    "control": {"aircraft", "flight"},
-    "batch": {"aircraft", "flight", "sim"},
-    "excite": {"aircraft", "flight", "sim"},
-    "faults": {"aircraft", "flight", "online"},
-    "gap": {"aircraft", "flight", "sim", "online", "batch", "control", "excite"},
-    "ros": {"aircraft", "flight", "sim", "online", "batch", "control", "excite", "faults", "gap"},
+    "dynamics": {"aircraft"},
+    "flight": {"aircraft", "dynamics"},
+    "sim": {"aircraft", "dynamics", "flight"},
+    "online": {"aircraft", "dynamics", "flight"},
+    "control": {"aircraft", "dynamics", "flight"},
+    "batch": {"aircraft", "dynamics", "flight", "sim"},
+    "excite": {"aircraft", "dynamics", "flight", "sim"},
+    "faults": {"aircraft", "dynamics", "flight", "online"},
+    "gap": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite"},
+    "ros": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite", "faults", "gap"},
 }
 BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["cli"] = {*BELOW["report"], "report"}

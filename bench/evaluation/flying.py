@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
@@ -26,7 +27,6 @@ from sysid_node.sim.flying.autopilot import Autopilot, autopilot_for, fly_held
 from sysid_node.sim.flying.rollout import Flight, Inputs
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.layout import OUTPUTS
-from sysid_node.sim.signals.atmosphere import air_density
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
 Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ def _samples(outputs: Array, surfaces: Array, states: Any) -> Array:
     air[:, 1:-1:2] = 0.5 * (air[:, :-2:2] + air[:, 2::2])
     columns = {name: outputs[..., OUTPUTS.index(name)] for name in SAMPLE_COLUMNS if name in OUTPUTS}
     columns |= dict(zip(("V", "alpha", "beta"), np.moveaxis(air, -1, 0), strict=True))
-    columns["rho"] = np.asarray(air_density(-states[..., 2]))
+    columns["rho"] = np.asarray(air_density(-states[..., 2], np))
     columns["thrust"] = surfaces[..., -1]
     columns["air_interval"] = np.full(outputs.shape[:2], AIR_INTERVAL)
     return np.concatenate([np.stack([columns[name] for name in SAMPLE_COLUMNS], axis=-1), surfaces[..., :-1]], axis=-1)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
@@ -22,7 +23,6 @@ from sysid_node.sim.flying.rollout import rollout
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model
-from sysid_node.sim.signals.atmosphere import air_density
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ class Predictor:
 
     def _record(self, manoeuvre: Manoeuvre, flight: Flight) -> FlightRecord:
         columns = dict(zip(self.simulator.outputs, np.asarray(flight.outputs).T, strict=True))
-        columns["rho"] = np.asarray(air_density(-flight.states[:, 2]))
+        columns["rho"] = np.asarray(air_density(-flight.states[:, 2], jnp))
         controls = (*self.aircraft.control_symbols, "thrust")
         columns |= dict(zip(controls, np.asarray(flight.commands).T, strict=True))
         return FlightRecord(manoeuvre.time, columns, f"{self.aircraft.name} {manoeuvre.spec}")

@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics.airflow import velocity_of
+from sysid_node.dynamics.atmosphere import altitude_of
+from sysid_node.dynamics.attitude import quaternion
 from sysid_node.errors import InputError
-from sysid_node.sim.body import STATES, quaternion
 from sysid_node.sim.effects import Parameter
 from sysid_node.sim.flying.rollout import Flight, Inputs, rollout
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar, layout_of, model_of
-from sysid_node.sim.signals.atmosphere import altitude_of
-from sysid_node.sim.stations.airflow import velocity_of
+from sysid_node.sim.model.state import STATES
 
 Array = NDArray[np.float64]
 
@@ -125,8 +126,8 @@ class Simulator:
         The default altitude has the reference condition's air density. Traceable by JAX.
         """
         height = altitude_of(self.aircraft.reference.air_density) if altitude is None else altitude
-        velocity = velocity_of(*(jnp.asarray(x, float) for x in (airspeed, alpha, beta)))
-        attitude = quaternion(*(jnp.asarray(x, float) for x in euler))
+        velocity = velocity_of((jnp.asarray(x, float) for x in (airspeed, alpha, beta)), jnp)
+        attitude = quaternion((jnp.asarray(x, float) for x in euler), jnp)
         return jnp.stack(
             [
                 *(jnp.asarray(x, float) for x in (0.0, 0.0, -height)),

@@ -6,8 +6,8 @@ from pathlib import Path
 import jsbsim
 import numpy as np
 
-from sysid_node.sim.body import euler_angles
-from sysid_node.sim.signals.atmosphere import GRAVITY
+from sysid_node.dynamics.atmosphere import GRAVITY
+from sysid_node.dynamics.attitude import euler_angles
 
 FOOT, RADIUS = 0.3048, 6371000.0
 
@@ -52,7 +52,7 @@ def load(model: str, name: str, folder: Path, rate: float, altitude: float) -> j
 
 def start(fdm: jsbsim.FGFDMExec, initial, trim, max_thrust: float) -> None:
     """Initial conditions from the body's state (13,) without rotation."""
-    angles = euler_angles(tuple(initial[6:10]))
+    angles = euler_angles(tuple(initial[6:10]), np)
     conditions = {
         "ic/h-sl-ft": -initial[2] / FOOT,
         "ic/lat-geod-deg": 0.0,

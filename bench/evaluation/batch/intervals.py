@@ -23,12 +23,12 @@ from sysid_node.batch.identify import identify
 from sysid_node.batch.methods.state_space import StateSpaceEstimation
 from sysid_node.batch.results.batch_fit import ParameterEstimate
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import Conditions, Sortie, fly_sortie
 from sysid_node.sim.model.layout import OUTPUTS
-from sysid_node.sim.signals.atmosphere import air_density
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _record(flown: Sortie, name: str, trial: Trial) -> FlightRecord:
     columns = dict(zip(OUTPUTS, np.asarray(flown.flight.outputs).T, strict=True))
     surfaces = (*AIRCRAFT.control_symbols, "thrust")
     columns |= dict(zip(surfaces, np.asarray(flown.flight.surfaces).T, strict=True))
-    columns["rho"] = np.asarray(air_density(-np.asarray(flown.flight.states[:, 2])))
+    columns["rho"] = np.asarray(air_density(-np.asarray(flown.flight.states[:, 2]), np))
     measured = {key: values[:: trial.faster] for key, values in columns.items()}
     return FlightRecord(np.arange(len(measured["V"])) / trial.rate, measured, name)
 

@@ -17,15 +17,18 @@ import jax.numpy as jnp
 import numpy as np
 from jax import export
 
+from sysid_node.dynamics.airflow import flow_angles, flow_rates, velocity_of
+from sysid_node.dynamics.attitude import down_of_euler, euler_rates
+from sysid_node.dynamics.lever_arm import specific_force_from, velocity_at, velocity_from
+from sysid_node.dynamics.rigid_body import velocity_rate
+from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
-from sysid_node.sim.body import Vector
-from sysid_node.sim.effects import air_data_lag, imu_lever_arm, imu_misalignment
+from sysid_node.sim.effects import air_data_lag, imu_misalignment
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters
-from sysid_node.sim.signals.atmosphere import GRAVITY
 from sysid_node.sim.signals.time_shift import shift_cubic, slope
-from sysid_node.sim.stations import airflow, sensors
+from sysid_node.sim.stations import sensors
 
 #: Columns of ``reconstruct``: m/s and rad.
 READINGS = ("V", "alpha", "beta", "phi", "theta", "psi")
@@ -114,7 +117,7 @@ def corrected_motion(chain: Chain, motion: Motion) -> Sample:
     """The motion (N,) that the readings tell of, at the time of the samples."""
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
-    velocity = airflow.velocity_of(*flow.T).minus(inertial.rates.cross(_probe(chain)))
+    velocity = velocity_from(velocity_of(flow.T, jnp), inertial.rates, _probe(chain))
     return Sample(inertial.force, inertial.rates, velocity, inertial.attitude, flow, reading)
 
 
@@ -137,8 +140,8 @@ def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
     samples = corrected_motion(chain, motion)
     moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
     velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
-    _, alpha_rate, _ = _rates_of_flow(velocity, rate)
-    _, alpha, _ = airflow.flow_angles(samples.velocity)
+    _, alpha_rate, _ = flow_rates(velocity, rate, jnp)
+    _, alpha, _ = flow_angles(samples.velocity, jnp)
     followed, seen = Flow(velocity, alpha_rate), Flow(samples.velocity, slope(alpha, chain.step))
     flow: Flow = jax.tree.map(lambda a, b: jnp.where(memory > 0.0, a, b), followed, seen)
     return flow
@@ -171,18 +174,9 @@ def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar
 
 def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
     force, rates, turning, attitude = inertial
-    velocity = airflow.velocity_of(*reading.T)
-    moving, _ = rates_of_change(velocity.minus(rates.cross(_probe(chain))), attitude, force, rates)
-    return jnp.stack(_rates_of_flow(velocity, moving.plus(turning.cross(_probe(chain)))), axis=1)
-
-
-def _rates_of_flow(velocity: Vector, rate: Vector) -> tuple[Scalar, Scalar, Scalar]:
-    """Of airspeed, alpha and beta, of a velocity (m/s) and its rate (m/s^2)."""
-    u, v, w = velocity
-    du, dv, dw = rate
-    forward, speed = jnp.hypot(u, w), jnp.sqrt(u * u + v * v + w * w)
-    faster = (u * du + v * dv + w * dw) / speed
-    return faster, (u * dw - w * du) / forward**2, (dv - v * faster / speed) / forward
+    velocity, probe = velocity_of(reading.T, jnp), _probe(chain)
+    moving, _ = rates_of_change(velocity_from(velocity, rates, probe), attitude, force, rates)
+    return jnp.stack(flow_rates(velocity, velocity_at(moving, turning, probe), jnp), axis=1)
 
 
 def _inertial(chain: Chain, motion: Motion) -> _Inertial:
@@ -196,7 +190,7 @@ def _inertial(chain: Chain, motion: Motion) -> _Inertial:
     bias = effects["imu_bias"]
     felt = _unscaled(effects, force.minus(Vector(bias["ax"], bias["ay"], bias["az"])), ("ax", "ay", "az"))
     arm = sensors.imu_arm(chain.model, effects, chain.body)
-    return _Inertial(imu_lever_arm.transfer(felt, rates, turning, arm.times(-1.0)), rates, turning, attitude)
+    return _Inertial(specific_force_from(felt, rates, turning, arm), rates, turning, attitude)
 
 
 def _reading(chain: Chain, motion: Motion) -> Scalar:
@@ -238,14 +232,9 @@ def _advance(
 
 
 def rates_of_change(velocity: Vector, attitude: Vector, force: Vector, rates: Vector) -> tuple[Vector, Vector]:
-    """Of velocity (m/s^2) and Euler angles (rad/s)."""
-    sin_roll, cos_roll = jnp.sin(attitude.x), jnp.cos(attitude.x)
-    sin_pitch, cos_pitch = jnp.sin(attitude.y), jnp.cos(attitude.y)
-    down = Vector(-sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch)
-    p, q, r = rates
-    heading = (q * sin_roll + r * cos_roll) / cos_pitch
-    turning = Vector(p + heading * sin_pitch, q * cos_roll - r * sin_roll, heading)
-    return force.plus(down.times(GRAVITY)).minus(rates.cross(velocity)), turning
+    """Rates of the velocity's components (m/s^2) and of the Euler angles (rad/s)."""
+    down = down_of_euler(attitude.x, attitude.y, jnp)
+    return velocity_rate(force, down, rates, velocity), euler_rates(attitude.x, attitude.y, rates, jnp)
 
 
 def _at_probe(chain: Chain, velocity: Vector, rates: Vector) -> Scalar:

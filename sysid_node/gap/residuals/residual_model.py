@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.flight_path_reconstruction import (
@@ -30,7 +31,6 @@ from sysid_node.gap.residuals.flight_path_reconstruction import (
 from sysid_node.gap.residuals.lru_cache import LruCache
 from sysid_node.gap.residuals.windowed_spectra import Complex, Windows
 from sysid_node.sim import EFFECTS, Simulator
-from sysid_node.sim.body import Vector
 from sysid_node.sim.compiled.programs import kept
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.chain import Chain

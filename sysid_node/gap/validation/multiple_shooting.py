@@ -17,15 +17,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from sysid_node.dynamics.atmosphere import altitude_of
+from sysid_node.dynamics.attitude import quaternion
+from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.flight_path_reconstruction import Motion, Sample, corrected_motion, rates_of_change
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.sim import body as rigid
-from sysid_node.sim.body import Vector
 from sysid_node.sim.flying.rollout import Carry, Pilot, advance, begin
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
-from sysid_node.sim.signals.atmosphere import altitude_of
 from sysid_node.sim.signals.time_shift import shift_cubic
 from sysid_node.sim.stations import command
 
@@ -100,7 +100,8 @@ def _advance(
 def _starts(samples: Sample, course: Course) -> _Start:
     """The measured state at every sample."""
     place = jnp.zeros_like(course.altitude)
-    columns = (place, place, -course.altitude, *samples.velocity, *rigid.quaternion(*samples.attitude), *samples.rates)
+    attitude = quaternion(samples.attitude, jnp)
+    columns = (place, place, -course.altitude, *samples.velocity, *attitude, *samples.rates)
     return _Start(course.begins, jnp.stack(columns, 1), _previous(samples.flow), _previous(samples.probe))
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
 from sysid_node.excite.manoeuvre import THROTTLE
 from sysid_node.excite.spec import parse_manoeuvre
@@ -29,7 +30,6 @@ from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
-from sysid_node.sim.signals.atmosphere import air_density
 
 #: Amplitude of the proposed deflections, as a share of each surface's limit, unless the words say otherwise.
 _USUAL = 0.2
@@ -151,7 +151,7 @@ def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> Residua
     outputs = np.asarray(sortie.flight.outputs)
     columns = {name: outputs[:, i] for i, name in enumerate(simulator.outputs)}
     columns |= {name: np.asarray(sortie.flight.commands)[:, i] for i, name in enumerate(_symbols(simulator))}
-    columns["rho"] = np.asarray(air_density(-jnp.asarray(sortie.flight.states)[:, 2]))
+    columns["rho"] = np.asarray(air_density(-jnp.asarray(sortie.flight.states)[:, 2], jnp))
     flight = replace(model.flight, record=FlightRecord(record.time, columns), imu_rate=simulator.rate, source="")
     return residual_model_like(model, resampled(flight, simulator.rate))
 

@@ -18,9 +18,12 @@ from typing import Any, TypeVar
 import jax
 from jax import export
 
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.compiled.xla import cache_folder
 
 _Result = TypeVar("_Result")
+
+export.register_namedtuple_serialization(Vector, serialized_name="sysid.Vector")
 
 
 def kept(fixed: int) -> Callable[[Callable[..., _Result]], Callable[..., _Result]]:

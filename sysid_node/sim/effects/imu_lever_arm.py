@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.body import Vector
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
 from sysid_node.sim.model.layout import Values
 
@@ -21,8 +21,3 @@ EFFECT = Effect(
 def arm(values: Values) -> Vector:
     """The error of the arm, m."""
     return Vector(values["x"], values["y"], values["z"])
-
-
-def transfer(specific_force: Vector, rates: Vector, acceleration: Vector, arm: Vector) -> Vector:
-    """Specific force (m/s^2) at an arm (m) from the CG; angular acceleration in rad/s^2."""
-    return specific_force.plus(acceleration.cross(arm)).plus(rates.cross(rates.cross(arm)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.body import Vector
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
 from sysid_node.sim.model.layout import Values
 

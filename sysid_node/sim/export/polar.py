@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.sim.model.layout import level_flight
+from sysid_node.sim.model.layout import reference_flight
 
 
 class Polar(NamedTuple):
@@ -19,7 +19,7 @@ class Polar(NamedTuple):
 
 def polar_of(aircraft: Aircraft) -> Polar:
     """The parabola; its factor is 0 where the file's drag does not grow with lift."""
-    lift, alpha = level_flight(aircraft)
+    lift, alpha = reference_flight(aircraft)
     value = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
     get = value.get
     if "CD_alpha" not in value:

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.sim.body import euler_angles, unpack
+from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.sim.flying.rollout import Flight, Inputs, fly
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.model.state import body_state
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import command
 
@@ -68,7 +69,7 @@ def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
                 integral[commands.index(control), _SEEN.index(seen)] = _INTEGRAL * gain
     limits = np.minimum(np.asarray(simulator.model.limits), 0.5)
     thrust = min(float(simulator.model.max_thrust), 10.0 * 9.8 * aircraft.mass) if aircraft.throttle else 0.0
-    attitude = euler_angles(unpack(jnp.asarray(trim.initial)).attitude)
+    attitude = euler_angles(body_state(jnp.asarray(trim.initial)).attitude, jnp)
     speed = float(np.linalg.norm(trim.initial[3:6]))
     return Autopilot(
         gains=jnp.asarray(gains),

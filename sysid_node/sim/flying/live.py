@@ -19,15 +19,15 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
-from sysid_node.sim.body import STATES
 from sysid_node.sim.effects import EFFECTS
 from sysid_node.sim.flying.rollout import Pilot, advance, begin
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
-from sysid_node.sim.signals.atmosphere import air_density
+from sysid_node.sim.model.state import STATES
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import airflow, command
@@ -59,7 +59,7 @@ class Reading(NamedTuple):
 
     time: float  # s
     outputs: Array  # (12,) layout.OUTPUTS
-    state: Array  # (13,) body.STATES
+    state: Array  # (13,) state.STATES
     surfaces: Array  # (controls + 1,) true positions rad, thrust N
     density: float  # kg/m^3
 
@@ -147,7 +147,7 @@ def _advance(
     follow: Pilot = lambda state, outputs, planned: (planned, planned, outputs)  # noqa: E731
     # the pilot's state brings out what the instruments read
     carry, (_, state, _, moved) = advance(chain, follow, carried.carry._replace(pilot=()), arriving, gusts, time, noise)
-    density = air_density(-state[2])
+    density = air_density(-state[2], jnp)
     reading = jnp.concatenate([density[None], carry.pilot, state, carried.surfaces])
     return _Carried(carry._replace(pilot=()), past, moved[:m]), reading
 

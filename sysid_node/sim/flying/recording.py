@@ -5,26 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics.atmosphere import GRAVITY, air_density
 from sysid_node.errors import InputError
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Streams
 from sysid_node.sim.flying.sortie import Sortie
-from sysid_node.sim.signals.atmosphere import air_density
 
 Array = NDArray[np.float64]
 
 #: Stamp of the first instant: a fixed date (2026-01-01), so that the same flight gives the same bag.
 START_NS = 1_767_225_600_000_000_000
 
-_GRAVITY = 9.80665
 #: Least steps of the readings: accelerometers of 16 bits over +-16 g, gyroscopes over +-2000 deg/s, airspeed 1 cm/s,
 #: vanes of 14 bits over a turn; attitude is a filter's output and has none.
 _STEPS = np.array(
-    [32 * _GRAVITY / 2**16] * 3 + [np.deg2rad(4000.0) / 2**16] * 3 + [0.0] * 3 + [0.01] + [2 * np.pi / 2**14] * 2
+    [32 * GRAVITY / 2**16] * 3 + [np.deg2rad(4000.0) / 2**16] * 3 + [0.0] * 3 + [0.01] + [2 * np.pi / 2**14] * 2
 )
 
 
@@ -56,7 +56,7 @@ class Recorder:
         imu, air, actuators = self._arrivals(times, random)
         inertial, flow = self._readings(sortie, times[0]), self._readings(sortie, times[1])
         altitude = np.interp(times[1], _grid(sortie), -np.asarray(sortie.flight.states[:, 2]))
-        density = np.round(np.asarray(air_density(altitude)), 5)
+        density = np.round(np.asarray(air_density(altitude, jnp)), 5)
         joints, positions = _joints(sortie.simulator.aircraft, self._controls(sortie, times[2]))
         return Streams(
             ImuStream(imu, inertial[:, :6], inertial[:, 6:9], "imu"),

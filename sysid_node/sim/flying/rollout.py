@@ -13,11 +13,13 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from sysid_node.sim import body as rigid
-from sysid_node.sim.body import Vector
+from sysid_node.dynamics.attitude import euler_angles
+from sysid_node.dynamics.lever_arm import specific_force_at
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation
-from sysid_node.sim.model.chain import MODE_RATE, Chain, Drive, Motion, derivative, drive_of
+from sysid_node.sim.model.chain import Chain, Drive, Motion, derivative, drive_of
 from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.model.state import MODE_RATE, body_state
 from sysid_node.sim.stations import actuator, airflow, clock, command, propulsion, sensors, structure
 from sysid_node.sim.stations.actuator import ActuatorState
 
@@ -35,7 +37,7 @@ class Flight(NamedTuple):
     """What a flight gives; N samples."""
 
     outputs: Scalar  # (N, 12) readings of the sensors, columns layout.OUTPUTS
-    states: Scalar  # (N, 13) the body's true state, columns body.STATES
+    states: Scalar  # (N, 13) the body's true state, columns state.STATES
     surfaces: Scalar  # (N, controls + 1): true positions rad, thrust N
     commands: Scalar  # (N, controls + 1): as given by the pilot
     coefficients: Scalar  # (N, 6) true CL CD CY Cl Cm Cn about the file's CG
@@ -129,13 +131,13 @@ def _runge_kutta(chain: Chain, x: Scalar, k1: Scalar, now: Drive, then: Drive) -
 
 def _read(chain: Chain, carry: Carry, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
     """At the probe: the truth (3,) and what the lagged probe holds (3,); and all readings (12,) without noise."""
-    state = rigid.unpack(carry.x)
+    state = body_state(carry.x)
     truth = _at_probe(chain, motion)
     probe = sensors.lagged(chain.effects, carry.probe, carry.truth, truth, chain.step)
     reading = jnp.stack(
         [
             *_inertial(chain, state.rates, motion, carry.x[MODE_RATE]),
-            *rigid.euler_angles(state.attitude),
+            *euler_angles(state.attitude, jnp),
             *sensors.air_data(chain.effects, probe[0], probe[1], probe[2]),
         ]
     )
@@ -145,7 +147,7 @@ def _read(chain: Chain, carry: Carry, motion: Motion) -> tuple[Scalar, Scalar, S
 def _inertial(chain: Chain, rates: Vector, motion: Motion, mode_rate: Scalar) -> tuple[Scalar, ...]:
     """Readings of accelerometers and gyroscopes."""
     arm = sensors.imu_arm(chain.model, chain.effects, chain.body)
-    force = sensors.at_imu(motion.specific_force, rates, motion.acceleration, arm)
+    force = specific_force_at(motion.specific_force, rates, motion.acceleration, arm)
     shake, nod = structure.felt(chain.effects, motion.mode_acceleration, mode_rate)
     return (
         *sensors.accelerometers(chain.effects, force._replace(z=force.z + shake)),
@@ -172,7 +174,7 @@ def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_s
 
 def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:
     """The continuous state (16,) with flow and structure at rest on the body's state (13,)."""
-    state = rigid.unpack(initial)
+    state = body_state(initial)
     air = airflow.meet(state.velocity, state.rates, drive.gusts, jnp.ones_like(chain.altitude))
     zero = jnp.zeros_like(air.alpha)
     attached = stall_separation.attached(chain.effects["stall_separation"], air.alpha, zero, zero)

@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from sysid_node.dynamics.airflow import velocity_of
+from sysid_node.dynamics.atmosphere import GRAVITY, altitude_of
+from sysid_node.dynamics.attitude import quaternion, to_earth
 from sysid_node.errors import InputError
-from sysid_node.sim import body as rigid
 from sysid_node.sim.flying.rollout import settled
 from sysid_node.sim.model.chain import Chain, derivative, drive_of
 from sysid_node.sim.model.layout import Layout, Model, Scalar
-from sysid_node.sim.signals.atmosphere import GRAVITY, altitude_of
+from sysid_node.sim.model.state import body_state
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import actuator, propulsion
-from sysid_node.sim.stations.airflow import velocity_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -132,8 +133,8 @@ def _residual(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scal
     drive, _ = drive_of(chain, actuator.start(model, command[:-1]).position, motor, jnp.zeros(6), zero)
     state = _state(point, z)
     rates, _ = derivative(chain, settled(chain, state, drive), drive)
-    body = rigid.unpack(state)
-    sink = rigid.to_earth(body.attitude, body.velocity).z
+    body = body_state(state)
+    sink = to_earth(body.attitude, body.velocity).z
     return jnp.concatenate([rates[3:6], rates[10:13], (sink / point.airspeed + jnp.sin(z[4]))[None]])
 
 
@@ -148,8 +149,8 @@ def _state(point: Point, z: Scalar) -> Scalar:
     """The body's state (13,)."""
     alpha, beta, phi, theta = z[0], z[1], z[2], z[3]
     zero = jnp.zeros(())
-    velocity = velocity_of(point.airspeed, alpha, beta)
-    attitude = rigid.quaternion(phi, theta, point.heading)
+    velocity = velocity_of((point.airspeed, alpha, beta), jnp)
+    attitude = quaternion((phi, theta, point.heading), jnp)
     return jnp.stack([zero, zero, -point.altitude, *velocity, *attitude, zero, zero, zero])
 
 

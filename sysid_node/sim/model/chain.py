@@ -9,18 +9,17 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from sysid_node.sim import body as rigid
-from sysid_node.sim.body import MassProperties, Vector
+from sysid_node.dynamics.atmosphere import air_density
+from sysid_node.dynamics.attitude import down_in_body, quaternion_rate, to_earth
+from sysid_node.dynamics.coefficients import Coefficients
+from sysid_node.dynamics.rigid_body import MassProperties, accelerations, free_fall
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation, steady_wind, unsteady_aerodynamics
 from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters, unpack
-from sysid_node.sim.signals.atmosphere import GRAVITY, air_density
+from sysid_node.sim.model.state import MODE, MODE_RATE, SEPARATION, body_state
 from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
-from sysid_node.sim.stations.aerodynamics import Coefficients
 from sysid_node.sim.stations.airflow import Air
-
-#: Places in the continuous state (16,), after the body's: attached fraction of the flow, modal displacement and speed.
-SEPARATION, MODE, MODE_RATE = 13, 14, 15
 
 
 @partial(
@@ -75,20 +74,20 @@ class Motion(NamedTuple):
 @jax.jit
 def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, Motion]:
     """d/dt of the continuous state (16,), and the motion behind it."""
-    effects, state = chain.effects, rigid.unpack(x)
+    effects, state = chain.effects, body_state(x)
     altitude = -state.position.z
-    air = airflow.meet(state.velocity, state.rates, drive.gusts, air_density(altitude))
-    free_fall = rigid.down_in_body(state.attitude).times(GRAVITY).minus(state.rates.cross(state.velocity))
+    air = airflow.meet(state.velocity, state.rates, drive.gusts, air_density(altitude, jnp))
+    falling = free_fall(down_in_body(state.attitude), state.rates, state.velocity)
     load = steady_load(chain, air, drive, x[SEPARATION], altitude - chain.altitude)
-    alpha_rate = rate_of_alpha(chain, air, load.force.times(1.0 / chain.body.mass).plus(free_fall))
+    alpha_rate = rate_of_alpha(chain, air, load.force.times(1.0 / chain.body.mass).plus(falling))
     load = unsteady_load(chain, air, load, alpha_rate)
-    specific_force, acceleration = mass.accelerations(chain.body, state.rates, load.force, load.moment)
+    specific_force, acceleration = accelerations(chain.body, state.rates, load.force, load.moment)
     mode_rate, mode_acceleration = structure.rate(effects, x[MODE], x[MODE_RATE], specific_force.z)
-    over_ground = steady_wind.apply(effects["steady_wind"], rigid.to_earth(state.attitude, state.velocity))
+    over_ground = steady_wind.apply(effects["steady_wind"], to_earth(state.attitude, state.velocity))
     rates = (
         *over_ground,
-        *specific_force.plus(free_fall),
-        *rigid.attitude_rate(state.attitude, state.rates),
+        *specific_force.plus(falling),
+        *quaternion_rate(state.attitude, state.rates),
         *acceleration,
         separation_rate(chain, air, x[SEPARATION], alpha_rate),
         mode_rate,
@@ -102,7 +101,7 @@ def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb:
     layout, model, effects = chain.layout, chain.model, chain.effects
     surfaces = [drive.surfaces[..., i] for i in range(len(layout.controls))]
     bent = aerodynamics.deflections(layout, model, effects, surfaces, air, drive.thrust)
-    regressors = aerodynamics.regressors(layout, model, air, bent)
+    regressors = aerodynamics.regressors_of(layout, model, air, bent)
     coefficients = aerodynamics.coefficients(layout, model, effects, regressors, separation, climb)
     force, moment = aerodynamics.load(model, air, coefficients)
     pull, pull_moment = propulsion.load(model, effects, drive.thrust, air.alpha)

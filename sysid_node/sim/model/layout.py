@@ -16,8 +16,9 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
+from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
+from sysid_node.dynamics.linear_model import level_flight
 from sysid_node.errors import InputError
-from sysid_node.sim.signals.atmosphere import GRAVITY
 
 #: A scalar, or a time series of one: stations and effects work on either.
 Scalar = jax.Array
@@ -86,7 +87,7 @@ def model_of(aircraft: Aircraft) -> Model:
         raise InputError(
             f"aircraft {aircraft.name!r}: inertia {inertia}: simulation needs Ixx, Iyy, Izz and Ixz; complete the file"
         )
-    lift, alpha = level_flight(aircraft)
+    lift, alpha = reference_flight(aircraft)
     geometry, throttle = aircraft.geometry, aircraft.throttle
     numbers: dict[str, Any] = {
         "mass": aircraft.mass,
@@ -110,21 +111,10 @@ def model_of(aircraft: Aircraft) -> Model:
     return Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})
 
 
-def level_flight(aircraft: Aircraft) -> tuple[float, float]:
-    """CL and alpha (rad) of unaccelerated level flight at the reference condition, thrust along the path.
-
-    Solves CL = weight and Cm = 0 for alpha and the elevator; without an elevator, CL alone.
-    """
-
-    def get(name: str) -> float:
-        return aircraft.derivatives[name].value if name in aircraft.derivatives else 0.0
-
-    pressure = 0.5 * aircraft.reference.air_density * aircraft.reference.airspeed**2
+def reference_flight(aircraft: Aircraft) -> tuple[float, float]:
+    """CL and alpha (rad) of level flight at the reference condition, thrust along the path."""
+    pressure = dynamic_pressure(aircraft.reference.air_density, aircraft.reference.airspeed)
     lift = aircraft.mass * GRAVITY / (pressure * aircraft.geometry.S)
-    if not get("CL_alpha"):
-        return lift, 0.0
-    matrix = np.array([[get("CL_alpha"), get("CL_de")], [get("Cm_alpha"), get("Cm_de")]])
-    right = np.array([lift - get("CL_0") - get("CL_V"), -get("Cm_0") - get("Cm_V")])
-    if not get("Cm_de"):
-        return lift, float(right[0] / get("CL_alpha"))
-    return lift, float(np.linalg.solve(matrix, right)[0])
+    values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
+    alpha, _ = level_flight(values, lift, speed_ratio=1.0)
+    return lift, alpha

@@ -22,10 +22,16 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
+from sysid_node.dynamics.airflow import flow_angles, stability_axes, velocity_of
+from sysid_node.dynamics.atmosphere import dynamic_pressure
+from sysid_node.dynamics.attitude import quaternion, to_earth
+from sysid_node.dynamics.coefficients import Coefficients
+from sysid_node.dynamics.forces import coefficients_of, thrust_axes
+from sysid_node.dynamics.lever_arm import specific_force_at, specific_force_from, velocity_from
+from sysid_node.dynamics.rigid_body import accelerations, moment_for
+from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
-from sysid_node.sim import body as rigid
-from sysid_node.sim.body import Vector
 from sysid_node.sim.effects import actuator_backlash, actuator_lag, actuator_rate_limit, stall_separation
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.model.chain import Chain, drive_of, steady_load, unsteady_load
@@ -33,8 +39,7 @@ from sysid_node.sim.model.layout import Layout, Model, Scalar
 from sysid_node.sim.model.parameters import Parameters, table
 from sysid_node.sim.signals.time_shift import shift_cubic, slope
 from sysid_node.sim.simulator import Simulator
-from sysid_node.sim.stations import airflow, command, mass, propulsion, sensors, structure
-from sysid_node.sim.stations.aerodynamics import Coefficients
+from sysid_node.sim.stations import command, mass, propulsion, sensors, structure
 from sysid_node.sim.stations.airflow import Air
 
 Array = NDArray[np.float64]
@@ -125,31 +130,17 @@ def coefficients(model: Model, signals: Signals, accelerations: Accelerations) -
     """Coefficients (N,) about the file's CG that the instruments show, by the aircraft file alone."""
     rates, turning = Vector(*signals.rates.T), accelerations.turning
     imu, probe = Vector(*model.imu), Vector(*model.air_data)
-    specific_force = accelerations.force.minus(turning.cross(imu)).minus(rates.cross(rates.cross(imu)))
-    velocity = airflow.velocity_of(*signals.air.T).minus(rates.cross(probe))
-    speed, _, _ = airflow.flow_angles(velocity)
+    specific_force = specific_force_from(accelerations.force, rates, turning, imu)
+    velocity = velocity_from(velocity_of(signals.air.T, jnp), rates, probe)
+    speed, _, _ = flow_angles(velocity, jnp)
     thrust = propulsion.commanded(model, signals.commands[:, -1])
-    along, up = jnp.cos(model.thrust_inclination), jnp.sin(model.thrust_inclination)
-    force = specific_force.times(model.mass).minus(Vector(thrust * along, jnp.zeros_like(thrust), -thrust * up))
-    moment = rigid.moment_for(mass.nominal(model), rates, turning)
+    forward, down = thrust_axes(model.thrust_inclination, jnp)
+    pull = Vector(thrust * forward, jnp.zeros_like(thrust), thrust * down)
+    force = specific_force.times(model.mass).minus(pull)
+    moment = moment_for(mass.nominal(model), rates, turning)
     moment = moment._replace(y=moment.y - model.thrust_arm * thrust)
-    return _non_dimensional(model, signals.density, speed, velocity, force, moment)
-
-
-def _non_dimensional(
-    model: Model, density: Scalar, speed: Scalar, velocity: Vector, force: Vector, moment: Vector
-) -> Coefficients:
-    scale = 1.0 / (0.5 * density * speed * speed * model.area)
-    forward = jnp.sqrt(velocity.x * velocity.x + velocity.z * velocity.z)
-    cos, sin = velocity.x / forward, velocity.z / forward
-    return Coefficients(
-        scale * (force.x * sin - force.z * cos),
-        -scale * (force.x * cos + force.z * sin),
-        scale * force.y,
-        scale / model.span * moment.x,
-        scale / model.chord * moment.y,
-        scale / model.span * moment.z,
-    )
+    pressure_area = dynamic_pressure(signals.density, speed) * model.area
+    return coefficients_of(force, moment, stability_axes(velocity, jnp), pressure_area, model.span, model.chord)
 
 
 def signals_of(simulator: Simulator, record: FlightRecord) -> Signals:
@@ -191,8 +182,9 @@ def _climb(record: FlightRecord, time: Array) -> Array:
 @jax.jit
 def _speed_of_climb(roll: Scalar, pitch: Scalar, airspeed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:
     """Speed (N,) upwards through the air, m/s."""
-    attitude = rigid.quaternion(roll, pitch, jnp.zeros_like(roll))
-    return -rigid.to_earth(attitude, airflow.velocity_of(airspeed, alpha, beta)).z
+    attitude = quaternion((roll, pitch, jnp.zeros_like(roll)), jnp)
+    climb: Scalar = -to_earth(attitude, velocity_of((airspeed, alpha, beta), jnp)).z
+    return climb
 
 
 def _acts(layout: Layout, acting: Scalar | None, effect: str) -> Scalar | None:
@@ -218,8 +210,8 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
         reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
         flow = sensors.before_lag(effects, reading, None, step)
         arm = sensors.air_data_arm(chain.model, effects, chain.body)
-        velocity = airflow.velocity_of(*flow.T).minus(rates.cross(arm))
-    _, alpha, _ = airflow.flow_angles(velocity)
+        velocity = velocity_from(velocity_of(flow.T, jnp), rates, arm)
+    _, alpha, _ = flow_angles(velocity, jnp)
     return _Sample(
         command=command.arrive(effects, signals.commands, step),
         velocity=velocity,
@@ -232,7 +224,7 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
 
 
 def _flow(sample: _Sample) -> Air:
-    speed, alpha, beta = airflow.flow_angles(sample.velocity)
+    speed, alpha, beta = flow_angles(sample.velocity, jnp)
     return Air(sample.velocity, sample.rates, speed, alpha, beta, sample.density)
 
 
@@ -306,10 +298,10 @@ def _accelerations(chain: Chain, memories: _Memory, samples: _Sample) -> tuple[V
         drive, _ = drive_of(chain, memory.actuators, memory.motor, jnp.zeros(6), sample.time)
         load = steady_load(chain, air, drive, memory.separation, sample.climb)
         load = unsteady_load(chain, air, load, sample.alpha_rate)
-        return mass.accelerations(chain.body, sample.rates, load.force, load.moment)
+        return accelerations(chain.body, sample.rates, load.force, load.moment)
 
-    accelerations: tuple[Vector, Vector] = jax.vmap(at)(memories, samples)
-    return accelerations
+    found: tuple[Vector, Vector] = jax.vmap(at)(memories, samples)
+    return found
 
 
 def _shaken(chain: Chain, memory: _Memory, samples: _Sample, force: Vector) -> _Shaken:
@@ -350,7 +342,7 @@ def _readings(chain: Chain, rates: Vector, force: Vector, acceleration: Vector, 
     effects, arm = chain.effects, sensors.imu_arm(chain.model, chain.effects, chain.body)
     _, mode_acceleration = structure.rate(effects, mode[:, 0], mode[:, 1], force.z)
     shake, nod = structure.felt(effects, mode_acceleration, mode_acceleration)
-    at_imu = sensors.at_imu(force, rates, acceleration, arm)
+    at_imu = specific_force_at(force, rates, acceleration, arm)
     return Accelerations(
         sensors.accelerometers(effects, at_imu._replace(z=at_imu.z + shake)),
         sensors.turned_by(effects, acceleration._replace(y=acceleration.y + nod)),

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.sim.body import STATES
 from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter
 from sysid_node.sim.flying.trim import trim_flight
 from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.model.state import STATES
 from sysid_node.sim.pages.line_chart import Panel, draw
 from sysid_node.sim.signals.dryden import Dryden
 from sysid_node.sim.simulator import Simulator

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import jax.numpy as jnp
 
-from sysid_node.sim.body import Vector
+from sysid_node.dynamics.airflow import stability_axes
+from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, regressors, with_polar
+from sysid_node.dynamics.forces import force_and_moment
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import (
     control_nonlinearity,
     drag_rise,
@@ -22,17 +23,6 @@ from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.stations.airflow import Air
 
 
-class Coefficients(NamedTuple):
-    """CL, CD in stability axes, CY and the moments in body axes about the file's CG."""
-
-    CL: Scalar
-    CD: Scalar
-    CY: Scalar
-    Cl: Scalar
-    Cm: Scalar
-    Cn: Scalar
-
-
 def deflections(
     layout: Layout, model: Model, effects: dict[str, Values], surfaces: list[Scalar], air: Air, thrust: Scalar
 ) -> list[Scalar]:
@@ -44,19 +34,11 @@ def deflections(
     return bent
 
 
-def regressors(layout: Layout, model: Model, air: Air, deflections: list[Scalar]) -> dict[str, Scalar]:
+def regressors_of(layout: Layout, model: Model, air: Air, deflections: list[Scalar]) -> dict[str, Scalar]:
     """Every regressor by name but CL^2; rates non-dimensional."""
-    half = 0.5 / air.speed
-    return {
-        "0": jnp.ones_like(air.speed),
-        "alpha": air.alpha,
-        "beta": air.beta,
-        "p": air.rates.x * model.span * half,
-        "q": air.rates.y * model.chord * half,
-        "r": air.rates.z * model.span * half,
-        "V": air.speed / model.airspeed,
-        **dict(zip(layout.symbols, deflections, strict=True)),
-    }
+    flow, one = (air.speed, air.alpha, air.beta), jnp.ones_like(air.speed)
+    state = regressors(flow, air.rates, model.span, model.chord, model.airspeed, one)
+    return state | dict(zip(layout.symbols, deflections, strict=True))
 
 
 def coefficients(
@@ -70,9 +52,8 @@ def coefficients(
     error = effects["derivative_error"]
 
     def linear(coefficient: str) -> Scalar:
-        total = jnp.zeros_like(x["alpha"])
-        for name, regressor in layout.terms(coefficient):
-            total = total + (derivative[name] + error[name]) * x[regressor]
+        terms = ((derivative[name] + error[name], regressor) for name, regressor in layout.terms(coefficient))
+        total: Scalar = linear_coefficient(terms, x, jnp.zeros_like(x["alpha"]))
         return total
 
     alpha = x["alpha"] - model.alpha
@@ -81,7 +62,7 @@ def coefficients(
     attached = linear("CL")
     CL = attached * stall_separation.lift_factor(stall, separation)
     CL = CL + ground_effect.lift(effects["ground_effect"], ground, CL)
-    x = {**x, "k": CL * CL}
+    x = with_polar(x, CL)
     CY_0, Cl_0, Cn_0 = lateral_asymmetry.offsets(effects["lateral_asymmetry"])
     return Coefficients(
         CL=CL,
@@ -112,10 +93,4 @@ def of_alpha_rate(model: Model, effects: dict[str, Values], air: Air, rate: Scal
 
 def load(model: Model, air: Air, c: Coefficients) -> tuple[Vector, Vector]:
     """Force (N) and moment about the file's CG (N m), body axes."""
-    u, w = air.velocity.x, air.velocity.z
-    forward = jnp.sqrt(u * u + w * w)
-    cos, sin = u / forward, w / forward
-    scale = air.pressure * model.area
-    force = Vector(scale * (c.CL * sin - c.CD * cos), scale * c.CY, -scale * (c.CL * cos + c.CD * sin))
-    moment = Vector(scale * model.span * c.Cl, scale * model.chord * c.Cm, scale * model.span * c.Cn)
-    return force, moment
+    return force_and_moment(c, stability_axes(air.velocity, jnp), air.pressure * model.area, model.span, model.chord)

@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from sysid_node.sim.body import Vector
+from sysid_node.dynamics.airflow import flow_angles
+from sysid_node.dynamics.atmosphere import dynamic_pressure
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import gust, turbulence
 from sysid_node.sim.model.layout import Model, Scalar, Values
 
@@ -24,7 +26,8 @@ class Air(NamedTuple):
     @property
     def pressure(self) -> Scalar:
         """Dynamic pressure, N/m^2."""
-        return 0.5 * self.density * self.speed * self.speed
+        pressure: Scalar = dynamic_pressure(self.density, self.speed)
+        return pressure
 
 
 def gusts(model: Model, effects: dict[str, Values], given: Scalar, realisation: Scalar, time: Scalar) -> Scalar:
@@ -37,18 +40,5 @@ def meet(velocity: Vector, rates: Vector, gusts: Scalar, density: Scalar) -> Air
     """The flow, from the motion relative to the steadily moving air and the gusts (6,)."""
     relative = velocity.minus(Vector(gusts[0], gusts[1], gusts[2]))
     turning = rates.minus(Vector(gusts[3], gusts[4], gusts[5]))
-    speed, alpha, beta = flow_angles(relative)
+    speed, alpha, beta = flow_angles(relative, jnp)
     return Air(relative, turning, speed, alpha, beta, density)
-
-
-def flow_angles(velocity: Vector) -> tuple[Scalar, Scalar, Scalar]:
-    """Airspeed (m/s), alpha = atan(w/u), beta = asin(v/V) (rad) of a velocity relative to the air."""
-    u, v, w = velocity
-    forward = jnp.sqrt(u * u + w * w)
-    return jnp.sqrt(forward * forward + v * v), jnp.arctan2(w, u), jnp.arctan2(v, forward)
-
-
-def velocity_of(speed: Scalar, alpha: Scalar, beta: Scalar) -> Vector:
-    """The velocity relative to the air (m/s) of an airspeed and flow angles (rad)."""
-    forward = speed * jnp.cos(beta)
-    return Vector(forward * jnp.cos(alpha), speed * jnp.sin(beta), forward * jnp.sin(alpha))

@@ -1,10 +1,11 @@
-"""Station ``mass``: from forces and moments to accelerations."""
+"""Station ``mass``: mass, centre of gravity and inertia."""
 
 from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.body import MassProperties, Vector, angular_acceleration
+from sysid_node.dynamics.rigid_body import MassProperties
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import cg_shift, inertia_error, mass_error
 from sysid_node.sim.model.layout import Model, Values
 
@@ -22,9 +23,3 @@ def nominal(model: Model) -> MassProperties:
     """Mass, CG and inertia as the file has them."""
     zero = jnp.zeros_like(model.mass)
     return MassProperties(model.mass, Vector(zero, zero, zero), *model.inertia)
-
-
-def accelerations(body: MassProperties, rates: Vector, force: Vector, moment: Vector) -> tuple[Vector, Vector]:
-    """Specific force at the CG (m/s^2) and angular acceleration (rad/s^2); moment about the file's CG."""
-    about_cg = moment.minus(body.cg.cross(force))
-    return force.times(1.0 / body.mass), angular_acceleration(body, rates, about_cg)

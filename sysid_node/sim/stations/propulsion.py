@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.body import Vector
+from sysid_node.dynamics.forces import thrust_axes
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import motor_lag, thrust_line_offset, thrust_scale, thrust_yaw
 from sysid_node.sim.model.layout import Model, Scalar, Values
 
@@ -26,8 +27,8 @@ def thrust(effects: dict[str, Values], state: Scalar) -> Scalar:
 
 def load(model: Model, effects: dict[str, Values], thrust: Scalar, alpha: Scalar) -> tuple[Vector, Vector]:
     """Force (N) and moment about the file's CG (N m), body axes."""
-    along, up = jnp.cos(model.thrust_inclination), jnp.sin(model.thrust_inclination)
-    force = Vector(thrust * along, jnp.zeros_like(thrust), -thrust * up)
+    forward, down = thrust_axes(model.thrust_inclination, jnp)
+    force = Vector(thrust * forward, jnp.zeros_like(thrust), thrust * down)
     moment = Vector(
         thrust_yaw.rolling_moment(effects["thrust_yaw"], thrust),
         model.thrust_arm * thrust + thrust_line_offset.pitching_moment(effects["thrust_line_offset"], thrust),

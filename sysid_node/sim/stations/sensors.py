@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.body import MassProperties, Vector
+import jax.numpy as jnp
+
+from sysid_node.dynamics.airflow import flow_angles
+from sysid_node.dynamics.lever_arm import velocity_at
+from sysid_node.dynamics.rigid_body import MassProperties
+from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import (
     air_data_lag,
     airspeed_scale,
@@ -17,7 +22,6 @@ from sysid_node.sim.effects import (
 )
 from sysid_node.sim.model.layout import Model, Scalar, Values
 from sysid_node.sim.signals.time_shift import slope
-from sysid_node.sim.stations.airflow import flow_angles
 
 
 def imu_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
@@ -28,11 +32,6 @@ def imu_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> V
 def air_data_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
     """From the CG to the air-data probe, m."""
     return Vector(*model.air_data).plus(vane_lever_arm.arm(effects["vane_lever_arm"])).minus(body.cg)
-
-
-def at_imu(specific_force: Vector, rates: Vector, acceleration: Vector, arm: Vector) -> Vector:
-    """Specific force (m/s^2) where the IMU sits, from that at the CG."""
-    return imu_lever_arm.transfer(specific_force, rates, acceleration, arm)
 
 
 def accelerometers(effects: dict[str, Values], specific_force: Vector) -> Vector:
@@ -61,7 +60,7 @@ def rates_from(effects: dict[str, Values], reading: Vector) -> Vector:
 
 def at_probe(velocity: Vector, rates: Vector, arm: Vector) -> tuple[Scalar, Scalar, Scalar]:
     """Airspeed (m/s), alpha, beta (rad) where the probe sits."""
-    return flow_angles(velocity.plus(rates.cross(arm)))
+    return flow_angles(velocity_at(velocity, rates, arm), jnp)
 
 
 def lagged(effects: dict[str, Values], state: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:

@@ -11,12 +11,12 @@ from sysid_node.batch.identify import identify
 from sysid_node.batch.models.gusts import air_relative, gust_rates, gust_states
 from sysid_node.batch.models.rigid_body import STATES, rigid_body
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import Conditions, Sortie, fly_sortie
 from sysid_node.sim.model.layout import OUTPUTS
-from sysid_node.sim.signals.atmosphere import air_density
 
 RATE = 100.0
 TRUTH = {name: derivative.value for name, derivative in KESTREL.derivatives.items()}
@@ -40,7 +40,7 @@ def record(flown: Sortie) -> FlightRecord:
     outputs, states = np.asarray(flown.flight.outputs), np.asarray(flown.flight.states)
     columns = dict(zip(OUTPUTS, outputs.T, strict=True))
     columns |= dict(zip(("de", "da", "dr", "thrust"), np.asarray(flown.flight.surfaces).T, strict=True))
-    columns["rho"] = np.asarray(air_density(-states[:, 2]))
+    columns["rho"] = np.asarray(air_density(-states[:, 2], np))
     return FlightRecord(np.arange(len(outputs)) / RATE, columns, "gusty")
 
 

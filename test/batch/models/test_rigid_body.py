@@ -9,10 +9,10 @@ from made_flight import KESTREL, MODEL, clean, trim
 from sysid_node.batch.likelihood import rollout
 from sysid_node.batch.models.manoeuvres import manoeuvre_data, with_forces_at_cg
 from sysid_node.batch.models.rigid_body import STATES, rigid_body
+from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.signals.atmosphere import air_density
 
 
 def test_it_flies_as_the_simulator_does():
@@ -24,7 +24,7 @@ def test_it_flies_as_the_simulator_does():
     flown = simulator.rollout(simulator.neutral(), start, simulator.inputs(commands))
     outputs = dict(zip(simulator.outputs, np.asarray(flown.outputs).T, strict=True))
     # the simulator's air thins as it climbs
-    density = np.asarray(air_density(-np.asarray(flown.states[:, 2])))
+    density = np.asarray(air_density(-np.asarray(flown.states[:, 2]), np))
     inputs = dataclasses.replace(record, columns={**record.columns, **outputs, "rho": density})
     start_here = {"V": airspeed, "alpha": alpha, "theta": alpha, **dict.fromkeys(("beta", "p", "q", "r", "phi"), 0.0)}
     mine = rollout.outputs(MODEL, manoeuvre_data(MODEL, inputs, start_here), MODEL.start)

@@ -9,9 +9,9 @@ import pytest
 from plain import DERIVATIVES, make_aircraft, three_axes
 from scipy.integrate import solve_ivp
 
+from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.sim import EFFECTS, Simulator, trim_flight
-from sysid_node.sim.signals.atmosphere import GRAVITY
 
 SAMPLES = 301
 

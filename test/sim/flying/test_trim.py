@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from plain import DERIVATIVES, make_aircraft
 
+from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator, trim_flight
-from sysid_node.sim.signals.atmosphere import GRAVITY
 
 EFFECTS = [
     "lateral_asymmetry:Cl_0=0.004:Cn_0=-0.002:CY_0=0.01",

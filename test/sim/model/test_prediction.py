@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from plain import make_aircraft, three_axes
 
+from sysid_node.dynamics.atmosphere import air_density
+from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import EFFECTS, Simulator, trim_flight
-from sysid_node.sim.body import Vector
 from sysid_node.sim.model.prediction import (
     Accelerations,
     Signals,
@@ -21,7 +22,6 @@ from sysid_node.sim.model.prediction import (
     predict_coefficients,
     signals_of,
 )
-from sysid_node.sim.signals.atmosphere import air_density
 
 SAMPLES = 601
 INNER = slice(40, -40)  # without the ends, where shifts and differences lack neighbours
@@ -32,7 +32,7 @@ def signals_from(flight, commands) -> Signals:
     return Signals(
         rates=outputs[:, 3:6],
         air=outputs[:, 9:12],
-        density=np.asarray(air_density(-states[:, 2])),
+        density=np.asarray(air_density(-states[:, 2], np)),
         commands=np.asarray(commands),
         climb=states[0, 2] - states[:, 2],
     )

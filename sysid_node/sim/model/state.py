@@ -1,0 +1,36 @@
+"""The simulator's state vector: which entry is what."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sysid_node.dynamics.attitude import Quaternion
+from sysid_node.dynamics.vector import Vector
+from sysid_node.sim.model.layout import Scalar
+
+#: The body's state (13,): position (m, north-east-down), velocity relative to the steadily moving air (m/s, body axes),
+#: attitude quaternion body to earth (scalar first), angular rates (rad/s, body axes).
+STATES = ("north", "east", "down", "u", "v", "w", "q0", "q1", "q2", "q3", "p", "q", "r")
+
+#: Places of what follows it in the continuous state (16,): attached fraction of the flow, displacement and speed of the
+#: structural mode.
+SEPARATION, MODE, MODE_RATE = 13, 14, 15
+
+
+class BodyState(NamedTuple):
+    """The rigid body's state, by part."""
+
+    position: Vector
+    velocity: Vector
+    attitude: Quaternion
+    rates: Vector
+
+
+def body_state(x: Scalar) -> BodyState:
+    """The first entries of a state vector (13 or more,), by part."""
+    return BodyState(
+        position=Vector(x[0], x[1], x[2]),
+        velocity=Vector(x[3], x[4], x[5]),
+        attitude=(x[6], x[7], x[8], x[9]),
+        rates=Vector(x[10], x[11], x[12]),
+    )
