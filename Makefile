@@ -4,7 +4,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo loop test lint format build bench clean distclean
+.PHONY: help demo loop docs test lint format build bench clean distclean
 
 VENV ?= .venv
 RATE ?= 1
@@ -36,7 +36,11 @@ demo: $(DONE)/build $(DONE)/run  ## identify the bundled flight live, over DDS; 
 loop: $(DONE)/build $(DONE)/run $(DONE)/desk  ## closed loop over DDS: something fails at 30 s, the controller adapts
 	@$(BIN)/python -m sysid_node.cli loop $(ARGS)
 
-test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## run all tests; ARGS="test/online -x" runs some
+docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out/docs/index.html; a warning is an error
+	@$(BIN)/python -m sphinx --quiet --jobs 2 --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
+	@echo "out/docs/index.html"
+
+test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs  ## run all tests; ARGS="test/online -x" runs some
 	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## ruff and mypy --strict
@@ -74,7 +78,7 @@ $(DONE)/ros: requirements/ros.txt requirements/constraints.txt | $(DONE)/venv
 	$(PIP) -r requirements/ros.txt
 	touch $@
 
-$(DONE)/run $(DONE)/desk $(DONE)/dev: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
+$(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
 	@echo "==> $< into $(VENV)"
 	$(PIP) -r $<
 	touch $@

@@ -1,4 +1,4 @@
-"""The adaptive controller against the fixed baseline. `python bench/closed_loop.py --page docs/closed_loop.md`
+"""The adaptive controller against the fixed baseline. `python bench/closed_loop.py --page docs/results/closed_loop.md`
 
 Simulator, online estimator, exciter and controller in one process, calling what the nodes call. Something fails at
 30 s; the tracking error is that of the true attitude from the reference model's, over the seconds from 10 s after the

@@ -1,4 +1,4 @@
-"""Which faults are found, how soon, and what is taken for one. `python bench/faults.py --page docs/faults.md`
+"""Which faults are found, how soon, and what is taken for one. `python bench/faults.py --page docs/results/faults.md`
 
 `cdrw` under an autopilot that holds attitude and airspeed, with 3-2-1-1s every six seconds; something fails at 40 s.
 The monitor knows the aircraft from a file whose derivatives are off by draws from their tolerances; `--identified` has

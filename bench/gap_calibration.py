@@ -1,6 +1,6 @@
 """Whether the probabilities that ``sysid gap`` states mean what they say, over several sets of withheld effects.
 
-    python bench/gap_calibration.py bench/withheld/*.jsonl [--page docs/gap_scoreboard.md]
+    python bench/gap_calibration.py bench/withheld/*.jsonl [--page docs/results/gap_scoreboard.md]
 
 Reads ledgers of ``bench/gap_scoreboard.py``: probabilities as they were stated, each set by its own version. One set of
 300 cases has few causes in the middle bins; together they have enough to tell chance from what is stated wrongly.

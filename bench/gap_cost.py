@@ -1,6 +1,6 @@
 """What ``sysid gap`` costs: 60 s at 100 Hz against every effect, programs kept and not, and two flights.
 
-    python bench/gap_cost.py [--repeat 3] [--page docs/gap.md]
+    python bench/gap_cost.py [--repeat 3] [--page docs/results/cost.md]
 
 The flights are flown first (cdrw, light turbulence, an actuator's lag). Run it on an idle machine: times by the clock
 tell of that machine only, the ratio of two flights to one of any.

@@ -1,6 +1,7 @@
 """The weights of ``sysid_node.gap.selection.calibration``, learned from flights of known truth.
 
-    python bench/gap_credence.py bench/withheld/seeds_820.jsonl bench/withheld/seeds_1200.jsonl [--page docs/gap.md]
+    python bench/gap_credence.py bench/withheld/seeds_820.jsonl bench/withheld/seeds_1200.jsonl \
+        [--page docs/results/gap_calibration.md]
 
 Reads ledgers of ``bench/gap_scoreboard.py`` (or some seeds of them): the grounds of every cause that was named or
 doubted, and by the label whether it was there. A logistic regression by Firth's (1993) penalised

@@ -1,10 +1,12 @@
-"""What the diagnosis says of every effect, one at a time: `python bench/gap_effects.py [--page docs/gap.md]`
+"""What the diagnosis says of every effect, one at a time.
 
-The sizes are those of the pictures in docs/effects.md, none chosen here; the aircraft is theirs, too. Two flights in
+    python bench/gap_effects.py [--page docs/results/gap_effects.md]
+
+The sizes are those of the pictures in docs/reference/effects.md, none chosen here; so is the aircraft. Two flights in
 still air each, 3-2-1-1 to be fitted, multisine held out, a throttle doublet in both; the aircraft file's derivatives
 are off by draws from their tolerances. With `--without-vanes` no flow angle is measured. The simulator that flies is
 the one that is searched: what is shown is what can be told apart, not how the diagnosis does on another plant
-(docs/gap_scoreboard.md). Finished effects are kept in `--out`, so that the command goes on where it stopped.
+(docs/results/gap_scoreboard.md). Finished effects are kept in `--out`, so that the command goes on where it stopped.
 """
 
 from __future__ import annotations

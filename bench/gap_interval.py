@@ -1,4 +1,6 @@
-"""Whether the interval of the gap's shrinkage holds: `python bench/gap_interval.py [--flights 20] [--page docs/gap.md]`
+"""Whether the interval of the gap's shrinkage holds.
+
+    python bench/gap_interval.py [--flights 20] [--page docs/results/gap_effects.md]
 
 Flights of cdrw with one effect and derivatives off by half their tolerances: one is fitted with that effect, the other
 held out. What could be closed on it is known here: the file's error less that of the simulator with everything right.

@@ -1,4 +1,4 @@
-"""``sysid gap`` on real flights: `python bench/gap_real_flights.py [--page docs/gap_real_flights.md]`
+"""``sysid gap`` on real flights: `python bench/gap_real_flights.py [--page docs/results/gap_real_flights.md]`
 
 HFB-320 in turbulence, the small UAV Thor whose surfaces are commands, and the Twin Otter: fitted on one part of the
 record, measured on the other. Needs the folder of flight records, which is not part of the project.

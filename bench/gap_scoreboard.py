@@ -1,6 +1,7 @@
 """The scoreboard of ``sysid gap`` on withheld effects.
 
-    python bench/gap_scoreboard.py --set development --cases 40 --out out/withheld [--page docs/gap_scoreboard.md]
+    python bench/gap_scoreboard.py --set development --cases 40 --out out/withheld \
+        [--page docs/results/gap_scoreboard.md]
 
 Effects drawn at random are flown by plants in processes of their own, which hand over bags and an aircraft file; the
 label is sealed until the diagnosis is written. Finished cases are kept: the same command goes on where it stopped.

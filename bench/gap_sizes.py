@@ -1,6 +1,7 @@
 """How far the sizes that ``sysid gap`` states are off, beside the standard errors that chance alone gives them.
 
-    python bench/gap_sizes.py bench/withheld/seeds_820.jsonl bench/withheld/seeds_1200.jsonl [--page docs/gap.md]
+    python bench/gap_sizes.py bench/withheld/seeds_820.jsonl bench/withheld/seeds_1200.jsonl \
+        [--page docs/results/gap_calibration.md]
 
 Reads ledgers of ``bench/gap_scoreboard.py``: the sizes of the effects that were named rightly, and what was drawn. An
 aircraft is not its simulator, so sizes are off by more than chance: by a share of themselves, which is learned here and

@@ -1,4 +1,4 @@
-"""The closed loop under stress, over DDS. `python bench/loop_stress.py --page docs/closed_loop.md`
+"""The closed loop under stress, over DDS. `python bench/loop_stress.py --page docs/results/closed_loop.md`
 
 Every node of the loop runs in a process of its own, and all that the sensors say passes through a relay. One after
 other: each node is killed and started again, 30 % of the messages are lost, each is up to 50 ms late, each sensor is

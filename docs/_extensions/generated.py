@@ -1,9 +1,9 @@
 """Writes the reference that is made from the program itself, before Sphinx reads the pages.
 
 Commands come from the argument parsers, parameters from ``config/*.yaml`` (which the nodes' own tables write), messages
-from ``msg_defs/msg``, the Python interface is a page of autodoc a layer, and the map of the source is the first sentence of
-every module's docstring. All of it goes to
-``docs/reference/generated``, which is not kept in the repository.
+from ``msg_defs/msg``. The Python interface is a page of autodoc a layer, and the map of the source holds the first
+sentence of every module's docstring. All of it goes to ``docs/reference/generated``, which is not kept in the
+repository.
 """
 
 from __future__ import annotations
@@ -211,9 +211,11 @@ def interface() -> dict[str, str]:
     layers = [layer for layer in LAYERS if (ROOT / "sysid_node" / layer).is_dir()]
     pages = {f"{layer}.rst": _layer(ROOT / "sysid_node" / layer) for layer in layers}
     title = "Python API of the layers"
+    everyday = "For everyday work the few functions of :doc:`/python_api` are enough. "
     said = (
-        "These pages are made from the docstrings of each layer's own modules, lowest layer first. For everyday work "
-        "the few functions of :doc:`/python_api` do; :doc:`../map` says what every module holds, inner ones included.\n"
+        "These pages are made from the docstrings of each layer's own modules, lowest layer first. "
+        + (everyday if (ROOT / "docs" / "python_api.md").is_file() else "")
+        + ":doc:`../map` says what every module holds, inner ones included.\n"
     )
     entries = "\n".join(f"   {layer}" for layer in layers)
     head = f"{title}\n{'=' * len(title)}\n"

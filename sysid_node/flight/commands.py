@@ -11,7 +11,7 @@ from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.cdr.decoding import decode
 from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS
 
-#: Where commands are recorded (``docs/bags.md``), and their type: that of the positions.
+#: Where commands are recorded (``docs/reference/bags.md``), and their type: that of the positions.
 COMMANDS, COMMANDS_TYPE = "/actuators/command", INPUT_TOPICS[ACTUATORS]
 
 

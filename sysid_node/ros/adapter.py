@@ -50,7 +50,7 @@ PARAMETERS = (
         _DEFAULT.joints,
         "",
         "Which output moves which joint, and how far: NAME=OUTPUT:TRIM:SCALE with spaces between. The joint's angle is "
-        "SCALE (rad per unit of the output) times the output less TRIM; see docs/autopilots.md. Needed.",
+        "SCALE (rad per unit of the output) times the output less TRIM; see docs/how-to/autopilots.md. Needed.",
         "For every aircraft: measure the surfaces at both ends of their travel.",
     ),
     Parameter(
@@ -66,7 +66,7 @@ PARAMETERS = (
         _DEFAULT.air_data_delay,
         "s",
         "By so much airspeed is stamped too late, as where it is stamped when it arrives.",
-        "To the link's latency where docs/autopilots.md says that stamps are times of arrival.",
+        "To the link's latency where docs/how-to/autopilots.md says that stamps are times of arrival.",
         *RANGES["air_data_delay"],
     ),
     Parameter(

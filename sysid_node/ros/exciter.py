@@ -34,7 +34,7 @@ PARAMETERS = (
         "manoeuvre",
         "+".join(_DEFAULT.manoeuvre),
         "",
-        "What is flown, over and over (docs/manoeuvres.md): multisines, 3-2-1-1, doublets; several joined by +.",
+        "What is flown, over and over: multisines, 3-2-1-1, doublets; several joined by + (docs: Manoeuvres).",
         "Amplitude up in rough air, down near the ground.",
     ),
     Parameter(

@@ -39,7 +39,7 @@ PARAMETERS = (
         "actuator_lag:time_constant=0.05",
         "",
         "What makes the aircraft differ from its file: name:key=value, several with a space between. Change in flight.",
-        "To let something fail: control_effectiveness_loss:elevator=0.6 (docs/effects.md lists all).",
+        "To let something fail: control_effectiveness_loss:elevator=0.6 (docs: Effects).",
     ),
     Parameter(
         "rate",

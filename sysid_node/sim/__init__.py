@@ -17,7 +17,7 @@ samples.
 record))`` and its slopes, without integrating the motion. ``sortie`` flies whole flights (trim, weather, autopilot,
 noise), ``live`` one sample at a time; ``recording`` turns flights into messages, ``dryden`` makes turbulence,
 ``export`` writes other simulators' models.
-The page docs/effects.md describes every effect.
+The page docs/reference/effects.md describes every effect.
 
 Everything is SI, radians, body axes forward-right-down, float64.
 """

@@ -201,7 +201,7 @@ def test_a_damaged_file_gives_an_aircraft_or_one_line(line, start, length, junk)
 
 
 def test_the_example_of_the_documentation_loads():
-    page = Path(__file__).parents[2] / "docs" / "aircraft_file.md"
+    page = Path(__file__).parents[2] / "docs" / "reference" / "aircraft_file.md"
     blocks = page.read_text().split("```yaml\n")[1:]
     assert len(blocks) >= 1
     parse_aircraft(blocks[0].split("```")[0], str(page))

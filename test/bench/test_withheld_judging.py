@@ -1,4 +1,4 @@
-"""What the scorer calls right, case by case. Truth: the rules of docs/gap_scoreboard.md, and textbook intervals."""
+"""What the scorer calls right, case by case. Truth: docs/results/gap_scoreboard.md, textbook intervals."""
 
 from __future__ import annotations
 

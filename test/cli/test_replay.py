@@ -292,6 +292,6 @@ def test_the_documentations_python_runs(monkeypatch, capsys):
     if not (root / "bags" / "cdrw_multistep").is_dir():
         pytest.skip("bags/cdrw_multistep is not there")
     monkeypatch.chdir(root)
-    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "bags.md").read_text(), re.DOTALL)
-    exec(compile(code, "docs/bags.md", "exec"), {})
+    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "reference" / "bags.md").read_text(), re.DOTALL)
+    exec(compile(code, "docs/reference/bags.md", "exec"), {})
     assert "DerivativeEstimate(name='Cm_alpha'" in capsys.readouterr().out

@@ -160,7 +160,7 @@ def test_any_text_gives_a_manoeuvre_or_one_line(text):
 
 
 def test_the_documentation_names_every_kind_and_its_examples_parse():
-    page = (Path(__file__).parents[2] / "docs" / "manoeuvres.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "manoeuvres.md").read_text()
     for kind in KINDS:
         assert f"| `{kind}` |" in page
     examples = [line.strip() for line in page.split("```spec\n")[1].split("```")[0].splitlines()]

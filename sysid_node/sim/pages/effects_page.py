@@ -1,6 +1,6 @@
 """Writes the page of effects: equation, parameters, source, and a picture of what each does to doublets.
 
-python -m sysid_node.sim.pages.effects_page [--out docs]
+python -m sysid_node.sim.pages.effects_page [--out docs/reference]
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ without the effect, blue with it; of all readings the two that change most, by t
 def main() -> None:
     """Writes ``effects.md`` and ``effects/NAME.svg`` into a folder."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--out", type=Path, default=Path("docs/reference"))
     folder = parser.parse_args().out
     (folder / "effects").mkdir(parents=True, exist_ok=True)
     for name, text in pictures().items():

@@ -48,7 +48,7 @@ def test_every_example_is_one(autopilot: str) -> None:
 
 
 def test_the_page_shows_maps_that_are_accepted() -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "autopilots.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[3] / "docs" / "how-to" / "autopilots.md").read_text(encoding="utf-8")
     shown = re.findall(r'joints(?::=| )"([^"]+)"', page)
     assert len(shown) == 3
     for text in shown:

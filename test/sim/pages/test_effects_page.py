@@ -9,7 +9,7 @@ from sysid_node.sim import EFFECTS
 from sysid_node.sim.pages.effects_page import EXAMPLES, page
 from sysid_node.sim.pages.line_chart import Panel, draw
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "reference"
 
 
 def test_the_page_is_up_to_date():
