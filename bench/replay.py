@@ -21,7 +21,7 @@ from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Sensors
-from sysid_node.cli.replay import replay, write_replay
+from sysid_node.api import load, replay
 from sysid_node.flight.bag.message_types import type_store
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
@@ -125,7 +125,8 @@ def measure(bag: Path, aircraft: Aircraft, repeat: int, folder: Path) -> None:
     settings = Settings()
     reference = best(lambda: deserialise(bag), repeat)
     streams = read_streams(bag)
-    done = replay(bag, aircraft, settings)
+    flight = load(bag, aircraft)
+    done = replay(flight, judge_faults=False)
     names = iter(range(1000))
 
     def estimates_bag() -> None:
@@ -138,12 +139,12 @@ def measure(bag: Path, aircraft: Aircraft, repeat: int, folder: Path) -> None:
         "align": best(lambda: align_streams(aircraft, streams, settings.max_gap), repeat),
         **{
             f"replay: decode, align, identify, estimates at {rate:g} Hz": best(
-                lambda rate=rate: replay(bag, aircraft, settings, publish_rate=rate), repeat
+                lambda rate=rate: replay(flight, {"publish_rate": rate}, judge_faults=False), repeat
             )
             for rate in (1.0, 20.0)
         },
         "estimates at 20 Hz as a bag": best(estimates_bag, repeat),
-        "all files of sysid replay, report included": best(lambda: write_replay(folder / "out", done), 1),
+        "all files of sysid replay, report included": best(lambda: done.save(folder / "out"), 1),
     }
     for name, seconds in rows.items():
         print(f"  {name:56} {seconds:6.2f} s  {seconds / reference:5.2f}")

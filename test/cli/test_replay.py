@@ -12,8 +12,10 @@ from made_flights import JOINTS, made_aircraft, made_streams
 from rosbags.rosbag2 import Reader
 
 from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.api import load, replay
+from sysid_node.api.replaying import replay_settings
 from sysid_node.cli.main import main
-from sysid_node.cli.replay import parse_settings, replay
+from sysid_node.cli.shared.options import settings_of
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.message_types import type_store
 from sysid_node.flight.bag.reader import read_streams
@@ -26,7 +28,8 @@ from sysid_node.online.estimates import published
 from sysid_node.online.settings import Settings
 
 AIRCRAFT = made_aircraft()
-SETTINGS = Settings(frequencies=(0.2, 0.2, 2.0))
+LINES = {"frequencies": (0.2, 0.2, 2.0)}
+SETTINGS = Settings.from_mapping(LINES)
 KEYS = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
 
 
@@ -83,7 +86,8 @@ def bits(known):
 
 @pytest.mark.parametrize("rate", [20.0, 3.0])
 def test_a_replay_is_the_live_run_to_the_last_bit(bag, rate):
-    done, live = replay(bag, AIRCRAFT, SETTINGS, publish_rate=rate), one_by_one(bag, SETTINGS, rate)
+    done = replay(load(bag, AIRCRAFT), LINES | {"publish_rate": rate})
+    live = one_by_one(bag, SETTINGS, rate)
     assert len(done.history) == len(live) > 10
     assert done.stamps_ns.tolist() == [stamp for stamp, _ in live]
     for ours, (_, theirs) in zip(done.history, live, strict=True):
@@ -109,7 +113,7 @@ def test_files_and_summary_are_the_contracts(arguments, tmp_path, capsys):
 
 def test_the_bag_of_estimates_holds_every_one(arguments, tmp_path, bag):
     assert main([*arguments, "--quiet"]) == 0
-    done, store = replay(bag, AIRCRAFT, SETTINGS), type_store()
+    done, store = replay(load(bag, AIRCRAFT), LINES), type_store()
     with Reader(tmp_path / "out" / "estimates") as reader:
         assert {c.topic for c in reader.connections} == {"/identifier/derivatives", "/fault_monitor/faults"}
         chosen = [c for c in reader.connections if c.topic == "/identifier/derivatives"]
@@ -134,7 +138,7 @@ def test_a_second_replay_replaces_the_first(arguments, tmp_path, capsys):
         assert {c.topic: c.msgcount for c in reader.connections}["/identifier/derivatives"] == 11
     (tmp_path / "out" / "estimates" / "mine.txt").write_text("keep me")
     assert main([*arguments, "--quiet"]) == 2
-    assert "holds mine.txt, which no replay wrote" in capsys.readouterr().err
+    assert "holds mine.txt, which sysid replay did not write" in capsys.readouterr().err
     assert (tmp_path / "out" / "estimates" / "mine.txt").read_text() == "keep me"
 
 
@@ -250,10 +254,11 @@ def test_an_out_that_is_a_file(arguments, tmp_path, capsys):
 
 
 def test_settings_from_texts():
-    settings, rate = parse_settings(["window = 12", "publish_rate=5", "detect_changes=false"], "0.1:0.1:1")
+    texts = ["window = 12", "publish_rate=5", "detect_changes=false"]
+    settings, rate = replay_settings(settings_of(texts, "0.1:0.1:1", "window=20"))
     assert (settings.window, settings.detect_changes, settings.frequencies, rate) == (12.0, False, (0.1, 0.1, 1.0), 5.0)
     with pytest.raises(InputError):
-        parse_settings(["="])
+        replay_settings(settings_of(["="], None, "window=20"))
 
 
 def test_faulty_messages_are_counted_in_the_summary(arguments, tmp_path, flight):

@@ -14,13 +14,16 @@ from sysid_node.online.types import Estimates
 
 
 @contextmanager
-def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr that shows the share (0..1) it is told; nothing where ``quiet`` or where stderr is a file."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float, str], None]]:
+    """A bar on stderr that shows the share done (0..1) and what is being done.
+
+    Nothing is shown where ``quiet`` or where stderr is a file.
+    """
+    columns = (TextColumn(title), BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
-        task = progress.add_task(title, total=1.0)
-        yield lambda share: progress.update(task, completed=share)
+        task = progress.add_task("", total=1.0)
+        yield lambda share, doing: progress.update(task, completed=share, description=doing)
 
 
 def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[str, float] | None = None) -> None:

@@ -36,10 +36,14 @@ class Figure:
     height: int = 230
 
     @property
+    def spec(self) -> dict[str, Any]:
+        """The figure as Plotly takes it: ``data`` and ``layout``."""
+        return {"data": list(self.traces), "layout": {**_LAYOUT, "height": self.height, **self.layout}}
+
+    @property
     def json(self) -> Markup:
         """The figure for a ``<script type="application/json">``: nothing in it can end that element."""
-        spec = {"data": list(self.traces), "layout": {**_LAYOUT, "height": self.height, **self.layout}}
-        text = json.dumps(spec, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+        text = json.dumps(self.spec, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         return Markup(text.replace("<", "\\u003c"))
 
 
@@ -47,6 +51,11 @@ def packed(values: Array) -> dict[str, str]:
     """An array (N,) as Plotly's typed-array text; NaN is a gap in the line."""
     data = np.ascontiguousarray(values, dtype="<f4").tobytes()
     return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
+
+
+def unpacked(values: Mapping[str, str]) -> NDArray[np.float32]:
+    """The array (N,) that ``packed`` made into text."""
+    return np.frombuffer(base64.b64decode(values["bdata"]), dtype="<f4")
 
 
 def line(x: Array, y: Array, name: str = "", *, colour: str = BLUE, dash: str = "solid", width: float = 1.6) -> Trace:

@@ -51,12 +51,17 @@ _SURFACES = {"de": "elevator", "da": "aileron", "dr": "rudder"}
 
 def context(run: RunResult) -> Mapping[str, Any]:
     """Captions and figures, the deflections first."""
-    plots = [] if run.flight is None else _histories(run.flight)
     spectrum = None if run.spectra is None or not run.spectra.inputs else _spectrum(run.spectra)
-    return {"plots": plots, "spectrum": spectrum}
+    return {"plots": figures_of(run), "spectrum": spectrum}
 
 
-def _histories(flight: FlightRecord) -> list[tuple[str, Figure]]:
+def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
+    """Titles and figures of what was flown; none where the record itself is not there."""
+    return [] if run.flight is None else histories(run.flight)
+
+
+def histories(flight: FlightRecord) -> list[tuple[str, Figure]]:
+    """Titles and figures: the deflections against time, then the motion."""
     surfaces = {c: _SURFACES.get(c, c) for c in flight.columns if c in _SURFACES or c not in COLUMNS}
     groups = (Group("Control deflections", "deg", DEGREES, surfaces), *GROUPS)
     return [(group.title, figure) for group in groups if (figure := _history(flight, group)) is not None]

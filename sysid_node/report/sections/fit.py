@@ -38,6 +38,11 @@ def context(run: RunResult) -> Mapping[str, Any]:
     }
 
 
+def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
+    """Measured and modelled, under the name of each output or coefficient."""
+    return [(f"{name}, {r.unit}" if r.unit else name, _figure(name, r)) for name, r in run.responses.items()]
+
+
 def _percent(share: float) -> str:
     """A share in percent; what is not quite all is not rounded up to it."""
     if not math.isfinite(share):

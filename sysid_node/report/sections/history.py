@@ -61,6 +61,12 @@ def context(run: RunResult) -> Mapping[str, Any]:
     }
 
 
+def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
+    """Each panel's figure under the derivative's name and unit; none where there is but one time."""
+    panels = [panel for _, group in context(run)["groups"] for panel in group]
+    return [(f"{panel.name} {unit(panel.name)}".strip(), panel.figure) for panel in panels if panel.figure]
+
+
 def _panel(run: RunResult, last: DerivativeEstimate) -> Panel:
     curves = _curves(run, last.name)
     figure = _figure(run, last, curves) if np.isfinite(curves.value).any() else None

@@ -22,6 +22,12 @@ def context(run: RunResult) -> Mapping[str, Any]:
     }
 
 
+def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
+    """The residual's spectrum under the name of each coefficient."""
+    spectra = run.spectra
+    return [(name, _figure(spectra, name)) for name in (spectra.residuals if spectra else ())] if spectra else []
+
+
 def _figure(spectra: Spectra, name: str) -> Figure:
     traces = []
     if name in spectra.measured:

@@ -7,8 +7,8 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.api import load, replay
 from sysid_node.cli.main import main
-from sysid_node.cli.replay import replay
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.base import AirSample, ImuSample, Settings
 from sysid_node.flight.autopilots.px4 import AIRSPEED, IMU, MOTORS, SERVOS, Px4
@@ -110,7 +110,7 @@ def test_a_bag_of_what_the_adapter_said_replays_to_the_same(said, tmp_path, vane
     logged = with_vanes(said) if vanes else said
     live = estimated(logged)
     write_streams(tmp_path / "bag", streams_of_samples(logged, "flight"))
-    replayed = replay(tmp_path / "bag", load_aircraft("cdrw"), Estimator(), publish_rate=5.0).history
+    replayed = replay(load(tmp_path / "bag", "cdrw"), {"publish_rate": 5.0}).history
     assert len(replayed) == len(live) > 50
     assert [bits(one) for one in replayed] == [bits(one) for one in live]
     if vanes:

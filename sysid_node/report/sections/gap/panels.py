@@ -72,7 +72,7 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
          ", ".join(_span(name, *ends) for name, ends in w["regime"].items()))
         for w in found.where[:8]
     ]  # fmt: skip
-    return {"figure": _waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect"}
+    return {"figure": waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect"}
 
 
 def _span(name: str, low: float, high: float) -> str:
@@ -85,7 +85,7 @@ def _signal(name: str) -> str:
     return WORDS.get(name) or REGRESSOR_WORDS.get(name, name)
 
 
-def _waterfall(found: Diagnosis) -> Figure:
+def waterfall(found: Diagnosis) -> Figure:
     """From all of the gap down to what noise leaves."""
     steps = _steps_down(found)
     stations = list(dict.fromkeys(station for station, _, _ in steps))
@@ -135,6 +135,11 @@ def flight(found: Diagnosis) -> Mapping[str, Any]:
 
 
 Panel = tuple[Any, str, Figure]
+
+
+def flight_figures(found: Diagnosis) -> list[tuple[str, Figure]]:
+    """The flight's figures, each under its symbol and meaning."""
+    return [(f"{sign}, {words}", figure) for sign, words, figure in flight(found)["panels"]]
 
 
 def _short_flights(found: Diagnosis) -> list[Panel]:

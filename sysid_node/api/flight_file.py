@@ -1,0 +1,81 @@
+"""A flight's file, its aircraft, and how to read it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.api.data_frames import data_frame
+from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.logs import load_flight
+from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.topics import topic_names
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+@dataclass(frozen=True)
+class FlightFile:
+    """A bag or a log of one flight. ``topics`` holds the absolute name of each input topic in the bag."""
+
+    path: Path
+    aircraft: Aircraft
+    topics: Mapping[str, str]
+    body_frame: BodyFrame
+
+    @property
+    def name(self) -> str:
+        """The file's or the folder's name."""
+        return self.path.name
+
+    @cached_property
+    def record(self) -> FlightRecord:
+        """The aligned samples: SI units and radians, body axes forward-right-down. Raises InputError."""
+        return self.aligned(max_gap=0.2)
+
+    def aligned(self, max_gap: float) -> FlightRecord:
+        """The samples, those left out that stand more than ``max_gap`` s from a message. Raises InputError."""
+        record = load_flight(self.path, self.aircraft, topics=self.topics, frame=self.body_frame, max_gap=max_gap)
+        return replace(record, name=self.name)
+
+    def plot(self) -> Figure:
+        """Deflections and motion against time, as the report of a replay draws them."""
+        from sysid_node.report.drawing.plotly_figure import plotly_figure  # noqa: PLC0415
+        from sysid_node.report.sections.excitation import histories  # noqa: PLC0415
+
+        return plotly_figure(histories(self.record), columns=2)
+
+    def to_pandas(self) -> Any:
+        """The aligned samples as a DataFrame, by time (s). Raises ImportError where pandas is not installed."""
+        record = self.record
+        return data_frame(dict(record.columns), index=record.time, index_name="time")
+
+    def __repr__(self) -> str:
+        record = self.record
+        measured = ", ".join(name for name in record.columns if record.measured(name))
+        return f"{self.name} of {self.aircraft.name}: {record.duration:.1f} s, {len(record)} samples of {measured}"
+
+
+def load(
+    path: str | Path,
+    aircraft: str | Path | Aircraft,
+    *,
+    topics: Iterable[str] = (),
+    body_frame: BodyFrame = "flu",
+) -> FlightFile:
+    """A flight's file with its aircraft; its samples are read when they are first needed.
+
+    ``path``: a rosbag2 folder, an ``.mcap`` or ``.db3`` file, or a ``.csv`` log. ``aircraft``: an aircraft file, the
+    name of one that is shipped, or an ``Aircraft``. ``topics``: names in the bag, as ``"imu/data:=/mavros/imu/data"``.
+    ``body_frame``: axes of the IMU messages, ``"flu"`` (REP-103) or ``"frd"``.
+
+    Raises InputError where the aircraft file or a topic's name is wrong.
+    """
+    known = aircraft if isinstance(aircraft, Aircraft) else load_aircraft(aircraft)
+    return FlightFile(Path(path), known, topic_names(topics), body_frame)

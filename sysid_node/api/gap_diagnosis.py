@@ -1,0 +1,117 @@
+"""Flights held against the simulator: where they differ, and which effect causes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
+
+from sysid_node.aircraft.model import Derivative
+from sysid_node.api.data_frames import data_frame
+from sysid_node.api.flight_file import FlightFile
+from sysid_node.errors import InputError
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.diagnose import diagnose as diagnose_flights
+from sysid_node.gap.document import document
+from sysid_node.gap.flightdata.gap_flight import load_gap_flight
+from sysid_node.report.drawing.plotly_figure import plotly_figure
+from sysid_node.report.files.gap_folder import corrected_aircraft, write_gap
+from sysid_node.report.files.run_folder import REPORT
+from sysid_node.report.sections.gap import panels
+from sysid_node.report.sections.gap.paragraph import paragraph
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class GapDiagnosis:
+    """A diagnosis with its verdict, causes and size. ``diagnosis`` holds all that the program found."""
+
+    diagnosis: Diagnosis
+
+    @property
+    def verdict(self) -> str:
+        """``"no_gap"``, ``"explained"``, ``"ambiguous"``, ``"unknown_effect"`` or ``"unsupported"``."""
+        return self.diagnosis.verdict
+
+    @property
+    def words(self) -> str:
+        """What was found, in one paragraph."""
+        return paragraph(self.diagnosis)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The content of ``gap.json``."""
+        return dict(document(self.diagnosis))
+
+    @property
+    def causes(self) -> list[dict[str, Any]]:
+        """Each cause with its effect, parameters (value, standard error) and probability."""
+        return list(self.document["causes"])
+
+    @property
+    def derivatives(self) -> dict[str, Derivative]:
+        """The aircraft file's derivatives as the flights have them, within their tolerances."""
+        return dict(corrected_aircraft(self.diagnosis).derivatives)
+
+    def plot(self, what: str = "where") -> Figure:
+        """A Plotly figure as the report draws it: ``"where"`` the gap lies, or the ``"flight"`` beside the simulator.
+
+        Raises InputError for any other word.
+        """
+        if what == "where":
+            return plotly_figure([("Where the gap lies", panels.waterfall(self.diagnosis))], columns=1)
+        if what == "flight":
+            return plotly_figure(panels.flight_figures(self.diagnosis), columns=2)
+        raise InputError(f"plot {what!r}: expected 'where' or 'flight'")
+
+    def to_pandas(self) -> Any:
+        """The candidates with probability and share. Raises ImportError where pandas is not installed."""
+        rows = self.document["candidates"]
+        columns = {name: [row[name] for row in rows] for name in ("probability", "share")}
+        return data_frame(columns, index=[row["effect"] for row in rows], index_name="effect")
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``sysid gap`` writes; returns the path of the report. Raises InputError."""
+        write_gap(Path(folder), self.diagnosis)
+        return Path(folder) / REPORT
+
+    def __repr__(self) -> str:
+        return f"{self.verdict}: {self.words}"
+
+    def _repr_html_(self) -> str:
+        return str(Markup("<p><strong>{}</strong></p><p>{}</p>").format(self.verdict.replace("_", " "), self.words))
+
+
+def diagnose(
+    flights: FlightFile | Sequence[FlightFile],
+    *,
+    holdout: Sequence[FlightFile] = (),
+    resume: str | Path | None = None,
+    progress: Callable[[float, str], None] | None = None,
+) -> GapDiagnosis:
+    """Finds where the simulator of the aircraft file and the flights differ, and which effect causes it.
+
+    The gap is measured on ``holdout``; without it, on parts of the flights that were not fitted. ``resume``: a folder
+    for finished steps, from which an interrupted diagnosis goes on. ``progress`` is called with the share done (0..1)
+    and what is being done. A diagnosis takes about a minute for a minute of flight.
+
+    Raises InputError where the aircraft file has no tolerances, a flight cannot be read, is fitted and held out at
+    once, or shows no motion.
+    """
+    flights = [flights] if isinstance(flights, FlightFile) else list(flights)
+    if not flights:
+        raise InputError("no flight to diagnose; give at least one")
+    aircraft = flights[0].aircraft
+    fitted, held_out = (
+        [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group] for group in (flights, holdout)
+    )
+    keep = None if resume is None else Path(resume)
+    return GapDiagnosis(
+        diagnose_flights(aircraft, fitted, held_out, progress or (lambda share, doing: None), keep=keep)
+    )

@@ -1,0 +1,65 @@
+"""Flights identified by a batch method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sysid_node.api.estimated_run import EstimatedRun
+from sysid_node.api.flight_file import FlightFile
+from sysid_node.batch.identify import Identification
+from sysid_node.batch.identify import identify as identify_records
+from sysid_node.batch.settings import BatchSettings
+from sysid_node.errors import InputError
+from sysid_node.flight.truth import read_truth
+from sysid_node.report.files.batch_tables import write_batch_tables
+from sysid_node.report.files.run_folder import REPORT, write_run
+from sysid_node.report.results.from_identification import identification_result
+from sysid_node.report.results.run_result import RunResult
+
+
+@dataclass(frozen=True, repr=False)
+class BatchIdentification(EstimatedRun):
+    """The result of a batch method. ``identification`` holds the fit with its correlations and residuals."""
+
+    run: RunResult
+    identification: Identification
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``sysid identify`` writes; returns the path of the report. Raises InputError."""
+        folder = Path(folder)
+        write_run(folder, self.run)
+        write_batch_tables(folder, self.identification)
+        return folder / REPORT
+
+
+def identify(
+    flights: FlightFile | Sequence[FlightFile],
+    method: str,
+    settings: Mapping[str, object] | None = None,
+    *,
+    holdout: Sequence[FlightFile] = (),
+    progress: Callable[[float, str], None] | None = None,
+) -> BatchIdentification:
+    """Estimates an aircraft's derivatives from whole flights, and checks them on flights that are held out.
+
+    ``flights``: one or several of the same aircraft. ``method``: as of ``sysid identify --method``, e.g.
+    ``"equation_error"``, ``"output_error"`` or ``"filter_error"``. ``settings``: as of ``--set``. ``progress`` is
+    called with the share done (0..1) and what is being done.
+
+    Raises InputError where a setting, the method or a flight is not as it must be.
+    """
+    flights = [flights] if isinstance(flights, FlightFile) else list(flights)
+    if not flights:
+        raise InputError("no flight to identify from; give at least one")
+    chosen = BatchSettings.from_mapping(settings or {})
+    tell = progress or (lambda share, doing: None)
+    tell(0.0, "reading the flights")
+    records, held_out = ([flight.aligned(chosen.max_gap) for flight in group] for group in (flights, holdout))
+    tell(0.2, method.replace("_", " "))
+    aircraft = flights[0].aircraft
+    found = identify_records(method, aircraft, records, chosen, held_out)
+    tell(0.9, "spectra")
+    result = identification_result(aircraft, records, found, chosen, read_truth(flights[0].path))
+    return BatchIdentification(result, found)

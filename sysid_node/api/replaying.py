@@ -1,0 +1,173 @@
+"""A flight identified as the live node does: the same functions, message for message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.api.estimated_run import EstimatedRun
+from sysid_node.api.flight_file import FlightFile
+from sysid_node.errors import InputError
+from sysid_node.faults.model.reference_model import known_of
+from sysid_node.faults.recorded_flight import Heard, Verdict, judge
+from sysid_node.faults.settings import Settings as FaultSettings
+from sysid_node.flight.actuation import Actuation
+from sysid_node.flight.align import flat, why_nothing_aligned
+from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.commands import read_commands
+from sysid_node.flight.streams import Stamps, Streams
+from sysid_node.flight.truth import Truth, truth_at_end
+from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.alignment.schedule import due_times
+from sysid_node.online.alignment.whole_record import Aligned, align_streams
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
+from sysid_node.online.whole_record import run as run_online
+from sysid_node.report.files.bag_folder import remove_earlier_bag
+from sysid_node.report.files.estimates_bag import write_estimates
+from sysid_node.report.files.run_folder import REPORT, write_run
+from sysid_node.report.results.from_replay import replay_result
+from sysid_node.report.results.run_result import RunResult
+
+PUBLISH_RATE = 20.0  # Hz, the node's default
+ESTIMATES_BAG = "estimates"
+TABLE_ROWS = 600  # times at which the tables and the report show estimates; the bag holds all
+
+#: Share of a replay's time at which the search for faults begins, for the progress bar.
+_FAULTS_FROM = 0.7
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, repr=False)
+class Replay(EstimatedRun):
+    """What a bag gave: aligned samples, and the estimates as the live node would have published them."""
+
+    aircraft: Aircraft
+    settings: Settings
+    publish_rate: float  # Hz
+    aligned: Aligned
+    history: Sequence[Estimates]
+    stamps_ns: Stamps  # (K,) header stamps at which each of ``history`` (K,) fell due
+    final: Estimates  # after the last sample, whether or not one was due
+    streams: Streams
+    truth: Truth  # empty where it is not known
+    faults: Verdict | None = None  # None: nothing was judged
+
+    @cached_property
+    def run(self) -> RunResult:  # type: ignore[override]  # computed when it is first needed
+        """Everything that the report shows, estimates over time thinned to what a table holds."""
+        every = max(len(self.history) // TABLE_ROWS, 1)
+        # While the estimator settles nothing is included yet, and estimates have the same time.
+        shown = {estimates.time: estimates for estimates in (*self.history[every - 1 :: every], self.final)}
+        flow = flow_angle_filter.init(self.aircraft)
+        time, gap = self.aligned.time, self.settings.max_gap
+        result = replay_result(
+            self.aircraft,
+            self.settings,
+            time=time,
+            samples=flow_angle_filter.complete_many(flow, time, self.aligned.samples, gap),
+            history=list(shown.values()),
+            rejected=flat(self.aligned.rejected),
+            truth=self.truth.values,
+            truth_since=self.truth.since,
+            faults=self.faults,
+            remarks=flow_angle_filter.remarks(flow),
+        )
+        return replace(result, settings={**result.settings, "publish_rate": self.publish_rate})
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``sysid replay`` writes; returns the path of the report.
+
+        These are summary.json, the tables, report.html and the bag of all estimates. What an earlier replay left in
+        the folder is replaced. Raises InputError where the folder cannot be written.
+        """
+        folder = Path(folder)
+        write_run(folder, self.run)
+        bag = folder / ESTIMATES_BAG
+        remove_earlier_bag(bag, "sysid replay")
+        write_estimates(
+            bag,
+            self.history,
+            self.stamps_ns,
+            aircraft=self.aircraft.name,
+            method=self.settings.method,
+            frame_id=self.streams.imu.frame_id,
+            faults=self.faults.said if self.faults else (),
+        )
+        return folder / REPORT
+
+
+def replay(
+    flight: FlightFile,
+    settings: Mapping[str, object] | None = None,
+    *,
+    judge_faults: bool = True,
+    progress: Progress | None = None,
+) -> Replay:
+    """Identifies a flight's derivatives from its bag as the live node would have, and looks for faults.
+
+    ``settings``: any parameter of the node, e.g. ``{"method": "iv_rft", "window": 20.0, "publish_rate": 5.0}``; the
+    rest is as by default. ``progress`` is called with the share done (0..1) and what is being done.
+
+    Raises InputError where a setting is wrong, the bag cannot be read, lacks a joint of the aircraft, or gives no
+    sample.
+    """
+    chosen, publish_rate = replay_settings(settings or {})
+    tell: Progress = progress or (lambda share, doing: None)
+    truth = truth_at_end(flight.path)
+    found = _estimated(flight, chosen, publish_rate, truth, lambda s: tell(_FAULTS_FROM * s, "identifying"))
+    if not judge_faults:
+        return found
+    later = _judged(found, flight.path, lambda s: tell(_FAULTS_FROM + (1 - _FAULTS_FROM) * s, "looking for faults"))
+    return replace(found, faults=later)
+
+
+def _estimated(
+    flight: FlightFile, settings: Settings, publish_rate: float, truth: Truth, progress: Callable[[float], None]
+) -> Replay:
+    """Decodes, aligns and identifies."""
+    streams = read_streams(flight.path, flight.topics, flight.body_frame)
+    Actuation.of(flight.aircraft).require(streams.actuators.names, streams.name)
+    aligned = align_streams(flight.aircraft, streams, settings.max_gap)
+    if not aligned.time.size:
+        raise InputError(why_nothing_aligned(streams, aligned.rejected))
+    time = aligned.time
+    due = due_times(time, aligned.wait, publish_rate)
+    last = float(time[-1])
+    history = run_online(
+        flight.aircraft,
+        settings,
+        time,
+        aligned.samples,
+        np.union1d(due, time[-1:]),
+        lambda t: progress(t / last if last else 1.0),
+    )
+    published = history if due.size and due[-1] == last else history[:-1]
+    stamps = aligned.stamps[np.searchsorted(time, due)]
+    return Replay(flight.aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams, truth)
+
+
+def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> Verdict:
+    """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
+    pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
+    heard = (Heard(stamp, known_of(estimates)) for stamp, estimates in pairs)
+    return judge(found.aircraft, FaultSettings(), found.streams, read_commands(bag), heard, progress)
+
+
+def replay_settings(values: Mapping[str, object]) -> tuple[Settings, float]:
+    """The estimator's settings and the publish rate (Hz). Raises InputError naming the key or value that is wrong."""
+    others = dict(values)
+    rate = others.pop("publish_rate", PUBLISH_RATE)
+    try:
+        publish_rate = float(rate)  # type: ignore[arg-type]  # whatever was given, a text included
+    except (TypeError, ValueError):
+        publish_rate = float("nan")
+    if not 0.01 <= publish_rate <= 1000.0:
+        raise InputError(f"setting publish_rate = {rate!r}: expected 0.01 to 1000 Hz")
+    return Settings.from_mapping(others), publish_rate

@@ -1,0 +1,61 @@
+"""Options that several commands have in common, and what their texts mean."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+
+from sysid_node.errors import InputError
+from sysid_node.flight.frames import BODY_FRAMES
+
+BAG_HELP = "rosbag2 folder, .mcap or .db3 file"
+LOG_HELP = "rosbag2 folder, .mcap, .db3 or .csv file"
+
+
+def add_aircraft(parser: argparse.ArgumentParser) -> None:
+    """``--aircraft``, which is required."""
+    parser.add_argument("--aircraft", required=True, metavar="FILE|NAME", help="aircraft file, or name as in cdrw")
+
+
+def add_out(parser: argparse.ArgumentParser, more: str = "") -> None:
+    """``--out``, which is required; ``more`` ends its help."""
+    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=f"folder for the results{more}")
+
+
+def add_holdout(parser: argparse.ArgumentParser) -> None:
+    """``--holdout``, which may be given several times."""
+    add = parser.add_argument
+    add("--holdout", action="append", default=[], metavar="BAG", type=Path, help="a flight to check on, not to fit")
+
+
+def add_settings(parser: argparse.ArgumentParser, meaning: str, lines_of: str) -> None:
+    """``--set`` and ``--frequencies``; their helps say what a setting is, and of what the frequencies are lines."""
+    parser.add_argument("--frequencies", metavar="START:STEP:STOP", help=f"lines of {lines_of}, Hz")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=meaning)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """How a bag is read, ``--topic`` and ``--body-frame``, and ``--quiet``."""
+    add = parser.add_argument
+    add("--topic", action="append", default=[], metavar="OURS:=THEIRS", help="a topic's name in the bag")
+    add("--body-frame", choices=BODY_FRAMES, default="flu", help="axes of the IMU messages (default: flu)")
+    add_quiet(parser)
+
+
+def add_quiet(parser: argparse.ArgumentParser) -> None:
+    """``--quiet``."""
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
+
+
+def settings_of(texts: Iterable[str], frequencies: str | None, example: str) -> dict[str, object]:
+    """The settings of ``--set key=value`` and ``--frequencies``, as texts. Raises InputError with an example."""
+    values: dict[str, object] = {}
+    for text in texts:
+        key, separator, value = text.partition("=")
+        if not separator:
+            raise InputError(f"--set {text!r}: expected KEY=VALUE, e.g. {example}")
+        values[key.strip()] = value.strip()
+    if frequencies is not None:
+        values["frequencies"] = frequencies
+    return values

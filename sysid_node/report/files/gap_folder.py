@@ -1,0 +1,57 @@
+"""The folder of a gap's diagnosis: ``gap.json``, its tables, the corrected aircraft and the report."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.csv_table import write_table
+from sysid_node.errors import InputError
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.document import document
+from sysid_node.report.pages.gap_page import write_gap_report
+
+
+def write_gap(folder: Path, found: Diagnosis) -> None:
+    """Writes gap.json, where.csv, candidates.csv, corrected.yaml, effects.txt and report.html. Raises InputError."""
+    content = document(found)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
+        write_table(folder / "where.csv", ["station", "axis", "share"],
+                   [[w["station"], w["axis"], w["share"]] for w in found.where])  # fmt: skip
+        write_table(folder / "candidates.csv", ["effect", "probability", "share"],
+                   [list(candidate.values()) for candidate in content["candidates"]])  # fmt: skip
+        (folder / "corrected.yaml").write_text(dump_aircraft(corrected_aircraft(found)), encoding="utf-8")
+        (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
+        write_gap_report(folder / "report.html", found)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder as --out") from None
+
+
+def corrected_aircraft(found: Diagnosis) -> Aircraft:
+    """The aircraft file with the derivatives as the flights have them, within their tolerances."""
+    fit = found.attribution.corrected
+    names, point = fit.models[0].simulator.names, fit.points[0]
+    derivatives = {
+        n: replace(d, value=float(d.value + point[names.index(f"derivative_error.{n}")]))
+        for n, d in found.aircraft.derivatives.items()
+    }
+    return replace(found.aircraft, derivatives=derivatives)
+
+
+def effect_options(found: Diagnosis) -> list[str]:
+    """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
+    fit = found.attribution.corrected
+    simulator = fit.models[0].simulator
+    options = []
+    for cause in found.attribution.causes:
+        indices = cause.candidate.entries
+        pairs = [f"{simulator.parameters[i][1].name}={fit.points[0][i]:.6g}" for i in indices]
+        if cause.candidate.effect != "derivative_error":
+            options.append(":".join([cause.candidate.effect, *pairs]))
+    return options

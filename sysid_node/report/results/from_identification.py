@@ -1,0 +1,124 @@
+"""From flights identified by a batch method to a RunResult."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.identify import Identification
+from sysid_node.batch.models.rigid_body import OUTPUTS
+from sysid_node.batch.results.batch_fit import ModelResponse, ParameterEstimate, goodness_of_fit
+from sysid_node.batch.settings import BatchSettings
+from sysid_node.flight.record import FlightRecord
+from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
+from sysid_node.report.drawing.spectrum import amplitude_spectrum
+from sysid_node.report.results.run_result import Response, RunResult, Spectra, prior_of
+
+#: Hz: what the drawn spectra show.
+_SPECTRUM = np.arange(0.1, 5.01, 0.1)
+
+
+def identification_result(
+    aircraft: Aircraft,
+    records: Sequence[FlightRecord],
+    found: Identification,
+    settings: BatchSettings,
+    truth: Mapping[str, float] | None = None,
+) -> RunResult:
+    """All that the report, the summary and the tables need. ``records`` are the flights that were fitted."""
+    fit, first = found.fit, records[0]
+    trusted = "ok" if fit.converged else f"not converged: {fit.message}"
+    derivatives = {
+        name: _derivative(name, fit.estimates.get(name), trusted, fit.remarks) for name in aircraft.derivatives
+    }
+    estimates = Estimates(sum(record.duration for record in records), derivatives, _fits(found))
+    return RunResult(
+        aircraft=aircraft.name,
+        method=fit.method,
+        history=[estimates],
+        data_seconds=sum(record.duration for record in records),
+        samples=sum(len(record) for record in records),
+        settings=settings.as_dict(),
+        prior=prior_of(aircraft),
+        truth=truth or {},
+        flight=first,
+        spectra=_spectra(aircraft, first, found.coefficients),
+        responses=_responses(found),
+        response_note=_note(records, settings),
+        rejected=_rejected(records),
+        holdout=found.holdout,
+        remarks=[_sentence(remark) for remark in (fit.message, *fit.remarks)],
+    )
+
+
+def _derivative(
+    name: str, estimate: ParameterEstimate | None, trusted: str, remarks: Sequence[str]
+) -> DerivativeEstimate:
+    """One row of the table; a derivative that was not estimated is there with the reason."""
+    if estimate is None:
+        coefficient = name.partition("_")[0]
+        reasons = [remark for remark in remarks if name in remark or coefficient in remark]
+        status = reasons[0] if reasons else "not part of the model that these flights allow"
+        return DerivativeEstimate(name, np.nan, np.nan, np.nan, np.nan, False, status)
+    status = estimate.status if not estimate.valid or trusted == "ok" else trusted
+    valid = estimate.valid and trusted == "ok"
+    return DerivativeEstimate(
+        name, estimate.value, estimate.standard_error, estimate.lower, estimate.upper, valid, status
+    )
+
+
+def _fits(found: Identification) -> dict[str, FitQuality]:
+    """Quality by coefficient, then by the outputs of a method that integrates."""
+    names = list(found.fit.estimates)
+    table = {}
+    for name, q in (goodness_of_fit(found.fit.responses) | goodness_of_fit(found.coefficients)).items():
+        own = sum(key.startswith(f"{name}_") for key in names)
+        freedom = float(q.samples - (own or len(names)))
+        table[name] = FitQuality(name, q.r_squared, q.residual_std, freedom, q.samples)
+    return table
+
+
+def _responses(found: Identification) -> dict[str, Response]:
+    """Of the first flight: its outputs, and its coefficients."""
+    table = {}
+    for response in (*found.fit.responses[:1], *found.coefficients[:1]):
+        for name in response.names:
+            table[name] = Response(OUTPUTS.get(name, ""), response.time, *response.column(name))
+    return table
+
+
+def _note(records: Sequence[FlightRecord], settings: BatchSettings) -> str:
+    which = f"The first of {len(records)} flights. " if len(records) > 1 else ""
+    return f"{which}Coefficients are shown below {settings.low_pass:g} Hz." if settings.low_pass else which
+
+
+def _spectra(aircraft: Aircraft, record: FlightRecord, coefficients: Sequence[ModelResponse]) -> Spectra | None:
+    """Of the first flight: the controls, the coefficients and what the model leaves of them."""
+    if not coefficients:
+        return None
+    response = coefficients[0]
+    frequency = _SPECTRUM[0.4 / float(np.median(np.diff(response.time))) > _SPECTRUM]
+    complete = [symbol for symbol in aircraft.control_symbols if np.isfinite(record[symbol]).all()]
+    inputs = amplitude_spectrum(record.time, np.column_stack([record[s] for s in complete]), frequency)
+    measured = amplitude_spectrum(response.time, response.measured, frequency)
+    residuals = amplitude_spectrum(response.time, response.residuals, frequency)
+    return Spectra(
+        frequency,
+        dict(zip(complete, inputs.T, strict=True)),
+        dict(zip(response.names, measured.T, strict=True)),
+        dict(zip(response.names, residuals.T, strict=True)),
+    )
+
+
+def _rejected(records: Sequence[FlightRecord]) -> dict[str, int]:
+    total: Counter[str] = Counter()
+    for record in records:
+        total.update(record.rejected)
+    return dict(total)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"

@@ -1,0 +1,135 @@
+"""The Python interface: five lines from a bag to a figure, and the same files as the commands write."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sysid_node
+from sysid_node import identify, load, replay
+from sysid_node.cli.main import main
+from sysid_node.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+BAG = ROOT / "bags" / "cdrw_multistep"
+TRUTH = json.loads((ROOT / "bags" / "cdrw_multistep.truth.json").read_text())["derivatives"]
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return load(BAG, "cdrw")
+
+
+@pytest.fixture(scope="module")
+def replayed(flight):
+    return replay(flight, {"publish_rate": 1.0})
+
+
+@pytest.fixture(scope="module")
+def identified(flight):
+    return identify(flight, "equation_error")
+
+
+def test_the_package_alone_is_light():
+    """`import sysid_node` loads no library, and the online path no report."""
+    code = "import sys, sysid_node; print([m for m in ('numpy', 'jax', 'jinja2', 'plotly') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_only_what_is_documented_is_offered():
+    assert sysid_node.__all__ == ["diagnose", "identify", "load", "replay"]
+    with pytest.raises(AttributeError, match="has no attribute 'fly'"):
+        _ = sysid_node.fly
+
+
+def test_a_flight_says_what_it_holds(flight):
+    assert repr(flight).startswith("cdrw_multistep of cdrw: 60.0 s, ")
+    assert "alpha" in repr(flight)
+    assert {axis.title.text for axis in flight.plot().select_yaxes()} >= {"deg", "deg/s", "m/s"}
+
+
+def test_a_replay_finds_the_truth_and_prints_it(replayed):
+    """The truth of a simulated flight lies in most 95 % intervals (27 of them; five misses have odds of 1 in 100)."""
+    valid = [d for d in replayed.derivatives.values() if d.valid]
+    missed = [d.name for d in valid if not d.lower <= TRUTH[d.name] <= d.upper]
+    assert len(valid) > 20
+    assert len(missed) < 5
+    assert "derivatives are known well enough to use" in repr(replayed)
+    assert re.search(r"Cm_alpha +−0\.\d+ ± 0\.\d+ per rad +ok", repr(replayed))
+    assert "<table>" in replayed._repr_html_()
+
+
+def test_a_figure_shows_the_estimates_as_the_report_does(replayed):
+    """One panel a derivative, whose last line is the estimate against time."""
+    figure = replayed.plot()
+    names = [note.text for note in figure.layout.annotations]
+    assert len(names) == len(replayed.derivatives)
+    place = names.index("Cm_alpha per rad") + 1
+    line = [trace for trace in figure.data if trace.xaxis == f"x{place}"][-1]
+    drawn = np.asarray(line.y, dtype=float)
+    assert drawn[-1] == pytest.approx(replayed.derivatives["Cm_alpha"].value, rel=1e-6)
+
+
+def test_an_identification_draws_its_fit_by_default(identified):
+    assert identified.derivatives["Cm_alpha"].value == pytest.approx(TRUTH["Cm_alpha"], rel=0.03)
+    assert [trace.name for trace in identified.plot().data[:2]] == ["measured", "model"]
+    with pytest.raises(InputError, match="this result has fit, excitation, residuals"):
+        identified.plot("estimates")
+
+
+@pytest.mark.parametrize("command", [["replay", "--set", "publish_rate=1"], ["identify", "--method", "equation_error"]])
+def test_what_is_saved_is_what_the_command_writes(command, replayed, identified, tmp_path):
+    name, *options = command
+    assert main([name, str(BAG), "--aircraft", "cdrw", "--out", str(tmp_path / "command"), "--quiet", *options]) == 0
+    result = {"replay": replayed, "identify": identified}[name]
+    assert result.save(tmp_path / "api") == tmp_path / "api" / "report.html"
+    written, expected = ({p.name for p in (tmp_path / f).iterdir()} for f in ("api", "command"))
+    assert written == expected
+    for file in (p for p in (tmp_path / "command").iterdir() if p.is_file()):
+        assert (tmp_path / "api" / file.name).read_bytes() == file.read_bytes(), file.name
+
+
+def test_without_pandas_one_line_says_so(replayed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="to_pandas needs pandas, which is not installed: pip install pandas"):
+        replayed.to_pandas()
+
+
+def test_a_table_for_pandas(replayed, flight):
+    pytest.importorskip("pandas")
+    table = replayed.to_pandas()
+    assert table.loc["Cm_alpha", "value"] == replayed.derivatives["Cm_alpha"].value
+    assert len(flight.to_pandas()) == len(flight.record)
+
+
+@pytest.mark.parametrize(
+    ("work", "said"),
+    [
+        (lambda: load(BAG, "nonesuch"), "aircraft 'nonesuch' is not known"),
+        (lambda: load(BAG, "cdrw", topics=["imu:=x"]), "'imu' is none of imu/data"),
+        (lambda: replay(load(BAG, "cdrw"), {"windoww": 3}), "'windoww' is not known"),
+        (lambda: identify([], "equation_error"), "no flight to identify from"),
+        (lambda: identify(load("nowhere.csv", "cdrw"), "equation_error"), "nowhere.csv"),
+    ],
+)
+def test_mistakes_are_one_line(work, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        work()
+
+
+def test_the_pages_five_lines_run(tmp_path, monkeypatch):
+    """The first block of docs/python_api.md, as it stands there."""
+    (code, *_) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python_api.md").read_text(), re.DOTALL)
+    lines = [line for line in code.splitlines() if line and not line.startswith(("from", "import"))]
+    assert len(lines) == 5
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    exec(compile(code, "docs/python_api.md", "exec"), names)
+    assert "cdrw_multistep" in repr(names["flight"])
+    assert type(names["figure"]).__name__ == "Figure"
+    assert names["gap"].verdict == "no_gap"  # the bundled flight was made by the simulator that it is held against
