@@ -6,7 +6,7 @@ import sys
 
 PROGRAMS = {
     "numpy": "import numpy",
-    "online path": "from sysid_node.online import estimator, intake",
+    "online path": "from sysid_node.online import estimator; from sysid_node.online.alignment import streaming",
     "node, ROS included": "import sysid_node.ros.identifier",
 }
 

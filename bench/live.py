@@ -31,8 +31,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates  # found once sysid_node.ros is there
 
-from sysid_node.ros.conversion import stamp_message, stamp_ns
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.ros.support.conversion import stamp_message, stamp_ns
+from sysid_node.ros.support.spin import run_program, serve
 
 IMU_RATE, SLOW_EVERY = 400, 4
 PUBLISH_RATE = 50.0

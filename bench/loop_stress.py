@@ -53,8 +53,8 @@ class Relay:
         from sensor_msgs.msg import Imu, JointState  # noqa: PLC0415  # after the domain is set
         from sysid_msgs.msg import AirData  # noqa: PLC0415
 
-        from sysid_node.ros.arrivals import Arrivals  # noqa: PLC0415
-        from sysid_node.ros.loop_node import SENSOR_QOS  # noqa: PLC0415
+        from sysid_node.flight.live.arrivals import Arrivals  # noqa: PLC0415
+        from sysid_node.ros.support.loop_node import SENSOR_QOS  # noqa: PLC0415
 
         self.heard = {topic: Arrivals(topic, 1.0) for topic in RAW}
         self.told: list[list[str]] = []  # of every second, what was wrong with what the simulator sent
@@ -79,7 +79,7 @@ class Relay:
             self.told.append([words for one in self.heard.values() for words in one.troubles()])
 
     def _passing(self, topic: str, to: Any) -> Callable[[Any], None]:
-        from sysid_node.ros.conversion import stamp_message, stamp_ns  # noqa: PLC0415
+        from sysid_node.ros.support.conversion import stamp_message, stamp_ns  # noqa: PLC0415
 
         def take(message: Any) -> None:
             self.heard[topic].arrived(1e-9 * stamp_ns(message.header.stamp))
@@ -166,7 +166,7 @@ def flying() -> Iterator[Loop]:
     from diagnostic_msgs.msg import DiagnosticArray  # noqa: PLC0415
     from rclpy.experimental import EventsExecutor  # noqa: PLC0415
 
-    from sysid_node.ros.loop_watch import LoopWatch  # noqa: PLC0415
+    from sysid_node.ros.support.loop_watch import LoopWatch  # noqa: PLC0415
 
     rclpy.init()
     node = rclpy.create_node("relay")

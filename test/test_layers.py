@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,9 +19,9 @@ BELOW = {
     "flight": {"aircraft", "dynamics"},
     "sim": {"aircraft", "dynamics", "flight"},
     "online": {"aircraft", "dynamics", "flight"},
-    "control": {"aircraft", "dynamics", "flight"},
+    "control": {"aircraft", "dynamics", "flight", "online"},
     "batch": {"aircraft", "dynamics", "flight", "sim"},
-    "excite": {"aircraft", "dynamics", "flight", "sim"},
+    "excite": {"aircraft", "dynamics", "flight", "sim", "online"},
     "faults": {"aircraft", "dynamics", "flight", "online"},
     "gap": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite"},
     "ros": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite", "faults", "gap"},
@@ -36,7 +37,15 @@ ROOMS = {
     ),
 }  # fmt: skip
 
-ROS_PACKAGES = {"rclpy", "ament_index_python", "rosidl_runtime_py", "launch", "launch_ros", "sysid_msgs"}
+ROS_PACKAGES = {
+    "rclpy",
+    "ament_index_python",
+    "rosidl_runtime_py",
+    "launch",
+    "launch_ros",
+    "rosidl_parser",
+    "sysid_msgs",
+}
 # the last two are SciPy's own and, where it happens to be installed, what NumPy's f2py takes along
 ONLINE_PACKAGES = {"numpy", "scipy", "cython_runtime", "charset_normalizer"}
 
@@ -99,6 +108,29 @@ def test_only_ros_and_above_import_ros() -> None:
     for path in modules():
         if layer_of(path) not in {"ros", "cli"}:
             assert not [name for name in imports(path) if is_ros(name)], path.relative_to(PACKAGE)
+
+
+def test_what_imports_no_ros_is_not_in_ros() -> None:
+    """Every module of the layer imports ROS, directly or through another module of the layer."""
+    found = {
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): set(imports(path))
+        for path in (PACKAGE / "ros").rglob("*.py")
+        if path.stem != "__init__"
+    }
+    with_ros = {module for module, names in found.items() if any(map(is_ros, names))}
+    before: set[str] = set()
+    while with_ros != before:
+        before = set(with_ros)
+        with_ros |= {
+            m for m, names in found.items() if names & with_ros or {n.rpartition(".")[0] for n in names} & with_ros
+        }
+    assert found.keys() - with_ros - {"sysid_node.ros.session"} == set()
+
+
+def test_modules_directly_in_ros_are_the_programs() -> None:
+    text = (PACKAGE.parent / "setup.py").read_text(encoding="utf-8")
+    programs = {path.stem for path in (PACKAGE / "ros").glob("*.py")} - {"__init__", "session"}
+    assert programs == set(re.findall(r'"(\w+) = sysid_node\.ros\.\1:main"', text))
 
 
 def test_online_imports_numpy_and_scipy_only() -> None:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import controller
+from sysid_node.control.estimates import beliefs_of
 from sysid_node.control.settings import Settings as Control
 from sysid_node.control.types import Sensed, SetPoints
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter import ExcitationSettings as Excitation
+from sysid_node.excite.relative_precision import relative_precision
 from sysid_node.online.settings import Settings as Estimation
-from sysid_node.ros.beliefs import beliefs_of, precision_of
 from sysid_node.ros.session import Session
 from sysid_node.sim import Simulator, Trim, trim_flight
 from sysid_node.sim.flying import live
@@ -130,7 +131,7 @@ def _estimate(session: Session, pilot: controller.State, excitation: exciter.Exc
     session.air_data(stamp, (V, alpha, beta, now.density))
     for due in session.imu(stamp, tuple(now.outputs[:6].tolist())):
         controller.hear(pilot, now.time, beliefs_of(due.estimates))
-        precision = precision_of(due.estimates.derivatives.values(), session.aircraft)
+        precision = relative_precision(due.estimates.derivatives.values(), session.aircraft)
         if exciter.receive_estimates(excitation, now.time, precision):
             session.reset()
 

@@ -29,7 +29,7 @@ from sysid_node.report.files.run_folder import write_run
 from sysid_node.report.results.from_replay import replay_result
 
 if TYPE_CHECKING:
-    from sysid_node.ros.follower import Follower
+    from sysid_node.ros.support.follower import Follower
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -117,7 +117,7 @@ def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[Followe
     """
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
 
-    from sysid_node.ros.follower import Follower  # noqa: PLC0415
+    from sysid_node.ros.support.follower import Follower  # noqa: PLC0415
 
     rclpy.init()
     follower = Follower(flight.start_ns)

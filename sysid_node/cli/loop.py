@@ -29,7 +29,7 @@ from sysid_node.online.settings import METHODS
 from sysid_node.report.pages.closed_loop_page import Episode, Event, write_loop
 
 if TYPE_CHECKING:
-    from sysid_node.ros.loop_watch import LoopWatch
+    from sysid_node.ros.support.loop_watch import LoopWatch
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> None:
 def _fly(plan: Plan) -> Episode:
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
 
-    from sysid_node.ros.loop_watch import LoopWatch  # noqa: PLC0415
+    from sysid_node.ros.support.loop_watch import LoopWatch  # noqa: PLC0415
 
     _check_effects(plan)
     rclpy.init()

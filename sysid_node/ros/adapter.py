@@ -30,13 +30,13 @@ from sysid_node.flight.autopilots.base import (
     adapter_for,
 )
 from sysid_node.flight.autopilots.known import ADAPTERS
+from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.ros import conversion
-from sysid_node.ros.declaring import declare, values_of
-from sysid_node.ros.diagnostics import Source
-from sysid_node.ros.monitor import TopicMonitor
-from sysid_node.ros.parameters import Parameter, annotated_yaml, check_each
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.parameter import Parameter, annotated_yaml, check_each
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.declaring import declare, values_of
+from sysid_node.ros.support.diagnostics import Source
+from sysid_node.ros.support.spin import run_program, serve
 
 #: Autopilots' bridges publish best effort; a burst after a pause of the process is not to be lost.
 HEARD_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -15,16 +15,19 @@ from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.control import controller
 from sysid_node.control.allocation import Allocation
+from sysid_node.control.estimates import beliefs_of
 from sysid_node.control.plant import CONTROLS
 from sysid_node.control.settings import RANGES, Settings
 from sysid_node.control.types import Command, Sensed, SetPoints
+from sysid_node.flight.live import messages
+from sysid_node.flight.live.arrivals import Arrivals
+from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
+from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.ros import conversion, inputs
-from sysid_node.ros.arrivals import Arrivals
-from sysid_node.ros.beliefs import beliefs_of
-from sysid_node.ros.conversion import NANOSECONDS, stamp_ns
-from sysid_node.ros.inputs import ATTITUDE_FIELDS, FIELDS, Numbers, Texts
-from sysid_node.ros.loop_node import (
+from sysid_node.parameter import Parameter, setting
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.conversion import NANOSECONDS, stamp_ns
+from sysid_node.ros.support.loop_node import (
     AIRCRAFT,
     COMMAND,
     DERIVATIVES,
@@ -36,9 +39,7 @@ from sysid_node.ros.loop_node import (
     by_name,
     named,
 )
-from sysid_node.ros.monitor import Durations
-from sysid_node.ros.parameters import Parameter, setting
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.ros.support.spin import run_program, serve
 
 _DEFAULT = Settings()
 _setting = partial(setting, _DEFAULT, RANGES)
@@ -107,11 +108,11 @@ class AdaptiveController(LoopNode):
         self._work = Durations()
         self._command = self.create_publisher(JointState, COMMAND, 10)
         self._tracking = self.create_publisher(JointState, "~/tracking", 10)
-        self.listen(Imu, IMU, ATTITUDE_FIELDS, self._on_imu, LATEST)
-        self.listen(AirData, AIR_DATA, FIELDS[AIR_DATA], self._on_air_data, LATEST)
+        self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
+        self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
-        self.listen(JointState, EXCITATION, FIELDS[ACTUATORS], self._on_excitation, LATEST)
-        self.listen(JointState, SET_POINTS, FIELDS[ACTUATORS], self._on_set_points, 10)
+        self.listen(JointState, EXCITATION, PATHS[ACTUATORS], self._on_excitation, LATEST)
+        self.listen(JointState, SET_POINTS, PATHS[ACTUATORS], self._on_set_points, 10)
         self.every(0.02, self._watch)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
@@ -134,7 +135,7 @@ class AdaptiveController(LoopNode):
         return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
-        stamp, (_x, _y, _z, p, q, r), (phi, theta) = inputs.imu_and_attitude(numbers)
+        stamp, (_x, _y, _z, p, q, r), (phi, theta) = messages.imu_and_attitude(numbers)
         self._start_ns = self._start_ns or stamp
         now = (stamp - self._start_ns) / NANOSECONDS
         if not self._imu.arrived(now):
@@ -146,7 +147,7 @@ class AdaptiveController(LoopNode):
         self._fly(Sensed(now, p, q, r, phi, theta, V, alpha, beta, density))
 
     def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
-        stamp, values = inputs.air_data(numbers)
+        stamp, values = messages.air_data(numbers)
         self._others[AIR_DATA].arrived(stamp / NANOSECONDS)
         self._air = (stamp - self._start_ns) / NANOSECONDS, values
 

@@ -17,13 +17,14 @@ from sysid_msgs.msg import AirData, DerivativeEstimates
 from sysid_node.errors import InputError
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter import RANGES, ExcitationSettings, FlightCondition
+from sysid_node.excite.relative_precision import relative_precision
+from sysid_node.flight.live import messages
+from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.topics import AIR_DATA, IMU
-from sysid_node.ros import conversion, inputs
-from sysid_node.ros.beliefs import precision_of
-from sysid_node.ros.inputs import ATTITUDE_FIELDS, FIELDS, Numbers, Texts
-from sysid_node.ros.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, named
-from sysid_node.ros.parameters import Parameter, setting
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.parameter import Parameter, setting
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, named
+from sysid_node.ros.support.spin import run_program, serve
 
 _DEFAULT = ExcitationSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
@@ -78,8 +79,8 @@ class Exciter(LoopNode):
         self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first
         self._excitation = self.create_publisher(JointState, EXCITATION, 10)
         self._reset = self.create_client(Trigger, "identifier/reset")
-        self.listen(Imu, IMU, ATTITUDE_FIELDS, self._on_imu, LATEST)
-        self.listen(AirData, AIR_DATA, FIELDS[AIR_DATA], self._on_air_data, LATEST)
+        self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
+        self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -94,18 +95,18 @@ class Exciter(LoopNode):
         return DiagnosticStatus.OK, doing, {**values, "last event": last}
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
-        stamp, values, attitude = inputs.imu_and_attitude(numbers)
+        stamp, values, attitude = messages.imu_and_attitude(numbers)
         self._inertial = time.monotonic(), (*attitude, -values[2] / exciter.GRAVITY)
         self._start_ns = self._start_ns or stamp
         self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
 
     def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
-        self._air = time.monotonic(), inputs.air_data(numbers)[1][0]
+        self._air = time.monotonic(), messages.air_data(numbers)[1][0]
 
     def _on_estimates(self, message: Any) -> None:
         estimates = conversion.estimates_from_message(message, 0)
         known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
-        precision = precision_of(known.values(), self.aircraft)
+        precision = relative_precision(known.values(), self.aircraft)
         if exciter.receive_estimates(self._state, self._now, precision) and self._reset.service_is_ready():
             self._reset.call_async(Trigger.Request())
         self._tell()

@@ -17,13 +17,14 @@ from sysid_node.faults.model.reference_model import Known
 from sysid_node.faults.settings import RANGES, Settings
 from sysid_node.faults.types import Fault
 from sysid_node.faults.watch import PERIOD, STALE_AFTER, Speech
+from sysid_node.flight.live import messages
+from sysid_node.flight.live.messages import PATHS, Numbers, Texts
+from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.ros import conversion, inputs
-from sysid_node.ros.inputs import FIELDS, Numbers, Texts
-from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
-from sysid_node.ros.monitor import Durations
-from sysid_node.ros.parameters import Parameter, setting
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.parameter import Parameter, setting
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
+from sysid_node.ros.support.spin import run_program, serve
 
 _DEFAULT = Settings()
 _setting = partial(setting, _DEFAULT, RANGES)
@@ -67,10 +68,10 @@ class FaultMonitor(LoopNode):
         self._watch = watching.init(self.aircraft, settings, self.values["stale_after"])
         self._work, self._speech = Durations(), Speech()
         self._faults = self.create_publisher(DiagnosticArray, "~/faults", 10)
-        self.listen(Imu, IMU, FIELDS[IMU], self._on_imu, SENSOR_QOS)
-        self.listen(AirData, AIR_DATA, FIELDS[AIR_DATA], self._on_air_data, SENSOR_QOS)
-        self.listen(JointState, ACTUATORS, FIELDS[ACTUATORS], self._on_actuators, SENSOR_QOS)
-        self.listen(JointState, COMMAND, FIELDS[ACTUATORS], self._on_command, SENSOR_QOS)
+        self.listen(Imu, IMU, PATHS[IMU], self._on_imu, SENSOR_QOS)
+        self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, SENSOR_QOS)
+        self.listen(JointState, ACTUATORS, PATHS[ACTUATORS], self._on_actuators, SENSOR_QOS)
+        self.listen(JointState, COMMAND, PATHS[ACTUATORS], self._on_command, SENSOR_QOS)
         self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
         self.every(PERIOD, self._on_time)
 
@@ -88,13 +89,13 @@ class FaultMonitor(LoopNode):
     # Messages
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
-        self._take(watching.on_imu, *inputs.imu(numbers, -1.0))
+        self._take(watching.on_imu, *messages.imu(numbers, -1.0))
 
     def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
-        self._take(watching.on_air_data, *inputs.air_data(numbers))
+        self._take(watching.on_air_data, *messages.air_data(numbers))
 
     def _on_actuators(self, numbers: Numbers, texts: Texts) -> None:
-        self._take(watching.on_actuators, *inputs.actuators(numbers, texts))
+        self._take(watching.on_actuators, *messages.actuators(numbers, texts))
 
     def _take(self, take: Callable[..., None], *message: Any) -> None:
         """Have a sensor's message taken."""
@@ -103,7 +104,7 @@ class FaultMonitor(LoopNode):
         self._work.add(time.monotonic() - start)
 
     def _on_command(self, numbers: Numbers, texts: Texts) -> None:
-        watching.on_command(self._watch, *inputs.actuators(numbers, texts))
+        watching.on_command(self._watch, *messages.actuators(numbers, texts))
 
     def _on_estimates(self, message: Any) -> None:
         known = {d.name: Known(d.value, d.standard_error, d.valid) for d in message.derivatives}

@@ -19,17 +19,17 @@ from sysid_node.control.allocation import Allocation
 from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.frames import quaternion_from_euler
+from sysid_node.flight.live.arrivals import LATE
+from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.ros.arrivals import LATE
-from sysid_node.ros.conversion import NANOSECONDS, header, stamp_message
-from sysid_node.ros.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
-from sysid_node.ros.monitor import Durations
-from sysid_node.ros.pace import Pace
-from sysid_node.ros.parameters import Parameter
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.parameter import Parameter
+from sysid_node.ros.support.conversion import NANOSECONDS, header, stamp_message
+from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
+from sysid_node.ros.support.spin import run_program, serve
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying import live
 from sysid_node.sim.flying.live import Air, Reading
+from sysid_node.sim.flying.pace import Pace
 from sysid_node.sim.signals.dryden import INTENSITIES
 
 PARAMETERS = (

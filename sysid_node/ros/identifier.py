@@ -23,20 +23,21 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
+from sysid_node.flight.live import messages
+from sysid_node.flight.live.messages import UNREADABLE, Numbers, Texts
+from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
-from sysid_node.ros import conversion, inputs
-from sysid_node.ros.declaring import declare, refusal, values_of
-from sysid_node.ros.diagnostics import Source
-from sysid_node.ros.estimates_cdr import EstimatesSerialiser
-from sysid_node.ros.inputs import UNREADABLE, Numbers, Texts
-from sysid_node.ros.lifecycle import CarefulNode
-from sysid_node.ros.loop_node import SENSOR_QOS
-from sysid_node.ros.message_types import fields_of
-from sysid_node.ros.monitor import Durations, TopicMonitor
-from sysid_node.ros.parameters import estimation_settings
-from sysid_node.ros.save import save_estimates
+from sysid_node.online.estimates.saving import save_estimates
+from sysid_node.online.estimates.serialisation import EstimatesSerialiser
+from sysid_node.online.parameters import LIVE, PARAMETERS, check, estimation_settings
 from sysid_node.ros.session import Due, Session
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.declaring import declare, refusal, values_of
+from sysid_node.ros.support.diagnostics import Source
+from sysid_node.ros.support.lifecycle import CarefulNode
+from sysid_node.ros.support.loop_node import SENSOR_QOS
+from sysid_node.ros.support.message_types import fields_of
+from sysid_node.ros.support.spin import run_program, serve
 
 DIAGNOSTICS = 1.0  # s between diagnostics
 TICK = 0.2  # s, by which they come later where nothing is published
@@ -51,7 +52,7 @@ class Identifier(CarefulNode):
     def __init__(self) -> None:
         super().__init__("identifier")
         self._session: Session | None = None
-        declare(self)
+        declare(self, PARAMETERS, check)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._told = -math.inf  # s, time.monotonic of the last diagnostics
@@ -71,7 +72,7 @@ class Identifier(CarefulNode):
 
     def configure(self) -> None:
         """Load the aircraft file; make the estimator, its inputs and its outputs."""
-        values = values_of(self)
+        values = values_of(self, PARAMETERS)
         if not values["aircraft"]:
             raise InputError("parameter aircraft is empty: give a name or a file, e.g. -p aircraft:=cdrw")
         aircraft = load_aircraft(values["aircraft"])
@@ -108,7 +109,7 @@ class Identifier(CarefulNode):
 
         Messages come serialised: making objects of all their parts would take longer than the estimator does.
         """
-        monitor, reader = self._monitors[topic], MessageReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic])
+        monitor, reader = self._monitors[topic], MessageReader(fields_of, INPUT_TOPICS[topic], *messages.PATHS[topic])
 
         def on_message(raw: bytes) -> None:
             monitor.arrived()
@@ -130,13 +131,13 @@ class Identifier(CarefulNode):
 
     def _on_imu(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
         self._frame_id = str(texts[0])
-        return session.imu(*inputs.imu(numbers, self._sign))
+        return session.imu(*messages.imu(numbers, self._sign))
 
     def _on_air_data(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
-        return session.air_data(*inputs.air_data(numbers))
+        return session.air_data(*messages.air_data(numbers))
 
     def _on_actuators(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
-        return session.actuators(*inputs.actuators(numbers, texts))
+        return session.actuators(*messages.actuators(numbers, texts))
 
     def _publish(self, session: Session, due: Due) -> None:
         start = time.perf_counter()
@@ -152,7 +153,13 @@ class Identifier(CarefulNode):
     # Requests
 
     def _on_parameters(self, changes: list[Parameter]) -> SetParametersResult:
-        reason = refusal(self, self.state_label, changes)
+        state = self.state_label
+        because = (
+            ""
+            if state == "unconfigured"
+            else (f"when the node is configured; it is {state}: deactivate and clean it up first")
+        )
+        reason = refusal(self, PARAMETERS, LIVE, changes, check, because)
         return SetParametersResult(successful=not reason, reason=reason)
 
     def reset(self) -> str:
@@ -166,7 +173,17 @@ class Identifier(CarefulNode):
         """Write the estimates to a file and name it. Raises InputError where there are none or the file cannot be."""
         if self._session is None or not self._session.samples:
             raise InputError(f"nothing to save: the node is {self.state_label} and no aligned sample has come")
-        return str(save_estimates(Path(self.get_parameter("save_directory").value), self._session))
+        session, (stamp_ns, estimates, _) = self._session, self._session.now()
+        path = save_estimates(
+            Path(self.get_parameter("save_directory").value),
+            estimates,
+            aircraft=session.aircraft.name,
+            settings=session.settings,
+            stamp_ns=stamp_ns,
+            samples=session.samples,
+            rejected=session.rejected,
+        )
+        return str(path)
 
     # Diagnostics
 

@@ -20,8 +20,8 @@ from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
 from sysid_node.flight.bag.reader import open_bag, reading
-from sysid_node.ros.conversion import NANOSECONDS, stamp_message
-from sysid_node.ros.spin import run_program
+from sysid_node.ros.support.conversion import NANOSECONDS, stamp_message
+from sysid_node.ros.support.spin import run_program
 
 CLOCK_PERIOD = NANOSECONDS // 100
 ACKNOWLEDGED = Duration(seconds=5)  # longest wait for listeners that have yet to take the last messages

@@ -23,7 +23,7 @@ from rosbags.rosbag2 import Writer
 
 from sysid_node.flight.bag.writer import STORAGES, add_topic, new_bag
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE, INPUT_TOPICS
-from sysid_node.ros.spin import run_program, serve
+from sysid_node.ros.support.spin import run_program, serve
 
 JOINTS = "sensor_msgs/msg/JointState"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"

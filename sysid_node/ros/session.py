@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flat
+from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
 from sysid_node.online.estimates.current_solution import Present, present
@@ -15,7 +16,6 @@ from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
-from sysid_node.ros.monitor import Durations
 
 
 class Due(NamedTuple):

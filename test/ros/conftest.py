@@ -10,7 +10,7 @@ import pytest
 from sysid_node.flight.bag.writer import write_streams
 
 if find_spec("rclpy") is None:
-    collect_ignore_glob = ["test_*.py"]
+    collect_ignore_glob = ["test_*.py", "support/test_*.py"]
 else:
     import rclpy
     from harness import ROOT, Probe, made_up_streams

@@ -17,7 +17,7 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
-from sysid_node.ros import conversion
+from sysid_node.ros.support import conversion
 
 ROOT = Path(__file__).resolve().parents[2]
 JOINTS = ("elevator", "aileron", "rudder", "throttle")

@@ -24,8 +24,8 @@ from sysid_node.flight.autopilots.base import ImuSample, Sample, header_ns
 from sysid_node.flight.autopilots.mavros import IMU, PRESSURE, Mavros
 from sysid_node.flight.autopilots.px4 import Px4
 from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler
-from sysid_node.ros import conversion
 from sysid_node.ros.adapter import PARAMETERS, AdapterNode, imu_message, message_class, parameter_file
+from sysid_node.ros.support import conversion
 
 STAMP = 1_700_000_000_250_000_000
 JOINTS = "elevator=out1:0:1"

@@ -15,8 +15,8 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData
 
-from sysid_node.ros.loop_node import COMMAND, LATEST, named
-from sysid_node.ros.loop_watch import LoopWatch
+from sysid_node.ros.support.loop_node import COMMAND, LATEST, named
+from sysid_node.ros.support.loop_watch import LoopWatch
 
 SIMULATOR, CONTROLLER, IDENTIFIER, EXCITER = "flight_simulator", "adaptive_controller", "identifier", "exciter"
 OWN = {IDENTIFIER: ("method:=sls_rft",), EXCITER: ("accuracy:=0.3",)}

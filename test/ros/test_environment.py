@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sysid_node.ros.environment import find_packages
+from sysid_node.ros import find_packages
 
 
 @pytest.mark.parametrize(

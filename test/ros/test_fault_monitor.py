@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from harness import ended, start
 from rclpy.executors import SingleThreadedExecutor
 
-from sysid_node.ros.loop_watch import LoopWatch
+from sysid_node.ros.support.loop_watch import LoopWatch
 
 LAG = "actuator_lag:time_constant=0.05"
 

@@ -21,7 +21,7 @@ from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
 from sysid_node.online.whole_record import run
-from sysid_node.ros.conversion import estimates_from_message, stamp_ns
+from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
 
 def expected_of(streams: Streams) -> dict[int, Estimates]:

@@ -15,8 +15,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
 from sysid_node.flight.bag.reader import read_streams
-from sysid_node.ros import conversion
 from sysid_node.ros.player import shift_stamp
+from sysid_node.ros.support import conversion
 
 
 @given(st.integers(0, 2**31 * 10**9 // 2), st.integers(-(10**18), 10**18))

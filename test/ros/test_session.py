@@ -6,13 +6,11 @@ import pytest
 from harness import START_NS, made_up_streams
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.errors import InputError
 from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.settings import Settings
 from sysid_node.online.whole_record import run
-from sysid_node.ros.save import save_estimates
 from sysid_node.ros.session import Due, Session
 
 
@@ -75,14 +73,3 @@ def test_silence_is_stale(session: Session) -> None:
     fly(session, made_up_streams(5.0), "iaj")
     assert {d.status for d in session.now(10.0).estimates.derivatives.values()} == {"stale input"}
     assert {d.status for d in session.now().estimates.derivatives.values()} != {"stale input"}
-
-
-def test_a_save_replaces_nothing_half(session: Session, tmp_path) -> None:
-    fly(session, made_up_streams(1.0), "iaj")
-    path = save_estimates(tmp_path, session)
-    assert path.name == f"cdrw-{START_NS + 990_000_000}.json"
-    assert save_estimates(tmp_path, session) == path
-    assert [file.name for file in tmp_path.iterdir()] == [path.name]
-    assert not any(math.isnan(x) for x in session.settings.frequencies)
-    with pytest.raises(InputError, match="save_directory"):
-        save_estimates(path, session)

@@ -10,9 +10,9 @@ from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.writer import add_topic, new_bag
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE
+from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.fault_messages import FAULTS, FAULTS_TYPE, fault_messages
-from sysid_node.ros.estimates_cdr import EstimatesSerialiser
 
 
 def write_estimates(

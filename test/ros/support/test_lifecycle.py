@@ -5,7 +5,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from sysid_node.errors import InputError
-from sysid_node.ros.lifecycle import CarefulNode
+from sysid_node.ros.support.lifecycle import CarefulNode
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS,

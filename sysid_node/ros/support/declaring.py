@@ -1,4 +1,4 @@
-"""Declares a node's parameters to ROS, and keeps wrong values out; by default those of the identifier."""
+"""Declares a table of parameters to ROS and refuses wrong values."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 
 from sysid_node.errors import InputError
-from sysid_node.ros.parameters import LIVE, PARAMETERS, Parameter, check
+from sysid_node.parameter import Parameter
+
+Check = Callable[[Mapping[str, Any]], None]  # raises InputError on wrong values
 
 
-def declare(
-    node: Node, table: Sequence[Parameter] = PARAMETERS, check: Callable[[Mapping[str, Any]], None] = check
-) -> None:
-    """Declare all parameters. Raises InputError on one whose type or value was overridden wrongly."""
+def declare(node: Node, table: Sequence[Parameter], check: Check) -> None:
+    """Declare all parameters. Raises InputError where the user gave one of them a wrong type or value."""
     for parameter in table:
         try:
             node.declare_parameter(parameter.name, parameter.default, _descriptor(parameter))
@@ -32,19 +32,29 @@ def declare(
     _warn_of_unknown(node, table)
 
 
-def values_of(node: Node, table: Sequence[Parameter] = PARAMETERS) -> dict[str, Any]:
-    """All parameters' values."""
+def values_of(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
+    """The values of all parameters by name."""
     return {parameter.name: node.get_parameter(parameter.name).value for parameter in table}
 
 
-def refusal(node: Node, state: str, changes: Iterable[RosParameter]) -> str:
-    """Why parameters cannot be changed so, in the lifecycle state; empty where they can."""
-    ours = {change.name: change.value for change in changes if any(p.name == change.name for p in PARAMETERS)}
-    fixed = sorted(ours.keys() - LIVE)
-    if fixed and state != "unconfigured":
-        return f"{fixed[0]} takes effect when the node is configured; it is {state}: deactivate and clean it up first"
+def refusal(
+    node: Node,
+    table: Sequence[Parameter],
+    live: frozenset[str],
+    changes: Iterable[RosParameter],
+    check: Check,
+    fixed_because: str = "",
+) -> str:
+    """Why parameters cannot be changed like this; empty where they can.
+
+    Those that are not ``live`` are refused for the reason ``fixed_because``, unless that is empty.
+    """
+    ours = {change.name: change.value for change in changes if any(p.name == change.name for p in table)}
+    fixed = sorted(ours.keys() - live)
+    if fixed and fixed_because:
+        return f"{fixed[0]} takes effect {fixed_because}"
     try:
-        check(values_of(node) | ours)
+        check(values_of(node, table) | ours)
     except InputError as error:
         return str(error)
     return ""
@@ -62,7 +72,7 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
 
 
 def _warn_of_unknown(node: Node, table: Sequence[Parameter]) -> None:
-    """A misspelt parameter would otherwise be ignored without a word."""
+    """Log a warning for each parameter that is not in the table: ROS would ignore a misspelt one silently."""
     known = [parameter.name for parameter in table]
     for name in node._parameter_overrides:
         if name in known or node.has_parameter(name) or name.startswith("qos_overrides."):

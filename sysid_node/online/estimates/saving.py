@@ -1,4 +1,4 @@
-"""Writes estimates where they outlive the node, with the keys of ``summary.json``."""
+"""Saves estimates to a file during the flight, with the keys of ``summary.json``."""
 
 from __future__ import annotations
 
@@ -9,28 +9,38 @@ from pathlib import Path
 from typing import Any
 
 from sysid_node.errors import InputError
-from sysid_node.ros.session import Session
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
 
 
-def save_estimates(folder: Path, session: Session) -> Path:
-    """Write ``<aircraft>-<stamp of the last sample>.json`` into ``folder``, whole or not at all. NaN becomes null.
+def save_estimates(
+    folder: Path,
+    estimates: Estimates,
+    *,
+    aircraft: str,
+    settings: Settings,
+    stamp_ns: int,
+    samples: int,
+    rejected: Mapping[str, int],
+) -> Path:
+    """Write ``<aircraft>-<stamp_ns>.json`` into ``folder``, completely or not at all, and return its path.
 
-    Returns the file. Raises InputError where the folder cannot be written.
+    ``stamp_ns`` is the header stamp of the last sample, ``samples`` the number of all samples, ``rejected`` the number
+    of messages left out by reason. NaN becomes null. Raises InputError where the folder cannot be written.
     """
-    stamp_ns, estimates, _ = session.now()
     content = {
-        "aircraft": session.aircraft.name,
-        "method": session.settings.method,
+        "aircraft": aircraft,
+        "method": settings.method,
         "stamp_ns": stamp_ns,
         "data_seconds": estimates.time,
-        "samples": session.samples,
-        "rejected": session.rejected,
-        "settings": session.settings.as_dict(),
+        "samples": samples,
+        "rejected": rejected,
+        "settings": settings.as_dict(),
         "derivatives": {name: _plain(d._asdict(), without="name") for name, d in estimates.derivatives.items()},
         "fits": {name: _plain(f._asdict(), without="coefficient") for name, f in estimates.fits.items()},
         "holdout": {},
     }
-    path = folder / f"{session.aircraft.name}-{stamp_ns}.json"
+    path = folder / f"{aircraft}-{stamp_ns}.json"
     partial = path.with_suffix(".part")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -42,6 +52,7 @@ def save_estimates(folder: Path, session: Session) -> Path:
 
 
 def _plain(values: Mapping[str, Any], without: str = "") -> dict[str, Any]:
+    """The values as JSON has them: null where one is not finite; ``without`` one key."""
     return {
         key: None if isinstance(value, float) and not math.isfinite(value) else value
         for key, value in values.items()

@@ -1,15 +1,16 @@
 """The table of parameters agrees with the estimator's settings and with the file that users read."""
 
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 import yaml
-from harness import ROOT
 
 from sysid_node.errors import InputError
+from sysid_node.online.parameters import PARAMETERS, check, estimation_settings, identifier_yaml
 from sysid_node.online.settings import Settings
-from sysid_node.ros.parameters import PARAMETERS, annotated_yaml, check, estimation_settings
 
+ROOT = Path(__file__).resolve().parents[2]
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 
 
@@ -19,9 +20,9 @@ def test_every_setting_of_the_estimator_is_a_parameter_with_the_same_default() -
 
 
 def test_shipped_file_is_the_table() -> None:
-    """`python -m sysid_node.ros.parameters > config/identifier.yaml` writes it again."""
-    assert (ROOT / "config" / "identifier.yaml").read_text(encoding="utf-8") == annotated_yaml()
-    assert yaml.safe_load(annotated_yaml())["/**"]["ros__parameters"] == DEFAULTS
+    """`python -m sysid_node.online.parameters > config/identifier.yaml` writes it again."""
+    assert (ROOT / "config" / "identifier.yaml").read_text(encoding="utf-8") == identifier_yaml()
+    assert yaml.safe_load(identifier_yaml())["/**"]["ros__parameters"] == DEFAULTS
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda parameter: parameter.name)

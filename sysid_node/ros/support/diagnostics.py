@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.online.types import Estimates
-from sysid_node.ros.monitor import Durations, TopicMonitor
 
 OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 

@@ -7,10 +7,10 @@ from harness import START_NS
 from rclpy.serialization import deserialize_message
 from sysid_msgs.msg import DerivativeEstimates
 
+from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.ros import conversion
-from sysid_node.ros.estimates_cdr import EstimatesSerialiser
-from sysid_node.ros.message_types import fields_of
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.message_types import fields_of
 
 
 @pytest.mark.parametrize("nanoseconds", [0, 1, 999_999_999, 10**9, START_NS + 123])

@@ -6,7 +6,7 @@ import sys
 INTERRUPTED = """
 import os, signal, sys, time
 import rclpy
-from sysid_node.ros.spin import run_program
+from sysid_node.ros.support.spin import run_program
 
 def program():
     os.kill(os.getpid(), signal.{signal})
@@ -21,7 +21,7 @@ sys.exit(run_program(program))
 ASKED_TOO_LATE = """
 import sys
 import rclpy
-from sysid_node.ros.spin import run_program
+from sysid_node.ros.support.spin import run_program
 
 def program():
     {before}

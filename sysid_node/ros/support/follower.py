@@ -11,7 +11,7 @@ from rclpy.node import Node
 from sysid_msgs.msg import DerivativeEstimates
 
 from sysid_node.online.types import Estimates
-from sysid_node.ros.conversion import estimates_from_message
+from sysid_node.ros.support.conversion import estimates_from_message
 
 
 class Follower:

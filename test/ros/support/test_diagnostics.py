@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.ros.diagnostics import ERROR, OK, STALE, WARN, Source
-from sysid_node.ros.monitor import Durations, TopicMonitor
+from sysid_node.ros.support.diagnostics import ERROR, OK, STALE, WARN, Source
 
 SOURCE = Source("identifier", "cdrw")
 
@@ -87,7 +87,7 @@ def test_a_replay_has_no_lag_worth_telling() -> None:
 
 def test_a_rate_is_over_the_time_since_it_was_last_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("sysid_node.ros.monitor.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("sysid_node.flight.live.monitor.time.monotonic", lambda: now[0])
     monitor = TopicMonitor("imu/data", _since=100.0)
     for _ in range(40):
         now[0] += 0.05

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sysid_node.ros.pace import AT_ONCE, MOST_BEHIND, Pace
+from sysid_node.sim.flying.pace import AT_ONCE, MOST_BEHIND, Pace
 
 STEP = 0.005
 

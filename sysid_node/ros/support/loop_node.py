@@ -17,11 +17,12 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
-from sysid_node.ros import conversion, inputs
-from sysid_node.ros.declaring import declare, values_of
-from sysid_node.ros.inputs import Fields, Numbers, Texts
-from sysid_node.ros.message_types import fields_of
-from sysid_node.ros.parameters import Parameter, check_each
+from sysid_node.flight.live import messages
+from sysid_node.flight.live.messages import Numbers, Paths, Texts
+from sysid_node.parameter import Parameter, check_each
+from sysid_node.ros.support import conversion
+from sysid_node.ros.support.declaring import declare, values_of
+from sysid_node.ros.support.message_types import fields_of
 
 COMMAND = "actuators/command"
 EXCITATION = "actuators/excitation"
@@ -70,19 +71,19 @@ class LoopNode(Node, ABC):
         """Level, one line, and values for /diagnostics."""
 
     def listen(
-        self, kind: Any, topic: str, fields: Fields, take: Callable[[Numbers, Texts], None], profile: QoSProfile | int
+        self, kind: Any, topic: str, paths: Paths, take: Callable[[Numbers, Texts], None], profile: QoSProfile | int
     ) -> None:
-        """Subscribe to ``fields`` of messages that stay serialised; those that cannot be read are left out.
+        """Subscribe to the numbers and texts at ``paths`` of messages that stay serialised; skip unreadable ones.
 
-        Making objects of all their parts would take longer than what is done with them.
+        To make objects of all parts of a message would take longer than the work on it.
         """
-        reader = MessageReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *fields)
+        reader = MessageReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *paths)
 
         def on_message(raw: bytes) -> None:
             try:
                 message = reader.read(raw)
             except DamageError:
-                self.get_logger().warning(f"{topic}: {inputs.UNREADABLE}", throttle_duration_sec=1.0)
+                self.get_logger().warning(f"{topic}: {messages.UNREADABLE}", throttle_duration_sec=1.0)
                 return
             take(*message)
 
@@ -123,5 +124,5 @@ def named(stamp_ns: int, values: Mapping[str, float]) -> JointState:
 
 def by_name(numbers: Numbers, texts: Texts) -> tuple[int, dict[str, float]]:
     """The way back, with the stamp (ns); of a message with fewer positions than names, what there is."""
-    stamp, names, positions = inputs.actuators(numbers, texts)
+    stamp, names, positions = messages.actuators(numbers, texts)
     return stamp, dict(zip(names, positions, strict=False))

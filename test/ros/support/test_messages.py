@@ -10,17 +10,17 @@ from std_msgs.msg import Header
 from sysid_msgs.msg import AirData
 
 from sysid_node.flight.cdr.message_reader import MessageReader
+from sysid_node.flight.live import messages
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
-from sysid_node.ros import inputs
-from sysid_node.ros.conversion import axes_sign, stamp_message
-from sysid_node.ros.message_types import fields_of
+from sysid_node.ros.support.conversion import axes_sign, stamp_message
+from sysid_node.ros.support.message_types import fields_of
 
 STAMP = 1_700_000_000_123_456_789
 FRAMES = ("", "imu", "a/frame/of/another/length")
 
 
-def read(topic: str, message: object) -> tuple[inputs.Numbers, inputs.Texts]:
-    return MessageReader(fields_of, INPUT_TOPICS[topic], *inputs.FIELDS[topic]).read(serialize_message(message))
+def read(topic: str, message: object) -> tuple[messages.Numbers, messages.Texts]:
+    return MessageReader(fields_of, INPUT_TOPICS[topic], *messages.PATHS[topic]).read(serialize_message(message))
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -32,8 +32,8 @@ def test_imu(frame: str) -> None:
     )
     numbers, texts = read(IMU, message)
     assert texts == (frame,)
-    assert inputs.imu(numbers, -1.0) == (STAMP, (1.0, -2.0, -3.0, 0.1, 0.2, 0.3))
-    assert inputs.imu(numbers, 1.0) == (STAMP, (1.0, 2.0, 3.0, 0.1, -0.2, -0.3))
+    assert messages.imu(numbers, -1.0) == (STAMP, (1.0, -2.0, -3.0, 0.1, 0.2, 0.3))
+    assert messages.imu(numbers, 1.0) == (STAMP, (1.0, 2.0, 3.0, 0.1, -0.2, -0.3))
 
 
 def test_level_flight_in_either_frame() -> None:
@@ -41,7 +41,7 @@ def test_level_flight_in_either_frame() -> None:
     flu = Imu(linear_acceleration=Vector3(z=9.8), angular_velocity=Vector3(x=0.1, y=-0.2, z=-0.3))
     frd = Imu(linear_acceleration=Vector3(z=-9.8), angular_velocity=Vector3(x=0.1, y=0.2, z=0.3))
     for message, body_frame in ((flu, "flu"), (frd, "frd")):
-        found = inputs.imu(read(IMU, message)[0], axes_sign(body_frame))
+        found = messages.imu(read(IMU, message)[0], axes_sign(body_frame))
         assert found == (0, (0.0, 0.0, -9.8, 0.1, 0.2, 0.3))
 
 
@@ -54,12 +54,12 @@ def test_attitude(frame: str) -> None:
         linear_acceleration=Vector3(z=9.8),
         angular_velocity=Vector3(x=0.1),
     )
-    reader = MessageReader(fields_of, INPUT_TOPICS[IMU], *inputs.ATTITUDE_FIELDS)
-    stamp, values, (roll, pitch) = inputs.imu_and_attitude(reader.read(serialize_message(message))[0])
+    reader = MessageReader(fields_of, INPUT_TOPICS[IMU], *messages.ATTITUDE_PATHS)
+    stamp, values, (roll, pitch) = messages.imu_and_attitude(reader.read(serialize_message(message))[0])
     assert (stamp, values) == (STAMP, (0.0, 0.0, -9.8, 0.1, 0.0, 0.0))
     assert (roll, pitch) == pytest.approx((0.0, 0.2), abs=1e-12)
     message.orientation_covariance[0] = -1.0
-    *_, attitude = inputs.imu_and_attitude(reader.read(serialize_message(message))[0])
+    *_, attitude = messages.imu_and_attitude(reader.read(serialize_message(message))[0])
     assert all(map(math.isnan, attitude))
 
 
@@ -67,12 +67,12 @@ def test_attitude(frame: str) -> None:
 def test_air_data(frame: str) -> None:
     header = Header(stamp=stamp_message(STAMP), frame_id=frame)
     message = AirData(header=header, true_airspeed=18.0, angle_of_attack=0.1, sideslip=-0.2, air_density=1.2)
-    assert inputs.air_data(read(AIR_DATA, message)[0]) == (STAMP, (18.0, 0.1, -0.2, 1.2))
+    assert messages.air_data(read(AIR_DATA, message)[0]) == (STAMP, (18.0, 0.1, -0.2, 1.2))
 
 
 @pytest.mark.parametrize("frame", FRAMES)
 def test_actuators(frame: str) -> None:
     header = Header(stamp=stamp_message(STAMP), frame_id=frame)
     message = JointState(header=header, name=["rudder", "throttle"], position=[0.25, 0.5], effort=[7.0])
-    assert inputs.actuators(*read(ACTUATORS, message)) == (STAMP, ("rudder", "throttle"), (0.25, 0.5))
-    assert inputs.actuators(*read(ACTUATORS, JointState())) == (0, (), ())
+    assert messages.actuators(*read(ACTUATORS, message)) == (STAMP, ("rudder", "throttle"), (0.25, 0.5))
+    assert messages.actuators(*read(ACTUATORS, JointState())) == (0, (), ())

@@ -1,4 +1,4 @@
-"""The input topics' numbers as the layers below want them, from messages that stay serialised; no ROS is needed."""
+"""The numbers of the input topics' messages, from messages that stay serialised."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 Numbers = tuple[Any, ...]
 Texts = tuple[Text, ...]
-Fields = tuple[tuple[str, ...], tuple[str, ...]]
+#: Dotted paths of numbers, in the messages' order, and of strings; what a ``MessageReader`` reads.
+Paths = tuple[tuple[str, ...], tuple[str, ...]]
 
 UNREADABLE = "not a message of this type"
 
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _VECTORS = tuple(f"{vector}.{axis}" for vector in ("angular_velocity", "linear_acceleration") for axis in "xyz")
-#: What is read of each topic's messages: paths of numbers, in the messages' order, and of strings.
-FIELDS: Mapping[str, Fields] = MappingProxyType(
+#: What is read of the messages of each input topic.
+PATHS: Mapping[str, Paths] = MappingProxyType(
     {
         IMU: ((*_STAMP, *_VECTORS), ("header.frame_id",)),
         AIR_DATA: ((*_STAMP, "true_airspeed", "angle_of_attack", "sideslip", "air_density"), ()),
@@ -28,35 +29,35 @@ FIELDS: Mapping[str, Fields] = MappingProxyType(
     }
 )
 
-#: The same of IMU messages for those who fly by their orientation.
-ATTITUDE_FIELDS: Fields = (
+#: What is read of IMU messages where the orientation is needed, too.
+ATTITUDE_PATHS: Paths = (
     (*_STAMP, *(f"orientation.{axis}" for axis in "xyzw"), "orientation_covariance", *_VECTORS),
     (),
 )
-_COVARIANCE = 9  # numbers of it
+_COVARIANCE = 9  # numbers in a covariance matrix
 
 
 def imu(numbers: Numbers, sign: float) -> tuple[int, tuple[float, ...]]:
-    """Stamp (ns), specific force (m/s^2) and rates (rad/s), FRD; ``sign`` -1 turns FLU axes, 1 keeps FRD."""
+    """Stamp (ns), specific force (m/s^2) and rates (rad/s), FRD; ``sign`` is -1 for messages in FLU axes, 1 in FRD."""
     seconds, nanoseconds, p, q, r, x, y, z = numbers
     return seconds * 1_000_000_000 + nanoseconds, (x, sign * y, sign * z, p, sign * q, sign * r)
 
 
 def imu_and_attitude(numbers: Numbers) -> tuple[int, tuple[float, ...], tuple[float, float]]:
-    """As ``imu`` of forward-left-up axes, by ``ATTITUDE_FIELDS``; roll and pitch (rad), NaN without orientation."""
+    """As ``imu`` for FLU axes, and roll and pitch (rad), NaN without orientation; of ``ATTITUDE_PATHS``."""
     x, y, z, w, covariance = numbers[2:7]
-    measured = covariance >= 0.0  # REP-145: -1 where it is not
+    measured = covariance >= 0.0  # REP-145: -1 where there is no orientation
     tilt = tilt_from_quaternion((x, y, z, w), "flu") if measured else (math.nan, math.nan)
     return *imu((*numbers[:2], *numbers[6 + _COVARIANCE :]), -1.0), tilt
 
 
 def air_data(numbers: Numbers) -> tuple[int, tuple[float, ...]]:
-    """Stamp (ns), true airspeed (m/s), flow angles (rad) and air density (kg/m^3)."""
+    """Stamp (ns), and true airspeed (m/s), angle of attack and sideslip (rad), air density (kg/m^3)."""
     seconds, nanoseconds, *values = numbers
     return seconds * 1_000_000_000 + nanoseconds, tuple(values)
 
 
 def actuators(numbers: Numbers, texts: Texts) -> tuple[int, Text, tuple[float, ...]]:
-    """Stamp (ns), names and positions (rad; throttle 0..1 or N) of the joints."""
+    """Stamp (ns), names and positions of the joints: rad; throttle 0..1 or N."""
     seconds, nanoseconds, *positions = numbers
     return seconds * 1_000_000_000 + nanoseconds, texts[0], tuple(positions)

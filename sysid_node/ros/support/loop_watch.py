@@ -18,8 +18,8 @@ from std_srvs.srv import Trigger
 from sysid_msgs.msg import DerivativeEstimates
 
 from sysid_node.online.types import Estimates
-from sysid_node.ros.conversion import NANOSECONDS, estimates_from_message, stamp_ns
-from sysid_node.ros.loop_node import DERIVATIVES, SET_POINTS, named
+from sysid_node.ros.support.conversion import NANOSECONDS, estimates_from_message, stamp_ns
+from sysid_node.ros.support.loop_node import DERIVATIVES, SET_POINTS, named
 
 TRACKING = "adaptive_controller/tracking"
 CONTROLLER, MONITOR = "adaptive_controller", "fault_monitor"

@@ -1,22 +1,24 @@
-"""What is told of arrivals, on a clock that the tests move."""
+"""Problems in the arrival of messages, by a clock that the tests set."""
 
 import random
 
 import pytest
 
-from sysid_node.ros import arrivals
-from sysid_node.ros.arrivals import Arrivals
+from sysid_node.flight.live.arrivals import Arrivals
 
 
 class Clock:
+    """A clock that the tests set, s."""
+
     now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    one = Clock()
-    monkeypatch.setattr(arrivals.time, "monotonic", lambda: one.now)
-    return one
+def clock() -> Clock:
+    return Clock()
 
 
 def fed(clock: Clock, topic: Arrivals, seconds: float, *, drop: float = 0.0, jitter: float = 0.0) -> None:
@@ -30,14 +32,14 @@ def fed(clock: Clock, topic: Arrivals, seconds: float, *, drop: float = 0.0, jit
 
 
 def test_all_is_well(clock: Clock) -> None:
-    topic = Arrivals("imu/data", 0.1)
+    topic = Arrivals("imu/data", 0.1, clock)
     fed(clock, topic, 3.0)
     assert topic.troubles() == []
     assert topic.count == 0
 
 
 def test_losses_are_told_once(clock: Clock) -> None:
-    topic = Arrivals("imu/data", 0.2)
+    topic = Arrivals("imu/data", 0.2, clock)
     fed(clock, topic, 20.0, drop=0.3)
     (words,) = topic.troubles()
     assert words.startswith("imu/data")
@@ -47,7 +49,7 @@ def test_losses_are_told_once(clock: Clock) -> None:
 
 def test_an_interval_that_was_short_once_is_not_usual(clock: Clock) -> None:
     """Nor is a rate that was higher before: what is usual follows."""
-    topic = Arrivals("identifier/derivatives", 1.0)
+    topic = Arrivals("identifier/derivatives", 1.0, clock)
     stamp = 1000.0
     for k in range(400):
         step = 0.01 if k in (30, 31) else 0.025 if k < 200 else 0.05
@@ -58,7 +60,7 @@ def test_an_interval_that_was_short_once_is_not_usual(clock: Clock) -> None:
 
 
 def test_what_comes_late(clock: Clock) -> None:
-    topic = Arrivals("imu/data", 0.2)
+    topic = Arrivals("imu/data", 0.2, clock)
     fed(clock, topic, 2.0)
     topic.troubles()
     fed(clock, topic, 2.0, jitter=0.05)
@@ -67,7 +69,7 @@ def test_what_comes_late(clock: Clock) -> None:
 
 def test_a_sender_that_has_lost_time_is_not_late_for_ever(clock: Clock) -> None:
     """Its stamps fall behind by 2 s once, as a simulator's do that could not keep up."""
-    topic = Arrivals("imu/data", 0.2)
+    topic = Arrivals("imu/data", 0.2, clock)
     fed(clock, topic, 8.0)
     topic.troubles()
     for k in range(2000):
@@ -81,7 +83,7 @@ def test_a_sender_that_has_lost_time_is_not_late_for_ever(clock: Clock) -> None:
 
 
 def test_a_short_silence_is_told_after_it_has_ended(clock: Clock) -> None:
-    topic = Arrivals("air_data", 0.1)
+    topic = Arrivals("air_data", 0.1, clock)
     assert not topic.silent()  # nothing was ever heard
     fed(clock, topic, 1.0)
     clock.now += 0.4
@@ -91,7 +93,7 @@ def test_a_short_silence_is_told_after_it_has_ended(clock: Clock) -> None:
 
 
 def test_a_clock_that_steps_back(clock: Clock) -> None:
-    topic = Arrivals("imu/data", 0.1)
+    topic = Arrivals("imu/data", 0.1, clock)
     fed(clock, topic, 1.0)
     newest = topic.stamp
     assert not topic.arrived(newest - 0.2)

@@ -1,53 +1,16 @@
-"""Parameters of nodes: one table declares, describes and checks them, and writes config/identifier.yaml."""
+"""The parameters of the node ``identifier`` as a table: the estimator's settings, and what the node needs besides.
+
+``python -m sysid_node.online.parameters > config/identifier.yaml`` writes the file that users read.
+"""
 
 from __future__ import annotations
 
-import math
-import textwrap
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
-from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS, Settings
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One node parameter. ``lower`` and ``upper`` are inclusive; ``choices`` are all that is allowed."""
-
-    name: str
-    default: Any
-    unit: str  # "" = none
-    meaning: str
-    change: str  # when to change it
-    lower: float = -math.inf
-    upper: float = math.inf
-    choices: tuple[str, ...] = ()
-
-    @property
-    def constraint(self) -> str:
-        """The allowed values in words; empty where any value of the type will do."""
-        if self.choices:
-            return " | ".join(self.choices)
-        if isinstance(self.default, float):
-            return f"{self.lower:g} to {self.upper:g}{f' {self.unit}' if self.unit else ''}"
-        return ""
-
-    @property
-    def expected(self) -> str:
-        """What a value must be, in words that end an error message."""
-        kind = {bool: "true or false", str: "a string", float: "a double", list: "a list of doubles"}
-        allowed = f", {self.constraint}" if self.constraint else ""
-        return f"{kind[type(self.default)]}{allowed}, e.g. {_yaml(self.default)}"
-
-
-def setting(
-    defaults: object, ranges: Mapping[str, tuple[float, float]], name: str, unit: str, meaning: str, change: str
-) -> Parameter:
-    """The parameter that sets the field ``name`` of a dataclass of settings, within its range."""
-    return Parameter(name, float(getattr(defaults, name)), unit, meaning, change, *ranges[name])
-
+from sysid_node.parameter import Parameter, annotated_yaml, check_each
 
 _ESTIMATOR = Settings()
 
@@ -182,59 +145,23 @@ LIVE = frozenset({"save_directory", "stale_after"})
 
 
 def estimation_settings(values: Mapping[str, Any]) -> Settings:
-    """The estimator's part of all parameters. Raises InputError on an impossible combination."""
+    """The estimator's settings among the node's parameters. Raises InputError on an impossible combination."""
     return Settings.from_mapping({name: value for name, value in values.items() if name in _ESTIMATION})
 
 
 def check(values: Mapping[str, Any]) -> None:
-    """Check values of all parameters. Raises InputError naming the first wrong one, what it is and what is expected."""
+    """Check values of all parameters. Raises InputError naming the first wrong one, its value and what is expected."""
     check_each(PARAMETERS, values)
     estimation_settings(values)
 
 
-def check_each(table: Sequence[Parameter], values: Mapping[str, Any]) -> None:
-    """Check values one by one. Raises InputError naming the first wrong one."""
-    for parameter in table:
-        value = values[parameter.name]
-        unknown = parameter.choices and value not in parameter.choices
-        if unknown or (isinstance(parameter.default, float) and not parameter.lower <= value <= parameter.upper):
-            raise InputError(f"parameter {parameter.name} = {value!r}: expected {parameter.expected}")
+EFFECT = "They take effect when the node is configured; to change one later: ros2 lifecycle set /identifier cleanup."
 
 
-IDENTIFIER_EFFECT = (
-    "They take effect when the node is configured; to change one later: ros2 lifecycle set /identifier cleanup."
-)
-
-
-def annotated_yaml(
-    node: str = "identifier", table: Sequence[Parameter] = PARAMETERS, effect: str = IDENTIFIER_EFFECT
-) -> str:
-    """The text of config/<node>.yaml: every parameter with meaning, unit, default and when to change it."""
-    lines = [
-        f"# Parameters of the node `{node}`. Every value here is the default; leave out what you do not change.",
-        f"# ros2 run sysid_node {node} --ros-args --params-file {node}.yaml -p aircraft:=cdrw",
-        f"# {effect}",
-        "",
-        "/**:",
-        "  ros__parameters:",
-    ]
-    for parameter in table:
-        values = f"Values: {parameter.constraint}." if parameter.constraint else ""
-        unit = f"Unit: {parameter.unit}." if parameter.unit and not values else ""
-        notes = (note for note in (parameter.meaning, values, unit, f"Change: {parameter.change}") if note)
-        for note in notes:
-            lines += textwrap.wrap(note, 110, initial_indent="    # ", subsequent_indent="    #   ")
-        lines += [f"    {parameter.name}: {_yaml(parameter.default)}", ""]
-    return "\n".join(lines)
-
-
-def _yaml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{value}"'
-    return str(value)
+def identifier_yaml() -> str:
+    """The text of config/identifier.yaml."""
+    return annotated_yaml("identifier", PARAMETERS, EFFECT)
 
 
 if __name__ == "__main__":
-    print(annotated_yaml(), end="")
+    print(identifier_yaml(), end="")

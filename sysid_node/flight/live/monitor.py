@@ -1,4 +1,4 @@
-"""What a node observes of its own work: arrivals by topic, times taken."""
+"""What a node measures of its own work: the messages of each topic, and durations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class TopicMonitor:
-    """Arrivals of one topic, by a clock that never jumps; ``rate`` is over the time since it was last asked for."""
+    """Counts the messages of one topic, by a clock that never jumps."""
 
     name: str
     received: int = 0
@@ -18,7 +18,7 @@ class TopicMonitor:
     _since: float = field(default_factory=time.monotonic)
 
     def arrived(self) -> None:
-        """One more message."""
+        """Count one more message."""
         self.received += 1
         self.last = time.monotonic()
 
@@ -27,7 +27,7 @@ class TopicMonitor:
         return time.monotonic() - self.last
 
     def rate(self) -> float:
-        """Messages per second since the last call."""
+        """Messages per second since the last call of this method."""
         now = time.monotonic()
         rate = (self.received - self._counted) / max(now - self._since, 1e-9)
         self._counted, self._since = self.received, now
@@ -36,16 +36,16 @@ class TopicMonitor:
 
 @dataclass
 class Durations:
-    """The last so many durations of one kind of work."""
+    """The last 500 durations of one kind of work."""
 
     seconds: deque[float] = field(default_factory=lambda: deque(maxlen=500))
 
     def add(self, seconds: float) -> None:
-        """One more, s."""
+        """Add one duration, s."""
         self.seconds.append(seconds)
 
     def percentiles(self) -> tuple[float, float]:
-        """p50 and p99, s; NaN where there are none."""
+        """Median and 99th percentile, s; NaN where there are no durations."""
         if not self.seconds:
             return float("nan"), float("nan")
         ordered = sorted(self.seconds)

@@ -1,0 +1,99 @@
+"""How the messages of a topic arrive: lost, late, out of order, silent, or with a clock that was set.
+
+Diagnostics once a second are too rare to show what lasts for a tenth of a second. Every problem is therefore counted
+when it happens and reported by the next message on ``/diagnostics``.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+STEP_BACK, STEP_AHEAD = 1.0, 5.0  # s: a larger step of the stamps is a clock that was set
+SEVERAL = 1.6  # usual intervals between two stamps, beyond which at least one message is missing
+KEPT, FEW = 40, 8  # intervals that are remembered; the least number that tells the usual interval
+SHARE = 0.05  # share of messages lost, beyond which it is reported
+LATE = 0.03  # s of delay beyond the smallest, beyond which it is reported
+RECENT = 5.0  # s: delays are compared with the smallest of a period this long and of the period before
+
+
+@dataclass
+class Arrivals:
+    """The arrivals of one topic; ``silent_after`` s without a message count as silence. ``clock`` never jumps."""
+
+    topic: str
+    silent_after: float
+    clock: Callable[[], float] = time.monotonic  # s
+    heard: float = -math.inf  # s, by ``clock``, of the last message
+    stamp: float = math.nan  # s, the newest
+    intervals: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))  # s between stamps
+    smallest_delay: float = math.inf  # s, arrival less stamp, in this period
+    smallest_before: float = math.inf  # s, in the period before
+    period_start: float = -math.inf  # s, by ``clock``
+    received: int = 0  # since the last report
+    missing: int = 0
+    largest_delay: float = 0.0  # s, beyond the smallest
+    events: list[str] = field(default_factory=list)  # that were not reported yet
+    count: int = 0  # of all problems so far
+
+    def arrived(self, stamp: float) -> bool:
+        """Take a message with a stamp (s). False where it is not newer than the messages before it."""
+        now = self.clock()
+        if self.silent():
+            self._add(f"was silent for {now - self.heard:.1f} s")
+        self.heard = now
+        step = stamp - self.stamp
+        if -STEP_BACK < step <= 0.0:
+            self._add("out of order")
+            return False
+        if step <= -STEP_BACK or step > STEP_AHEAD:
+            self._add(f"clock set by {step:+.1f} s")
+            self.smallest_delay = self.smallest_before = math.inf
+        elif step > 0.0:
+            self._count_missing(step)
+        self.stamp, self.received = stamp, self.received + 1
+        self._compare_delay(now, now - stamp)
+        return True
+
+    def silent(self) -> bool:
+        """Whether the topic is silent now; never before the first message."""
+        return math.isfinite(self.heard) and self.clock() - self.heard > self.silent_after
+
+    def troubles(self) -> list[str]:
+        """The problems since the last call, in words."""
+        words, self.events = list(dict.fromkeys(self.events)), []
+        if self.silent():
+            words.append(f"silent for {self.clock() - self.heard:.1f} s")
+        share = self.missing / max(self.received + self.missing, 1)
+        if share > SHARE:
+            words.append(f"{100.0 * share:.0f} % lost")
+        if self.largest_delay > LATE:
+            words.append(f"up to {1e3 * self.largest_delay:.0f} ms late")
+        self.count += share > SHARE or self.largest_delay > LATE
+        self.received, self.missing, self.largest_delay = 0, 0, 0.0
+        return [f"{self.topic} {problem}" for problem in words]
+
+    def _add(self, event: str) -> None:
+        self.events.append(event)
+        self.count += 1
+
+    def _compare_delay(self, now: float, delay: float) -> None:
+        """Compare a delay (s) with the smallest of this period and of the one before."""
+        if now - self.period_start > RECENT:
+            self.smallest_delay, self.smallest_before, self.period_start = math.inf, self.smallest_delay, now
+        self.smallest_delay = min(self.smallest_delay, delay)
+        self.largest_delay = max(self.largest_delay, delay - min(self.smallest_delay, self.smallest_before))
+
+    def _count_missing(self, step: float) -> None:
+        """Count the messages that are missing between two stamps.
+
+        The lower quartile of the last intervals is taken as the usual one. It holds while up to three quarters of the
+        messages are lost, and a single short interval does not change it.
+        """
+        self.intervals.append(step)
+        if len(self.intervals) >= FEW:
+            usual = sorted(self.intervals)[len(self.intervals) // 4]
+            self.missing += round(step / usual) - 1 if step > SEVERAL * usual else 0

@@ -1,0 +1,45 @@
+"""Estimates saved to a file in flight: complete, or not at all."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from sysid_node.errors import InputError
+from sysid_node.online.estimates.saving import save_estimates
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
+
+ESTIMATES = Estimates(
+    2.5,
+    {"Cm_alpha": DerivativeEstimate("Cm_alpha", -0.5, 0.1, -0.7, math.nan, True, "ok")},
+    {"Cm": FitQuality("Cm", 0.9, 0.01, 30.0, 99)},
+)
+
+
+def save(folder: Path) -> Path:
+    return save_estimates(
+        folder, ESTIMATES, aircraft="cdrw", settings=Settings(), stamp_ns=7, samples=99, rejected={"imu/data: late": 3}
+    )
+
+
+def test_a_second_save_replaces_the_first_and_leaves_no_other_file(tmp_path: Path) -> None:
+    path = save(tmp_path / "new")
+    assert path.name == "cdrw-7.json"
+    assert save(tmp_path / "new") == path
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+def test_content_is_json_with_null_for_nan(tmp_path: Path) -> None:
+    content = json.loads(save(tmp_path).read_text(encoding="utf-8"))
+    assert content["derivatives"]["Cm_alpha"]["value"] == -0.5
+    assert content["derivatives"]["Cm_alpha"]["upper"] is None
+    assert content["fits"]["Cm"]["samples"] == 99
+    assert (content["samples"], content["rejected"], content["data_seconds"]) == (99, {"imu/data: late": 3}, 2.5)
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"file.*save_directory"):
+        save(tmp_path / "file")
