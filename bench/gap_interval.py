@@ -20,10 +20,11 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import CandidateFit, converged, unfitted, with_candidates
-from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.predictive_density import Evidence, held_out_evidence, window_groups
+from sysid_node.gap.estimation.convergence import converged
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
+from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, held_out_evidence
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, completed_flight
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of
@@ -101,10 +102,9 @@ def outcome(aircraft: Aircraft, case: int, turbulence: str) -> Outcome:
     effects = EFFECTS[case % len(EFFECTS)]
     truth = {**effects, "derivative_error": wrong}
     first, second = (residual_model_of(simulator, fly(aircraft, truth, 2 * case + k, turbulence)) for k in (0, 1))
-    own = [nuisances_of(aircraft, second)]
-    base, final = (held_out_evidence(fit, [second], own) for fit in fitted(first, next(iter(effects))))
-    groups = len(window_groups(second))
-    right = Evidence(np.zeros(groups), (), (second,), ((simulator.vector(truth),) * groups,))
+    held_out = [HeldOutFlight(second, nuisances_of(aircraft, second))]
+    base, final = (held_out_evidence(fit, held_out) for fit in fitted(first, next(iter(effects))))
+    right = Evidence(np.zeros(0), (FlightEvidence.throughout(second, simulator.vector(truth)),))
     stated, best = simulation_gap(base, final), simulation_gap(base, right)
     assert stated is not None and best is not None
     return Outcome(stated.before, stated.after, stated.noise_floor, best.after, stated.ci95)

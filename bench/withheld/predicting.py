@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
+from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import Simulator
 
@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 
 def everywhere(models: tuple[ResidualModel, ...], point: Array) -> Evidence:
     """Flights that are predicted with the same parameters throughout."""
-    points = tuple((point,) * len(window_groups(model)) for model in models)
-    return Evidence(np.empty(0), (), models, points)
+    return Evidence(np.empty(0), tuple(FlightEvidence.throughout(model, point) for model in models))
 
 
 def vector(simulator: Simulator, aircraft: Aircraft, effects: Mapping[str, Mapping[str, float]]) -> Array:

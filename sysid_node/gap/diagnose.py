@@ -9,7 +9,7 @@ from typing import Any
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
@@ -92,19 +92,20 @@ def diagnose(
         flights = [cut_to_manoeuvre(flights[0], aircraft.control_symbols)]
     simulator = Simulator(aircraft, ANALYSIS_RATE)
     models = [require_admissible(residual_model_of(simulator, flight)) for flight in flights]
-    unseen = [require_admissible(residual_model_of(simulator, flight)) for flight in holdouts]
-    nuisances, *own = (nuisances_of(aircraft, model, (*models, *unseen)) for model in (models[0], *unseen))
-    steps = Checkpoint.of(keep, models)
-    attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), steps, unseen, own)
+    others = [require_admissible(residual_model_of(simulator, flight)) for flight in holdouts]
+    nuisances, *theirs = (nuisances_of(aircraft, model, (*models, *others)) for model in (models[0], *others))
+    held_out = [HeldOutFlight(*parts) for parts in zip(others, theirs, strict=True)]
+    checkpoint = Checkpoint.of(keep, models)
+    attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), checkpoint, held_out)
     progress(0.92, "the gap on flight not fitted")
-    attribution, checked = validate(attribution, models, unseen, own)
+    attribution, checked = validate(attribution, models, held_out)
     scores = measure(models, attribution, checked)
     decision = decide(scores)
     progress(0.95, "short flights beside the flight, and what to fly next")
-    found = localisation.where(attribution, [v.residual(simulator.neutral()) for v in models])
-    air = max(gust_speed(v, transferred_parameters(attribution.corrected, v)) for v in (*models, *unseen))
+    found = localisation.where(attribution)
+    air = max(gust_speed(v, transferred_parameters(attribution.corrected, v)) for v in (*models, *others))
     flight = advice(decision.verdict, attribution)
-    steps.forget()
+    checkpoint.clear()
     return Diagnosis(
         aircraft, decision, scores, attribution, checked, bool(holdouts), found, localisation.missing(attribution),
         confusion_of(attribution.base, attribution.first_stage), flight, air,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.estimation.fit import CandidateFit
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.causes import Cause
@@ -114,7 +114,7 @@ def _grounds(cause: Cause) -> dict[str, Any]:
 
 def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
     """Value and standard error of each of a cause's parameters, in the simulator's units."""
-    simulator, places = fit.models[0].simulator, {index: place for place, index in enumerate(fit.indices)}
+    simulator, places = fit.simulator, {index: place for place, index in enumerate(fit.indices)}
     own = cause.candidate.indices
     if not own:
         ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
@@ -123,5 +123,6 @@ def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
         own = tuple(i for i in ordered if i in cause.candidate.widened)
     errors, names = standard_errors(fit), {i: simulator.parameters[i][1].name for i in own}
     return {
-        name: with_standard_error(name, float(fit.points[0][i]), float(errors[places[i]])) for i, name in names.items()
+        name: with_standard_error(name, float(fit.flights[0].point[i]), float(errors[places[i]]))
+        for i, name in names.items()
     }

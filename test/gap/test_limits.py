@@ -1,23 +1,16 @@
 """Tolerances are limits: a nuisance never goes beyond three of them, whatever the data say."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from gap_flights import fly
 from scipy.optimize import lsq_linear
 
+from sysid_node.gap.estimation.bounded_least_squares import bounded_least_squares
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import (
-    CandidateFit,
-    VariableProjection,
-    bounded_least_squares,
-    converged,
-    linearised,
-    unfitted,
-    with_candidates,
-)
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
@@ -39,7 +32,7 @@ def test_none_is_beyond_its_limit_and_some_stand_at_it(shifted) -> None:
 
 def test_what_stands_at_its_limit_is_not_uncertain(shifted) -> None:
     now, _, limit = shifted.stacked
-    np.testing.assert_array_equal(shifted.loose, np.abs(now) < limit * (1.0 - 1e-9))
+    np.testing.assert_array_equal(shifted.uncertain, np.abs(now) < limit * (1.0 - 1e-9))
 
 
 def test_priors_cost_what_they_say(shifted) -> None:
@@ -49,7 +42,7 @@ def test_priors_cost_what_they_say(shifted) -> None:
 
 
 def test_a_wider_prior_has_its_price(shifted) -> None:
-    names = shifted.models[0].simulator.names
+    names = shifted.simulator.names
     own = tuple(i for i, name in enumerate(names) if name.startswith("derivative_error.Cm_"))
     wide = shifted.nuisances.without(frozenset({"derivative_error"}), names, own)
     moved = np.isin(wide.indices, own)
@@ -59,7 +52,7 @@ def test_a_wider_prior_has_its_price(shifted) -> None:
 
 
 def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
-    names = shifted.models[0].simulator.names
+    names = shifted.simulator.names
     kept = shifted.nuisances.without(frozenset({"command_delay"}), names)
     left = {names[i] for i in kept.indices}
     assert "actuator_stamp_delay.delay" not in left and "air_data_delay.delay" in left
@@ -92,6 +85,6 @@ def test_what_a_nuisance_at_its_limit_holds_is_given_back(aircraft) -> None:
     (bias,) = (c for c in candidates_of(model.simulator, [model]) if c.effect == "actuator_bias")
     fit = with_candidates(converged(unfitted([model], nuisances)), [bias], nuisances, [0.0, 0.0, 0.0])
     cm, limit = (nuisances.indices.index(model.simulator.names.index("derivative_error.Cm_0")), nuisances.limit)
-    stuck = [point.copy() for point in fit.points]
+    stuck = [flight.point.copy() for flight in fit.flights]
     stuck[0][nuisances.indices[cm]] = limit[cm]
-    assert converged(replace(fit, points=tuple(stuck))).values[0] == pytest.approx(-0.06, rel=0.1)
+    assert converged(fit.at(stuck)).values[0] == pytest.approx(-0.06, rel=0.1)

@@ -12,10 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS, Simulator
 
 #: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
@@ -42,15 +40,8 @@ TIME_EFFECTS = frozenset(
 #: Of these, the ones by which the response comes later than the commands: each is a rival of the others, always.
 RESPONSE_DELAYS = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
 
-#: Of these, stamps: no message is stamped before what it tells of. Early ones would let the three clocks stand for one
-#: another: commands and air data that are late by themselves would be an early IMU and air data less late.
-_STAMPS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
-
 #: Onsets that are tried, as shares of the flight.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
-
-#: A mode that rings more slowly than any airframe's would pass for whatever a gust does.
-_MODE = ("structural_mode", "frequency")
 
 
 @dataclass(frozen=True)
@@ -90,26 +81,6 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
         else:
             found.append(_whole(simulator, models, effect))
     return found
-
-
-def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
-    """Lowest and highest values of these entries."""
-    table = [simulator.parameters[i] for i in indices]
-    # A surface half stuck is one that has lost half its effect: only a jam is called one.
-    jams = [e == "stuck_surface" and p.switch for e, p in table]
-    lower = [THRESHOLDS.priors.jammed if jam else p.lower for jam, (_, p) in zip(jams, table, strict=True)]
-    slowest = THRESHOLDS.priors.lowest_mode
-    lower = [slowest if (e, p.name) == _MODE else low for low, (e, p) in zip(lower, table, strict=True)]
-    lower = [0.0 if e in _STAMPS else low for low, (e, _) in zip(lower, table, strict=True)]
-    return np.array(lower), np.array([p.upper for _, p in table])
-
-
-def prior(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
-    """Centre and 1-sigma of the prior of these entries; an onset may be at any time."""
-    parameters = [simulator.parameters[i][1] for i in indices]
-    sigma = [100.0 if p.name == "onset" else THRESHOLDS.priors.scale * simulator.scales[i]
-             for i, p in zip(indices, parameters, strict=True)]  # fmt: skip
-    return np.array([p.neutral for p in parameters]), np.array(sigma)
 
 
 def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> Candidate:

@@ -1,7 +1,7 @@
-"""Finished steps of a diagnosis, kept in a folder so that one that was interrupted goes on where it stopped.
+"""Finished steps of a diagnosis, kept in a folder so that an interrupted diagnosis goes on where it stopped.
 
-Each file is named after a digest of all that its content depends on: flights, aircraft, effects and where the fit
-started. A file of another diagnosis is never taken for one of this.
+Each file is named after a digest of all that its content depends on: flights, aircraft, candidates and the start of the
+fit. So a file of one diagnosis is never taken for a file of another.
 """
 
 from __future__ import annotations
@@ -14,29 +14,30 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid_node.gap.estimation.fit import CandidateFit, converged, linearised
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.residuals.residual_model import ResidualModel
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A folder of finished steps, or None to keep nothing; ``digest`` tells the flights and the aircraft."""
+    """The finished steps of one diagnosis: in memory, and in a folder where one is given."""
 
     folder: Path | None = None
-    digest: str = ""
-    done: dict[str, CandidateFit] = field(default_factory=dict)  # what was fitted in this run
+    digest: str = ""  # of the flights and the aircraft
+    done: dict[str, CandidateFit] = field(default_factory=dict)  # fits of this run
 
     @classmethod
     def of(cls, folder: Path | None, models: Sequence[ResidualModel]) -> Checkpoint:
-        """Those of these flights."""
+        """The checkpoint of a diagnosis of these flights."""
         text = hashlib.sha256(repr(models[0].simulator.aircraft).encode())
         for model in models:
             text.update(np.ascontiguousarray(model.series).tobytes())
             text.update(np.ascontiguousarray(model.commands).tobytes())
         return cls(folder, text.hexdigest())
 
-    def polished(self, fit: CandidateFit) -> CandidateFit:
-        """The fit polished, or as it was when this was done before."""
+    def converged(self, fit: CandidateFit) -> CandidateFit:
+        """The converged fit, computed or restored."""
         key = self._key("fit", fit)
         if key not in self.done:
             path = self._path(key, "npz")
@@ -51,7 +52,7 @@ class Checkpoint:
     def table(
         self, fit: CandidateFit, names: Sequence[str], work: Callable[[], dict[str, list[float]]]
     ) -> dict[str, list[float]]:
-        """Numbers by these names that were worked out about a fit, or as they were before."""
+        """Numbers by these names that ``work`` computes for a fit, computed or restored."""
         path = self._path(self._key("+".join(["table", *names]), fit), "json")
         if path is None:
             return work()
@@ -64,8 +65,8 @@ class Checkpoint:
         partial.replace(path)
         return done
 
-    def forget(self) -> None:
-        """Removes the files of this diagnosis, which is finished, and the folder where nothing else is in it."""
+    def clear(self) -> None:
+        """Removes the files of this diagnosis, and the folder if nothing else is in it."""
         if self.folder is None or not self.folder.is_dir():
             return
         for path in self.folder.glob(f"{self.digest[:12]}-*"):
@@ -75,7 +76,8 @@ class Checkpoint:
 
     def _key(self, kind: str, fit: CandidateFit) -> str:
         key = hashlib.sha256((self.digest + kind + "+".join(c.label for c in fit.candidates)).encode())
-        for array in (*fit.points, *fit.power, fit.nuisances.sigma):
+        points, powers = ([getattr(flight, name) for flight in fit.flights] for name in ("point", "power"))
+        for array in (*points, *powers, fit.nuisances.sigma):
             key.update(np.ascontiguousarray(array).tobytes())
         return key.hexdigest()
 
@@ -88,13 +90,16 @@ class Checkpoint:
 
 def _restored(path: Path, fit: CandidateFit) -> CandidateFit:
     with np.load(path) as kept:
-        points, power = (tuple(kept[f"{kind}{i}"] for i in range(len(fit.models))) for kind in ("point", "power"))
-    return linearised(replace(fit, points=points, power=power))
+        flights = [
+            replace(flight, point=kept[f"point{number}"], power=kept[f"power{number}"])
+            for number, flight in enumerate(fit.flights)
+        ]
+    return linearised(replace(fit, flights=tuple(flights)))
 
 
 def _store(path: Path, fit: CandidateFit) -> None:
-    kinds = {"point": fit.points, "power": fit.power}
-    arrays = {f"{kind}{i}": array for kind, of in kinds.items() for i, array in enumerate(of)}
+    arrays = {f"point{number}": flight.point for number, flight in enumerate(fit.flights)}
+    arrays |= {f"power{number}": flight.power for number, flight in enumerate(fit.flights)}
     partial = path.with_suffix(".part.npz")
     np.savez(partial, **arrays)  # type: ignore[arg-type]  # NumPy's stubs take the names for options
     partial.replace(path)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
+from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 
@@ -60,6 +61,30 @@ class Nuisances:
         more = self.widened + float(np.log(wide[keep]).sum())
         return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
 
+    def places(self, flight: int) -> NDArray[np.intp]:
+        """Places of one flight's nuisance parameters among those of all flights, the shared ones first."""
+        shared = int(self.shared.sum())
+        separate = len(self.indices) - shared
+        places = np.empty(len(self.indices), np.intp)
+        places[self.shared] = np.arange(shared)
+        places[~self.shared] = shared + flight * separate + np.arange(separate)
+        return places
+
+    def among_all(self, slopes: Array, flight: int, flights: int) -> Array:
+        """Slopes (n, K) of one flight as columns among those of all flights' nuisance parameters; zero elsewhere."""
+        shared = int(self.shared.sum())
+        wide = np.zeros((slopes.shape[0], shared + flights * (len(self.indices) - shared)))
+        wide[:, self.places(flight)] = slopes
+        return wide
+
+
+@dataclass(frozen=True)
+class HeldOutFlight:
+    """A flight that is predicted and not fitted: its residual model, and the nuisance parameters it may need."""
+
+    model: ResidualModel
+    nuisances: Nuisances
+
 
 def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[ResidualModel] = ()) -> Nuisances:
     """Of one of an aircraft's flights: the same ones for all that are looked at together, by its own rates.
@@ -88,11 +113,6 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
     shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *CLOCKS)) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
-
-
-def is_gusty(model: ResidualModel) -> bool:
-    """Whether the air moves across the flight path by enough to count."""
-    return bool(model.gusts >= THRESHOLDS.priors.gusty * model.record["V"].mean())
 
 
 def _turning_air(aircraft: Aircraft) -> dict[str, float]:

@@ -1,12 +1,14 @@
-"""Evidence: how probable flight is that a fit has not seen, and the probabilities of explanations that follow.
+"""Predictive density: how probable a fit makes flight data that it has not seen.
 
-Each group of windows is predicted from the others (or from the training flights), with the uncertainty of everything
-that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), eq. 2.12; 5.10-5.12 leave out). What
-the fit asks of the priors counts too, as a share of each group: prediction from the rest alone would forgive an
-explanation that needs every derivative two sigmas out.
-Explanations compete by these scores; a Bayesian bootstrap over the groups tempers them, so that probabilities mean no
-more than so many independent observations can say (Yao, Vehtari, Simpson & Gelman (2018), Bayesian Analysis 13(3),
-"pseudo-BMA+").
+Each group of windows is predicted from the other windows (or, on a flight held out, from the flights fitted), with the
+uncertainty of all that was fitted: a Gaussian about the fit, linearised (Rasmussen & Williams (2006), Gaussian
+Processes for Machine Learning, eq. 2.12; eqs. 5.10 to 5.12 leave out one observation). Each group also bears its share
+of the prior density at the fit: prediction from the other windows alone would favour an explanation that needs every
+derivative two standard deviations away from the aircraft file.
+
+Explanations are compared by these scores. A Bayesian bootstrap over the groups turns them into probabilities that are
+no more certain than so many independent observations allow (Yao, Vehtari, Simpson & Gelman (2018), Bayesian
+Analysis 13(3), "pseudo-BMA+").
 """
 
 from __future__ import annotations
@@ -18,34 +20,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import (
-    CandidateFit,
-    amplitudes,
-    linearised,
-    real_rows,
-    residual_power,
-    solve,
-    stepped,
-    weights,
-)
-from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, Nuisances
+from sysid_node.gap.estimation.bounded_least_squares import solve
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit, linearised, stepped
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, HeldOutFlight, Nuisances
+from sysid_node.gap.estimation.spectral_weights import amplitudes, real_rows, residual_power, weights
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Scores (G,) of groups of windows not seen, and their residuals (W, L, 12) by flight.
+class FlightEvidence:
+    """A flight as it was predicted without having been seen.
 
-    ``points`` are the parameters (P,) of the model that each group was predicted with, by flight and group, as it is
-    written: a clock within a sample or a bias within the noise is the recording's, no simulator's.
+    ``points`` are the parameters (P,) of the model that predicted each group of windows, as it is exported: clock
+    offsets and biases within the noise belong to the recording, not to a simulator.
     """
 
+    model: ResidualModel
+    residual: Complex  # (W, L, 12)
+    points: tuple[Array, ...]  # by group of windows
+
+    @classmethod
+    def throughout(cls, model: ResidualModel, point: Array) -> FlightEvidence:
+        """The flight as the same parameters (P,) predict all of it."""
+        return cls(model, model.residual(point), (point,) * len(window_groups(model)))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Log predictive densities (G,) of groups of windows, in nats, and the flights that they belong to."""
+
     scores: Array
-    residuals: tuple[Complex, ...]
-    models: tuple[ResidualModel, ...]
-    points: tuple[tuple[Array, ...], ...]
+    flights: tuple[FlightEvidence, ...]
 
     @property
     def total(self) -> float:
@@ -54,166 +61,181 @@ class Evidence:
 
 
 def window_groups(model: ResidualModel) -> list[NDArray[np.intp]]:
-    """Indices of the windows of each group, neighbours together."""
+    """Indices of the windows of each group; a group's windows are neighbours."""
     count = model.windows.count
     return list(np.array_split(np.arange(count), min(THRESHOLDS.evidence.groups, max(count // 2, 1))))
 
 
 def with_neighbours(group: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """A group of windows with those that overlap it, of so many."""
+    """Indices of a group of windows and of those that overlap it, of ``count`` windows."""
     return np.arange(max(group[0] - 1, 0), min(group[-1] + 2, count))
 
 
 def cross_validated_evidence(fit: CandidateFit) -> Evidence:
-    """Each group of windows predicted from the others of the same flights; windows that overlap it stand aside."""
+    """Evidence of the flights fitted: each group of windows predicted from those that do not overlap it."""
     assert fit.information is not None
     scores: list[float] = []
-    residuals: list[Complex] = []
-    points: list[tuple[Array, ...]] = []
-    grams = [np.einsum("wru,wrv->wuv", J * fit.loose, J * fit.loose, optimize=True) for J in fit.slopes]
+    flights: list[FlightEvidence] = []
+    grams = [
+        np.einsum("wru,wrv->wuv", f.slopes * fit.uncertain, f.slopes * fit.uncertain, optimize=True)
+        for f in fit.flights
+    ]
     whole = [gram.sum(axis=0) for gram in grams]
     elsewhere = [fit.prior_information + sum(w for k, w in enumerate(whole) if k != i) for i in range(len(whole))]
-    for i, (model, power, rows, full) in enumerate(zip(fit.models, fit.power, fit.rows, fit.slopes, strict=True)):
-        slopes = full * fit.loose
-        residual = amplitudes(rows, weights(model.windows, power))
-        unseen, steps = residual.copy(), []
+    for number, (flight, gram) in enumerate(zip(fit.flights, grams, strict=True)):
+        model, slopes = flight.model, flight.slopes * fit.uncertain
+        residual = amplitudes(flight.rows, flight.weights)
+        predicted, points = residual.copy(), []
         for group in window_groups(model):
             aside = with_neighbours(group, model.windows.count)
             others = np.setdiff1d(np.arange(model.windows.count), aside)
-            J, r = slopes[aside].reshape(-1, slopes.shape[2]), rows[aside].ravel()
-            information = elsewhere[i] + grams[i][others].sum(axis=0)
+            J, r = slopes[aside].reshape(-1, slopes.shape[2]), flight.rows[aside].ravel()
+            information = elsewhere[number] + gram[others].sum(axis=0)
             step = -solve(information, J.T @ r)
-            steps.append(step)
-            own_power = residual_power(model, residual[others]) if others.size > 2 else power
-            score, part = _predictive(model, power, own_power, rows[group], slopes[group], step, information)
+            power = residual_power(model, residual[others]) if others.size > 2 else flight.power
+            part = _Group(model, flight.power, flight.rows[group], slopes[group])
+            score, predicted[group] = _predictive(part, power, step, information)
             scores.append(score)
-            unseen[group] = part
-        residuals.append(unseen)
-        points.append(tuple(exported_parameters(fit, stepped(fit, step).points[i]) for step in steps))
-    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), fit.models, tuple(points))
+            points.append(exported_parameters(fit, stepped(fit, step).flights[number].point))
+        flights.append(FlightEvidence(model, predicted, tuple(points)))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(flights))
 
 
-def competing_evidence(fit: CandidateFit, unseen: Sequence[ResidualModel], nuisances: Sequence[Nuisances]) -> Evidence:
-    """Evidence by which explanations compete: parts of the flights fitted, each predicted from the rest, and flights
-    held out. Nothing is fitted to the latter, but they have a say in what is blamed."""
-    own = cross_validated_evidence(fit)
-    if not unseen:
-        return own
-    theirs = held_out_evidence(fit, unseen, nuisances)
-    scores = [part.scores - fit.prior_score / part.scores.size for part in (own, theirs)]
+def competing_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> Evidence:
+    """Evidence by which explanations are compared: of the flights fitted, cross-validated, and of flights held out.
+
+    Nothing is fitted to flights held out, but they take part in the choice of the explanation.
+    """
+    fitted = cross_validated_evidence(fit)
+    if not held_out:
+        return fitted
+    other = held_out_evidence(fit, held_out)
+    scores = [part.scores - fit.prior_score / part.scores.size for part in (fitted, other)]
     both = np.concatenate(scores)
-    return Evidence(
-        both + fit.prior_score / both.size,
-        own.residuals + theirs.residuals,
-        own.models + theirs.models,
-        own.points + theirs.points,
-    )
+    return Evidence(both + fit.prior_score / both.size, fitted.flights + other.flights)
 
 
-def _without_shapes(fit: CandidateFit) -> Array:
-    """The information with what only shapes an effect (an onset, an angle) held where the fit put it.
+def _information_without_shapes(fit: CandidateFit) -> Array:
+    """The information with those unknowns held that do not count as uncertain.
 
-    The data of a few windows may say nothing about such a parameter, and a linear step would then lead anywhere.
+    A few windows may contain no information on a parameter that only shapes an effect (an onset, an angle), and a
+    linear step of it would then lead anywhere.
     """
     assert fit.information is not None
-    held = ~fit.loose
-    information = fit.information * np.outer(fit.loose, fit.loose)
+    held = ~fit.uncertain
+    information = fit.information * np.outer(fit.uncertain, fit.uncertain)
     information[held, held] = 1.0
     return np.asarray(information)
 
 
-def held_out_evidence(fit: CandidateFit, models: Sequence[ResidualModel], nuisances: Sequence[Nuisances]) -> Evidence:
-    """Flights that the fit has not seen: its parameters and shared nuisances hold, biases and clocks are their own."""
+def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> Evidence:
+    """Evidence of flights that were not fitted.
+
+    The fit's parameters and shared nuisances are kept; biases and clock offsets are each flight's own and unknown.
+    """
     chosen, shared, _ = fit.sizes
-    known = np.linalg.inv(_without_shapes(fit))[: chosen + shared, : chosen + shared]
+    common = chosen + shared
+    covariance = np.linalg.inv(_information_without_shapes(fit))[:common, :common]
     scores: list[float] = []
-    residuals: list[Complex] = []
-    points: list[tuple[Array, ...]] = []
-    for model, theirs in zip(models, nuisances, strict=True):
-        kept = theirs.without(fit.effects, model.simulator.names, fit.widened)
+    flights: list[FlightEvidence] = []
+    for flight in held_out:
+        model, kept = flight.model, _kept_nuisances(fit, flight)
         point = transferred_parameters(fit, model)
-        power = np.maximum(_train_power(fit, model), model.noise)
+        power = np.maximum(_mean_power(fit, model), model.noise)
         power = np.where(model.axes, power, 1.0)
         weight = weights(model.windows, power)
-        order = [*fit.indices, *_ordered(kept)]
+        order = [*fit.indices, *_shared_first(kept)]
         rows = real_rows(model.residual(point), weight)
         slopes = real_rows(model.slopes(point, order), weight)
-        slopes[..., : chosen + shared] *= fit.loose[: chosen + shared]
-        sigma = np.concatenate([kept.sigma[~kept.shared]])
+        slopes[..., :common] *= fit.uncertain[:common]
         information = np.zeros((len(order), len(order)))
-        information[: chosen + shared, : chosen + shared] = np.linalg.inv(known)
-        information[chosen + shared :, chosen + shared :] = np.diag(sigma**-2.0)
-        for group in window_groups(model):
-            score, _ = _predictive(model, power, power, rows[group], slopes[group], np.zeros(len(order)), information)
-            scores.append(score)
-        residuals.append(model.residual(point))
-        points.append((exported_parameters(fit, point),) * len(window_groups(model)))
-    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(residuals), tuple(models), tuple(points))
+        information[:common, :common] = np.linalg.inv(covariance)
+        information[common:, common:] = np.diag(kept.sigma[~kept.shared] ** -2.0)
+        groups = window_groups(model)
+        for group in groups:
+            part = _Group(model, power, rows[group], slopes[group])
+            scores.append(_predictive(part, power, np.zeros(len(order)), information)[0])
+        exported = exported_parameters(fit, point)
+        flights.append(FlightEvidence(model, model.residual(point), (exported,) * len(groups)))
+    return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(flights))
 
 
-def _ordered(nuisances: Nuisances) -> list[int]:
-    """Indices of the shared ones, then of the flight's own."""
+def _shared_first(nuisances: Nuisances) -> list[int]:
+    """Indices of the shared nuisance parameters, then of the flight's own."""
     indices = np.array(nuisances.indices)
     return [*indices[nuisances.shared].tolist(), *indices[~nuisances.shared].tolist()]
 
 
+def _kept_nuisances(fit: CandidateFit, flight: HeldOutFlight) -> Nuisances:
+    """A flight's nuisance parameters without those that the fit's candidates are or replace."""
+    return flight.nuisances.without(fit.effects, flight.model.simulator.names, fit.widened)
+
+
 def transferred_parameters(fit: CandidateFit, model: ResidualModel) -> Array:
-    """The parameters of a flight not seen: what is shared from the fit, its own nuisances neutral."""
+    """Parameters (P,) of a flight that was not fitted: what is shared from the fit, its own nuisances neutral."""
     point = model.simulator.neutral()
     shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-    transferred_parameters = [*fit.indices, *shared]
-    point[transferred_parameters] = fit.points[0][transferred_parameters]
+    transferred = [*fit.indices, *shared]
+    point[transferred] = fit.flights[0].point[transferred]
     return np.asarray(point)
 
 
-def fit_on_other_flight(fit: CandidateFit, model: ResidualModel, nuisances: Nuisances) -> CandidateFit:
-    """The fit as it stands on a flight that it has not seen, all unknowns and their priors about there."""
-    kept = nuisances.without(fit.effects, model.simulator.names, fit.widened)
-    point = transferred_parameters(fit, model)
+def fit_on_other_flight(fit: CandidateFit, flight: HeldOutFlight) -> CandidateFit:
+    """The fit as it stands on a flight that it has not seen, linearised there; nothing is fitted anew."""
+    model, point = flight.model, transferred_parameters(fit, flight.model)
     power = residual_power(model, model.residual(point))
-    return linearised(replace(fit, models=(model,), nuisances=kept, points=(point,), power=(power,)))
+    there = FlightFit(model, _kept_nuisances(fit, flight), point, power)
+    return linearised(replace(fit, flights=(there,)))
 
 
 def exported_parameters(fit: CandidateFit, point: Array) -> Array:
-    """The parameters (P,) of the model that is handed on: the nuisances neutral but for the derivatives' errors."""
-    simulator, kept = fit.models[0].simulator, point.copy()
-    own = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != DERIVATIVE_ERROR]
-    kept[own] = simulator.neutral()[own]
+    """Parameters (P,) of the model that is handed on: the nuisances neutral, except the derivatives' errors."""
+    simulator, kept = fit.simulator, point.copy()
+    recording = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != DERIVATIVE_ERROR]
+    kept[recording] = simulator.neutral()[recording]
     return np.asarray(kept)
 
 
-def _train_power(fit: CandidateFit, model: ResidualModel) -> Array:
-    """Mean residual power of the flights fitted, at the lines of another."""
+def _mean_power(fit: CandidateFit, model: ResidualModel) -> Array:
+    """Mean residual power (L, 12) of the flights fitted, at the lines of another flight."""
     lines = model.windows.frequencies
     total = np.zeros((lines.size, len(CHANNELS)))
-    for known, power in zip(fit.models, fit.power, strict=True):
-        own = known.windows.frequencies
-        total += np.column_stack([np.interp(lines, own, power[:, axis]) for axis in range(len(CHANNELS))])
-    return np.asarray(total / len(fit.models))
+    for flight in fit.flights:
+        fitted_lines = flight.model.windows.frequencies
+        columns = [np.interp(lines, fitted_lines, flight.power[:, axis]) for axis in range(len(CHANNELS))]
+        total += np.column_stack(columns)
+    return np.asarray(total / len(fit.flights))
 
 
-def _predictive(
-    model: ResidualModel, power: Array, own_power: Array, rows: Array, slopes: Array, step: Array, information: Array
-) -> tuple[float, Complex]:
-    """Log probability of a group's rows, and its residual (w, L, 12), after a step of the unknowns.
+@dataclass(frozen=True)
+class _Group:
+    """A group of w windows: rows (w, R) and slopes (w, R, unknowns), both weighted by ``power`` (L, 12)."""
 
-    The rows are weighted by ``power``; the probability is that of ``own_power``.
+    model: ResidualModel
+    power: Array
+    rows: Array
+    slopes: Array
+
+
+def _predictive(group: _Group, power: Array, step: Array, information: Array) -> tuple[float, Complex]:
+    """Log predictive density of a group, and its residual (w, L, 12), after a step (unknowns,) of the unknowns.
+
+    ``power`` (L, 12) is that of the noise; ``information`` that of the unknowns before the group is seen.
     """
-    change = rows - slopes @ step
-    parts = change.reshape(rows.shape[0], 2, -1, len(CHANNELS))
-    scale = np.sqrt(power / own_power)
+    change = group.rows - group.slopes @ step
+    windows, unknowns = group.rows.shape[0], group.slopes.shape[2]
+    parts = change.reshape(windows, 2, -1, len(CHANNELS))
+    scale = np.sqrt(group.power / power)
     scaled = (parts * scale).ravel()
-    J = (slopes.reshape(rows.shape[0], 2, -1, len(CHANNELS), slopes.shape[2]) * scale[..., None]).reshape(
-        -1, slopes.shape[2]
-    )
+    J = (group.slopes.reshape(*parts.shape, unknowns) * scale[..., None]).reshape(-1, unknowns)
     gained, right = information + J.T @ J, J.T @ scaled
     _, before = np.linalg.slogdet(information)
     _, after = np.linalg.slogdet(gained)
-    lines = np.ones(power.shape[0])
+    lines = np.ones(group.power.shape[0])
     lines[0] = 0.5
-    spread = INDEPENDENT_SHARE * rows.shape[0] * float(np.sum(lines[:, None] * np.log(own_power) * model.axes))
+    spread = INDEPENDENT_SHARE * windows * float(np.sum(lines[:, None] * np.log(power) * group.model.axes))
     score = -spread - 0.5 * float(scaled @ scaled) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
-    return score, amplitudes(change, weights(model.windows, power))
+    return score, amplitudes(change, weights(group.model.windows, group.power))
 
 
 def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:

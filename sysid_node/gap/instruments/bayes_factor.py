@@ -1,41 +1,42 @@
-"""Evidence that no gust can give: how much better an explanation accounts for what the commands foretell.
+"""Log Bayes factor of two explanations under a likelihood that gusts cannot influence.
 
-Air that turns is in every flight and obeys the same law in each. So what merely answers to gusts as the aircraft does
-(a mode that rings, other moments of inertia) predicts flight held out as well, and all the better the longer it is. Of
-what the commands foretell it explains nothing. Air data and attitude, predicted from the inertial instruments, know no
-such air and count whole. The sum of squares of the instruments' equations
-(``structure``) stands for minus twice a log likelihood (Kim (2002), Journal of Econometrics 107(1): the limited
-information likelihood), unknowns within their limits, and Laplace's approximation makes it evidence.
+Rotating air is in every flight and obeys the same law in each. An effect that only changes how the aircraft answers
+gusts (a structural mode, other moments of inertia) therefore predicts flights held out as well, and the better the
+longer they are. It explains nothing of what is coherent with the commands, however. Air data and attitude are predicted
+from the inertial instruments, which contain no such air, and count whole.
+
+The sum of squares of the moment equations stands for minus twice a log likelihood (the limited-information likelihood:
+Kim (2002), Journal of Econometrics 107(1)), with the unknowns within their limits, and Laplace's approximation makes it
+the log evidence.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit
-from sysid_node.gap.instruments.overidentification import (
-    command_instruments,
-    limited_step,
-    moment_equations,
-    overidentification_of,
-    prior_terms,
-)
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
+from sysid_node.gap.instruments.gust_free_signals import command_instruments
+from sysid_node.gap.instruments.moment_equations import limited_step, moment_equations, prior_terms
+from sysid_node.gap.instruments.overidentification import overidentification_of
 
 
 def log_bayes_factor(fit: CandidateFit, other: CandidateFit) -> float:
-    """Nats by which a fit accounts better than another for what commands foretell, in the noise that it leaves.
+    """Nats by which a fit explains better than another what is coherent with the commands.
 
-    What stays beyond chance counts as noise by channel: a model that is not exact knows no better than it predicts
-    (quasi-likelihood: Burnham & Anderson (2002), Model Selection, sect. 2.5).
+    The noise is that which the first fit leaves; by channel it includes what stays coherent beyond chance, because a
+    model that is not exact is no more certain than it predicts (quasi-likelihood: Burnham & Anderson (2002), Model
+    Selection and Multimodel Inference, sect. 2.5).
     """
     left = overidentification_of(fit)
     scatter = 1.0 + left.coherent / (0.5 * left.chance**2)
-    powers = tuple(power * scatter for power in fit.power)
-    return _evidence(fit, powers) - _evidence(other, powers)
+    powers = tuple(power * scatter for power in fit.powers)
+    return _log_evidence(fit, powers) - _log_evidence(other, powers)
 
 
-def _evidence(fit: CandidateFit, powers: tuple[Array, ...]) -> float:
+def _log_evidence(fit: CandidateFit, powers: Sequence[Array]) -> float:
     """Log evidence, up to a constant, in noise of these powers (L, 12) by flight."""
     seen = moment_equations(fit, powers, command_instruments, whole=True)
     step = limited_step(seen, fit)

@@ -8,9 +8,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.nuisances import is_gusty
 from sysid_node.gap.flightdata.manoeuvre_window import step_changes
-from sysid_node.gap.residuals.air_motion import with_longest_memory
+from sysid_node.gap.residuals.air_motion import is_gusty, with_longest_memory
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.candidates import prior
+from sysid_node.gap.residuals.parameter_priors import prior
 from sysid_node.gap.residuals.residual_model import (
     CHANNELS,
     COEFFICIENTS,
@@ -21,6 +21,7 @@ from sysid_node.gap.residuals.residual_model import (
     ResidualModel,
     kinematic_parameters,
 )
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Shortest memory of the observer of the air, s.
 _SHORTEST = 0.15
@@ -53,6 +54,11 @@ def gust_speed(model: ResidualModel, theta: Array) -> float:
     if model.axes[airspeed]:
         return float(np.sqrt(_beyond_noise(calm, theta, np.array([airspeed])).mean()))
     return 0.0
+
+
+def is_gusty(model: ResidualModel) -> bool:
+    """Whether the air moves across the flight path by enough to count."""
+    return bool(model.gusts >= THRESHOLDS.priors.gusty * model.record["V"].mean())
 
 
 def _beyond_noise(calm: ResidualModel, theta: Array, channels: NDArray[np.intp]) -> Array:

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.estimation.nuisances import is_gusty
 from sysid_node.gap.flightdata import flow_angles, thrust
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
-from sysid_node.gap.residuals.air_motion import best_instrument_parameters, gust_speed, observer_memory
+from sysid_node.gap.residuals.air_motion import best_instrument_parameters, gust_speed, is_gusty, observer_memory
 from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
 from sysid_node.gap.residuals.residual_model import (
     CHANNELS,

@@ -5,19 +5,17 @@ Significant is not enough: a clock's odd millisecond is real, and trifling.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
 from sysid_node.gap.estimation.candidates import TIME_EFFECTS
-from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, with_candidates
-from sysid_node.gap.estimation.nuisances import is_gusty
 from sysid_node.gap.estimation.predictive_density import Evidence, probabilities
+from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.instruments.overidentification import overidentification_of
+from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.candidate_fitter import FittedSet
@@ -59,7 +57,7 @@ def _matters(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
 
 def _matters_in_gusts(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
     """The same, of forces and moments by what of the remainder is structure: the rest is weather."""
-    before, after = overidentification_of(without.fit, trial.fit), overidentification_of(trial.fit)
+    before, after = overidentification_of(without.fit, trial.fit.powers), overidentification_of(trial.fit)
     scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
     gone = before.coherent - after.coherent
     structured = (gone > THRESHOLDS.acceptance.share_of_remainder * before.coherent) & (
@@ -80,12 +78,14 @@ def _shifts(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
 
 def _power_of_means(evidence: Evidence) -> Array:
     """Power (12,) of the flights' means of what is left, as ``spectra.power_of`` counts it."""
-    return np.asarray(sum(0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in evidence.residuals))
+    return np.asarray(
+        sum(0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in (f.residual for f in evidence.flights))
+    )
 
 
 def _motion(trial: FittedSet) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
-    return np.asarray(sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in trial.evidence.models))
+    return np.asarray(sum((np.abs(f.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for f in trial.evidence.flights))
 
 
 def _in_gusts(trial: FittedSet) -> bool:
@@ -99,18 +99,18 @@ def _contributed(base: FittedSet, without: FittedSet, trial: FittedSet) -> Array
     twice as long for an engine half as strong. Where the others alone grow without end, so does what comes back.
     """
     kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
-    lacking = replace(with_candidates(trial.fit, kept, base.fit.nuisances, ()), power=without.fit.power)
+    lacking = with_candidates(trial.fit, kept, base.fit.nuisances, ()).with_powers(without.fit.powers)
     try:
-        points = VariableProjection(lacking).points(lacking.values)
+        lacking = lacking.at(VariableProjection(lacking).points(lacking.values))
     except np.linalg.LinAlgError:
         return np.full(len(CHANNELS), np.inf)
-    back, now, whole = (_powers(trial.fit, some) for some in (points, trial.fit.points, base.fit.points))
+    back, now, whole = (_powers(fit) for fit in (lacking, trial.fit, base.fit))
     return np.asarray(np.max((back - now) / np.maximum(whole, 1e-300), axis=0))
 
 
-def _powers(fit: CandidateFit, points: Sequence[Array]) -> Array:
-    """Power (2, 12) that parameters leave of the flights, and without the means, beside which all else may be small."""
-    residuals = [model.residual(point) for model, point in zip(fit.models, points, strict=True)]
+def _powers(fit: CandidateFit) -> Array:
+    """Power (2, 12) that a fit leaves of the flights, and without the means, beside which all else may be small."""
+    residuals = [flight.residual for flight in fit.flights]
     swinging = [np.concatenate([0.0 * r[:, :1], r[:, 1:]], axis=1) for r in residuals]
     return np.array([sum(power_of(r) for r in some) for some in (residuals, swinging)])
 
@@ -119,10 +119,10 @@ def _trifling(trial: FittedSet) -> bool:
     """Whether what was added is a time within one sample of the slowest topic: a matter of sampling."""
     if trial.added is None or trial.added.effect not in TIME_EFFECTS:
         return False
-    slowest = min(min(v.flight.actuator_rate, v.flight.air_rate) for v in trial.fit.models)
-    return bool(abs(trial.fit.points[0][trial.added.indices[0]]) < 1.0 / slowest)
+    slowest = min(min(m.flight.actuator_rate, m.flight.air_rate) for m in trial.fit.models)
+    return bool(abs(trial.fit.flights[0].point[trial.added.indices[0]]) < 1.0 / slowest)
 
 
 def power_left(evidence: Evidence) -> Array:
     """Power (12,) of what is left on flight not fitted."""
-    return np.asarray(sum(power_of(r) for r in evidence.residuals))
+    return np.asarray(sum(power_of(flight.residual) for flight in evidence.flights))

@@ -11,12 +11,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate, bounds
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
+from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, with_candidates
-from sysid_node.gap.estimation.nuisances import Nuisances
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import Evidence, competing_evidence
-from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.gap.selection.onset import search_onset
 from sysid_node.gap.thresholds import THRESHOLDS
 
@@ -44,8 +45,7 @@ class CandidateFitter:
 
     nuisances: Nuisances
     checkpoint: Checkpoint
-    holdouts: Sequence[ResidualModel] = ()  # flights held out, and what is allowed for in each
-    holdout_nuisances: Sequence[Nuisances] = ()
+    held_out: Sequence[HeldOutFlight] = ()
     fitted: dict[frozenset[str], FittedSet] = field(default_factory=dict)  # by the labels of the set
     screened: dict[frozenset[str], dict[str, Screened]] = field(default_factory=dict)  # upon such a set, by label
 
@@ -55,10 +55,10 @@ class CandidateFitter:
         wanted = [*candidates, *([added] if added else [])]
         labels = frozenset(c.label for c in wanted)
         if labels not in self.fitted:
-            done = self.checkpoint.polished(with_candidates(fit, wanted, self.nuisances, start))
+            done = self.checkpoint.converged(with_candidates(fit, wanted, self.nuisances, start))
             if added is not None and (moved := search_onset(done, added)) is not done:
-                done = self.checkpoint.polished(moved)
-            self.fitted[labels] = FittedSet(done, competing_evidence(done, self.holdouts, self.holdout_nuisances))
+                done = self.checkpoint.converged(moved)
+            self.fitted[labels] = FittedSet(done, competing_evidence(done, self.held_out))
         return replace(self.fitted[labels], added=added)
 
     def screen(self, current: FittedSet, candidates: Sequence[Candidate], progress: Progress) -> list[Screened]:
@@ -183,12 +183,12 @@ def _first_look(fit: CandidateFit, problem: VariableProjection, candidate: Candi
         widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
         problem = VariableProjection(widened)
         return problem.deviance(problem.residual(widened.values)), candidate, ()
-    low, high = bounds(fit.models[0].simulator, (*fit.indices, *candidate.indices))
+    low, high = bounds(fit.simulator, (*fit.indices, *candidate.indices))
     best: Screened = (np.inf, candidate, candidate.starts[0])
-    look = problem.looking(candidate)
+    look = problem.with_candidate(candidate)
     for start in candidate.starts:
         values = np.concatenate([fit.values, start])
-        rows = look.ahead(values)
+        rows = look.residual_and_slopes(values)
         step = np.linalg.lstsq(look.jacobian(values), -rows, rcond=None)[0]
         stepped = np.clip(values + step, low, high)
         for there, left in ((values, rows), (stepped, look.residual(stepped))):

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.estimation.fit import CandidateFit
 from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import accepted, power_left

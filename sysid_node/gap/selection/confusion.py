@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
+from sysid_node.gap.estimation.spectral_weights import real_rows
 from sysid_node.gap.selection.candidate_fitter import FittedSet
 
 
@@ -31,7 +32,7 @@ def confusion_of(base: FittedSet, trials: Sequence[FittedSet]) -> Confusion:
 def _rows(fit: CandidateFit, like: CandidateFit) -> Array:
     """What a fit leaves, weighted as another's remainder."""
     pieces = [
-        real_rows(model.residual(point), weights(model.windows, power)).ravel()
-        for model, point, power in zip(fit.models, fit.points, like.power, strict=True)
+        real_rows(flight.residual, weighted.weights).ravel()
+        for flight, weighted in zip(fit.flights, like.flights, strict=True)
     ]
     return np.concatenate(pieces)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.fit import CandidateFit, linearised, unfitted
-from sysid_node.gap.estimation.nuisances import Nuisances
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import (
@@ -47,11 +47,8 @@ class Attribution:
     doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
     ranking: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
     first_stage: tuple[FittedSet, ...] = field(default=())  # of the first stage
-    holdouts: tuple[ResidualModel, ...] = ()  # flights held out, and what is allowed for in each
-    holdout_nuisances: tuple[Nuisances, ...] = ()
-    size_source: CandidateFit | None = (
-        None  # what the sizes are from, where the corrected fit has the file's derivatives
-    )
+    held_out: tuple[HeldOutFlight, ...] = ()
+    size_source: CandidateFit | None = None  # of the sizes, where the corrected fit has the file's derivatives
 
     @property
     def keeps_file_derivatives(self) -> bool:
@@ -65,16 +62,16 @@ class Attribution:
 
     def as_in_file(self) -> Attribution:
         """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
-        neutral = tuple(model.simulator.neutral() for model in self.base.fit.models)
-        return replace(self, corrected=linearised(replace(self.base.fit, points=neutral)))
+        neutral = [model.simulator.neutral() for model in self.base.fit.models]
+        return replace(self, corrected=linearised(self.base.fit.at(neutral)))
 
     def with_file_derivatives(self) -> Attribution:
         """The causes beside the file's own derivatives: where those that were fitted predict worse."""
-        fit, neutral = self.corrected, self.corrected.models[0].simulator.neutral()
-        own, points = [*fit.indices, *fit.widened], tuple(neutral.copy() for _ in fit.points)
-        for point, found in zip(points, fit.points, strict=True):
-            point[own] = found[own]
-        moved = replace(linearised(replace(fit, points=points)), information=fit.information)
+        fit, neutral = self.corrected, self.corrected.simulator.neutral()
+        own, points = [*fit.indices, *fit.widened], [neutral.copy() for _ in fit.flights]
+        for point, flight in zip(points, fit.flights, strict=True):
+            point[own] = flight.point[own]
+        moved = replace(linearised(fit.at(points)), information=fit.information)
         return replace(self, corrected=moved, size_source=fit)
 
     def by_least_squares(self) -> Attribution:
@@ -90,7 +87,7 @@ class Attribution:
             chosen=weakest.without,
             corrected=liml_estimate(fit),
             size_source=None,
-            structure_left=pooled_overidentification(fit, self.holdouts, self.holdout_nuisances),
+            structure_left=pooled_overidentification(fit, self.held_out),
             causes=causes,
         )
 
@@ -102,7 +99,7 @@ class Attribution:
             chosen=self.base,
             corrected=corrected,
             size_source=None,
-            structure_left=pooled_overidentification(self.base.fit, self.holdouts, self.holdout_nuisances),
+            structure_left=pooled_overidentification(self.base.fit, self.held_out),
             causes=(),
         )
 
@@ -112,14 +109,11 @@ def attribute(
     nuisances: Nuisances,
     progress: Progress,
     steps: Checkpoint | None = None,
-    unseen: Sequence[ResidualModel] = (),
-    own: Sequence[Nuisances] = (),
+    held_out: Sequence[HeldOutFlight] = (),
 ) -> Attribution:
-    """Fits everything that has to be, and chooses; flights held out, with ``own`` nuisances, have a say but no fit."""
-    candidates, fitter = (
-        candidates_of(models[0].simulator, models),
-        CandidateFitter(nuisances, steps or Checkpoint(), unseen, own),
-    )
+    """Fits everything that has to be, and chooses; flights held out have a say but no fit."""
+    candidates = candidates_of(models[0].simulator, models)
+    fitter = CandidateFitter(nuisances, steps or Checkpoint(), held_out)
     progress(0.0, "derivatives within their tolerances")
     base = fitter.fit_set(unfitted(models, nuisances), [])
     chosen, stages, frontier = base, [], [base]
@@ -135,10 +129,10 @@ def attribute(
     progress(0.8, "whether another effect would do as well")
     late = [candidate for candidate in candidates if candidate.effect in RESPONSE_DELAYS]
     chosen, causes, doubted = select_causes(fitter, base, chosen, stages, late)
-    before, left = overidentification_of(base.fit, chosen.fit), pooled_overidentification(chosen.fit, unseen, own)
+    before, left = overidentification_of(base.fit, chosen.fit.powers), pooled_overidentification(chosen.fit, held_out)
     ranked, corrected = _ranked(base, stages[0]), liml_estimate(chosen.fit)
     found = Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
-    return replace(found, holdouts=tuple(unseen), holdout_nuisances=tuple(own))
+    return replace(found, held_out=tuple(held_out))
 
 
 def _share_of(progress: Progress, count: int) -> Progress:

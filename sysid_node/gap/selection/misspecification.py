@@ -14,8 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
+from sysid_node.gap.estimation.spectral_weights import real_rows
+from sysid_node.gap.instruments.moment_equations import weights_without_mean
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 
@@ -36,12 +38,12 @@ def misspecification_of(fit: CandidateFit, candidate: Candidate) -> Misspecifica
     """Of one of a fit's candidates, over its flights, all its unknowns left free to move."""
     done, found, size = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     assert fit.information is not None
-    for model, point, power, rows, slopes in zip(fit.models, fit.points, fit.power, fit.rows, fit.slopes, strict=True):
-        weight = weights(model.windows, power)
-        weight[[0, model.windows.frequencies.size]] = 0.0  # without means
-        parts = rows.reshape(rows.shape[0], -1, len(CHANNELS))
+    for flight in fit.flights:
+        model, slopes = flight.model, flight.slopes
+        weight = weights_without_mean(model, flight.power)
+        parts = flight.rows.reshape(flight.rows.shape[0], -1, len(CHANNELS))
         unknowns = slopes.reshape(*parts.shape, slopes.shape[2])
-        contribution = _contribution(model, point, candidate)
+        contribution = _contribution(model, flight.point, candidate)
         for axis in np.flatnonzero(model.axes & (contribution.std(axis=0) > 0.0)):
             own, kept = contribution[:, axis], (weight[:, axis] > 0.0)
             whole, *added = (_rows(model, x, weight[:, axis]) for x in (own, *_modulated(own, model.record.time)))

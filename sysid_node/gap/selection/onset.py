@@ -6,15 +6,16 @@ tried, the effect's size anew for each, first coarsely, then finely about the be
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.candidates import Candidate, bounds
-from sysid_node.gap.estimation.fit import CandidateFit, VariableProjection, linearised
-from sysid_node.gap.estimation.nuisances import is_gusty
-from sysid_node.gap.instruments.overidentification import command_instruments, limited_step, moment_equations
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised
+from sysid_node.gap.estimation.candidates import Candidate
+from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.instruments.gust_free_signals import command_instruments
+from sysid_node.gap.instruments.moment_equations import limited_step, moment_equations
+from sysid_node.gap.residuals.air_motion import is_gusty
+from sysid_node.gap.residuals.parameter_priors import bounds
 
 #: Steps between times that are tried, s, and how far about the best the finer ones reach, s.
 _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
@@ -25,7 +26,7 @@ _GRAIN = 0.5
 
 def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     """The fit with the onset of one of its candidates where it leaves least; as it was where that is best."""
-    names = fit.models[0].simulator.names
+    names = fit.simulator.names
     places = [fit.indices.index(i) for i in candidate.indices if names[i].endswith(".onset")]
     if not places:
         return fit
@@ -37,10 +38,10 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     values = best[1]
     if values is fit.values:
         return fit
-    points = tuple(point.copy() for point in fit.points)
+    points = [flight.point.copy() for flight in fit.flights]
     for point in points:
         point[list(fit.indices)] = values
-    return replace(fit, points=points)
+    return fit.at(points)
 
 
 def onset_uncertainty(fit: CandidateFit, place: int) -> float:
@@ -63,11 +64,11 @@ def onset_uncertainty(fit: CandidateFit, place: int) -> float:
 
 def _foretold(fit: CandidateFit, place: int, time: float) -> float:
     """What of the remainder the commands foretell with an onset at a time, all else at its best, in noise levels."""
-    points = tuple(point.copy() for point in fit.points)
+    points = [flight.point.copy() for flight in fit.flights]
     for point in points:
         point[fit.indices[place]] = time
-    there = linearised(replace(fit, points=points))
-    seen = moment_equations(there, fit.power, command_instruments)
+    there = linearised(fit.at(points))
+    seen = moment_equations(there, fit.powers, command_instruments)
     step = limited_step(seen, there)
     return float(seen.constant - 2.0 * seen.right @ step + step @ seen.information @ step)
 
@@ -84,7 +85,7 @@ def _at(problem: VariableProjection, values: Array, place: int, time: float) -> 
     there[place] = time
     slopes = problem.jacobian(there)
     slopes[:, place] = 0.0
-    low, high = bounds(problem.fit.models[0].simulator, problem.indices)
+    low, high = bounds(problem.fit.simulator, problem.indices)
     stepped = np.clip(there + np.linalg.lstsq(slopes, -problem.residual(there), rcond=None)[0], low, high)
     stepped[place] = time
     return min(((problem.deviance(problem.residual(v)), v) for v in (there, stepped)), key=lambda pair: pair[0])

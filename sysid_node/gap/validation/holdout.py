@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sysid_node.gap.estimation.nuisances import Nuisances
-from sysid_node.gap.estimation.predictive_density import Evidence, held_out_evidence, window_groups
+from sysid_node.gap.estimation.nuisances import HeldOutFlight
+from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, held_out_evidence
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import OveridentificationTest
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -23,13 +23,17 @@ from sysid_node.gap.validation.spectral_error import Gap
 
 @dataclass(frozen=True)
 class Check:
-    """Evidence of the derivatives alone and of the whole explanation, and the gap, on ``models``."""
+    """Evidence of the derivatives alone and of the whole explanation, and the gap, on the same flights."""
 
-    models: tuple[ResidualModel, ...]
     base: Evidence
     final: Evidence
     gap: Gap  # of forces, moments and kinematics by frequency
     weather_suffices: bool = False  # whether weather and sensors' noise are all of it
+
+    @property
+    def models(self) -> tuple[ResidualModel, ...]:
+        """The flights' residual models."""
+        return tuple(flight.model for flight in self.base.flights)
 
     @cached_property
     def simulation_gap(self) -> Gap | None:
@@ -43,30 +47,26 @@ class Check:
 
     def as_in_file(self, left: OveridentificationTest) -> Check:
         """The same of the aircraft file as it is."""
-        before = tuple(v.residual(v.simulator.neutral()) for v in self.models)
-        filed = tuple((v.simulator.neutral(),) * len(window_groups(v)) for v in self.models)
-        base = replace(self.base, residuals=before, points=filed)
-        return replace(self, base=base, final=base, gap=spectral_error.gap_of(self.models, before, base, base, left))
+        filed = (FlightEvidence.throughout(model, model.simulator.neutral()) for model in self.models)
+        base = replace(self.base, flights=tuple(filed))
+        return replace(self, base=base, final=base, gap=spectral_error.gap_of(base, base, left))
 
 
-def check(attribution: Attribution, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]) -> Check:
+def check(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> Check:
     """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
-    if unseen:
-        base, final = (
-            held_out_evidence(f, unseen, own) for f in (liml_estimate(attribution.base.fit), attribution.corrected)
-        )
+    if held_out:
+        fits = liml_estimate(attribution.base.fit), attribution.corrected
+        base, final = (held_out_evidence(fit, held_out) for fit in fits)
     else:
         base = kfold_evidence(attribution.base.evidence, liml_estimate(attribution.base.fit))
         final = kfold_evidence(
             attribution.chosen.evidence, attribution.corrected, filed=attribution.keeps_file_derivatives
         )
-    models = base.models
-    before = [v.residual(v.simulator.neutral()) for v in models]
-    return Check(models, base, final, spectral_error.gap_of(models, before, base, final, attribution.structure_left))
+    return Check(base, final, spectral_error.gap_of(base, final, attribution.structure_left))
 
 
 def validate(
-    attribution: Attribution, models: Sequence[ResidualModel], unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
+    attribution: Attribution, models: Sequence[ResidualModel], held_out: Sequence[HeldOutFlight]
 ) -> tuple[Attribution, Check]:
     """What flight not fitted leaves of an explanation.
 
@@ -76,12 +76,12 @@ def validate(
     frequency.)
     """
     with ThreadPoolExecutor(1) as pool:
-        weather = pool.submit(weather_suffices, [*models, *unseen])
-        attribution, checked = _standing(attribution, unseen, own)
+        weather = pool.submit(weather_suffices, [*models, *(flight.model for flight in held_out)])
+        attribution, checked = _standing(attribution, held_out)
     if weather.result():
         attribution = attribution.without_causes().as_in_file()
         return attribution, replace(
-            check(attribution, unseen, own).as_in_file(attribution.structure_left), weather_suffices=True
+            check(attribution, held_out).as_in_file(attribution.structure_left), weather_suffices=True
         )
     if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
         attribution = attribution.as_in_file()
@@ -89,9 +89,7 @@ def validate(
     return attribution, checked
 
 
-def _standing(
-    attribution: Attribution, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
-) -> tuple[Attribution, Check]:
+def _standing(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> tuple[Attribution, Check]:
     """What of an explanation stands, and what flight not fitted says of it.
 
     The first that predicts better: all causes; the same with sizes as least squares has them; without the least
@@ -100,15 +98,15 @@ def _standing(
     """
     for explanation in _explanations(attribution):
         try:
-            found = explanation, check(explanation, unseen, own)
+            found = explanation, check(explanation, held_out)
         except np.linalg.LinAlgError:
             continue
         if any(g.tolerances > g.before for g in found[1].gaps):
-            found = _beside_the_file(*found, unseen, own)
+            found = _beside_the_file(*found, held_out)
         if _better(found[1]):
             return found
     bare = attribution.without_causes()
-    return bare, check(bare, unseen, own)
+    return bare, check(bare, held_out)
 
 
 def _explanations(attribution: Attribution) -> Iterator[Attribution]:
@@ -127,19 +125,16 @@ def _better(checked: Check) -> bool:
 
 
 def _beside_the_file(
-    attribution: Attribution, checked: Check, unseen: Sequence[ResidualModel], own: Sequence[Nuisances]
+    attribution: Attribution, checked: Check, held_out: Sequence[HeldOutFlight]
 ) -> tuple[Attribution, Check]:
     """The causes beside the file's own derivatives, where these do better than the derivatives that were fitted."""
     explanation = attribution.with_file_derivatives()
     try:
-        found = check(explanation, unseen, own)
+        found = check(explanation, held_out)
     except np.linalg.LinAlgError:
         return attribution, checked
     if not found.gaps[-1].after < checked.gaps[-1].after:
         return attribution, checked
-    before, filed = (
-        [v.residual(v.simulator.neutral()) for v in found.models],
-        found.as_in_file(attribution.structure_left),
-    )
-    gap = spectral_error.gap_of(found.models, before, filed.base, found.final, attribution.structure_left)
+    filed = found.as_in_file(attribution.structure_left)
+    gap = spectral_error.gap_of(filed.base, found.final, attribution.structure_left)
     return explanation, replace(found, base=replace(filed.base, scores=found.base.scores), gap=gap)

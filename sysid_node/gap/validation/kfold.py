@@ -14,10 +14,18 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit, amplitudes, bounded_least_squares, step_limits, stepped, weights
-from sysid_node.gap.estimation.predictive_density import Evidence, exported_parameters, window_groups, with_neighbours
+from sysid_node.gap.estimation.bounded_least_squares import bounded_least_squares
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, step_limits, stepped
+from sysid_node.gap.estimation.predictive_density import (
+    Evidence,
+    FlightEvidence,
+    exported_parameters,
+    window_groups,
+    with_neighbours,
+)
+from sysid_node.gap.estimation.spectral_weights import amplitudes
 from sysid_node.gap.instruments.liml import at_least_prior, moment_weights
-from sysid_node.gap.instruments.overidentification import prior_terms
+from sysid_node.gap.instruments.moment_equations import prior_terms
 
 
 def kfold_evidence(evidence: Evidence, fit: CandidateFit, *, filed: bool = False) -> Evidence:
@@ -25,23 +33,23 @@ def kfold_evidence(evidence: Evidence, fit: CandidateFit, *, filed: bool = False
 
     ``filed``: nuisances stay where they are. The scores stay: they compare explanations of the same flights.
     """
-    residuals, points = [], []
-    for i, (model, steps) in enumerate(zip(fit.models, _steps(fit, filed=filed), strict=True)):
-        weight = weights(model.windows, fit.power[i])
-        unseen = amplitudes(fit.rows[i], weight)
-        for group, step in zip(window_groups(model), steps, strict=True):
-            unseen[group] = amplitudes(fit.rows[i][group] - fit.slopes[i][group] @ step, weight)
-        residuals.append(unseen)
-        points.append(tuple(exported_parameters(fit, stepped(fit, step).points[i]) for step in steps))
-    return replace(evidence, residuals=tuple(residuals), points=tuple(points))
+    flights = []
+    for number, (flight, steps) in enumerate(zip(fit.flights, _steps(fit, filed=filed), strict=True)):
+        residual = amplitudes(flight.rows, flight.weights)
+        for group, step in zip(window_groups(flight.model), steps, strict=True):
+            residual[group] = amplitudes(flight.rows[group] - flight.slopes[group] @ step, flight.weights)
+        points = tuple(exported_parameters(fit, stepped(fit, step).flights[number].point) for step in steps)
+        flights.append(FlightEvidence(flight.model, residual, points))
+    return replace(evidence, flights=tuple(flights))
 
 
 def _steps(fit: CandidateFit, *, filed: bool) -> Iterator[list[Array]]:
     """By flight: the steps (unknowns,) that the unknowns take without each group of windows and its neighbours."""
     known, _ = moment_weights(fit)
     precision, far = prior_terms(fit)
-    matrices = [np.einsum("wru,wrv->wuv", K, J, optimize=True) for K, J in zip(known, fit.slopes, strict=True)]
-    scores = [np.einsum("wru,wr->wu", K, r) for K, r in zip(known, fit.rows, strict=True)]
+    pairs = list(zip(known, fit.flights, strict=True))
+    matrices = [np.einsum("wru,wrv->wuv", K, flight.slopes, optimize=True) for K, flight in pairs]
+    scores = [np.einsum("wru,wr->wu", K, flight.rows) for K, flight in pairs]
     matrix = np.diag(precision) + sum(m.sum(axis=0) for m in matrices)
     score = -precision * far + sum(s.sum(axis=0) for s in scores)
     least, greatest = step_limits(fit)

@@ -56,14 +56,16 @@ def simulation_gap(base: Evidence, final: Evidence) -> Gap | None:
 
     None without attitude, where no flight is long enough, or where the simulator departs within a short flight.
     """
-    found = zip(final.models, base.points, final.points, strict=True)
-    tables = [_table(*parts) for parts in found if can_be_simulated(parts[0])]
+    pairs = list(zip(base.flights, final.flights, strict=True))
+    simulated = [pair for pair in pairs if can_be_simulated(pair[0].model)]
+    tables = [_table(before.model, before.points, after.points) for before, after in simulated]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return None
     motion, noise, *errors = np.concatenate(tables, axis=1)
-    lateral = all(model.flight.lateral for model in final.models)
-    unread = {angle for model in final.models for angle in model.flight.inferred}
-    unread |= thrust.THRUST_READINGS if any(not model.flight.metered for model in final.models) else set()
+    flights = [evidence.model.flight for evidence in final.flights]
+    lateral = all(flight.lateral for flight in flights)
+    unread = {angle for flight in flights for angle in flight.inferred}
+    unread |= thrust.THRUST_READINGS if any(not flight.metered for flight in flights) else set()
     counted = np.array([(lateral or name in _LONGITUDINAL) and name not in unread for name in READINGS])
     counted &= motion.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
     if not counted.any():

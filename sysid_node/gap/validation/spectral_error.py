@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
@@ -42,18 +41,15 @@ class Gap:
     intervals: dict[str, Interval]  # of the four errors, by name
 
 
-def gap_of(
-    models: Sequence[ResidualModel],
-    before: Sequence[Complex],
-    base: Evidence,
-    after: Evidence,
-    left: OveridentificationTest,
-) -> Gap:
-    """The gap on flights not fitted, from their residuals (W, L, 12) as the file has it, then as fitted."""
-    groups = [(i, group) for i, model in enumerate(models) for group in window_groups(model)]
-    measured = np.array([(np.abs(models[i].measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for i, g in groups])
-    noise = np.array([len(g) * (models[i].noise.sum(axis=0) - 0.5 * models[i].noise[0]) for i, g in groups])
-    stages = [_powers(r, groups) for r in (before, base.residuals, after.residuals)]
+def gap_of(base: Evidence, after: Evidence, left: OveridentificationTest) -> Gap:
+    """The gap on flights not fitted: as the aircraft file, the fitted derivatives and the explanation predict them."""
+    models = [flight.model for flight in base.flights]
+    groups = [(model, group) for model in models for group in window_groups(model)]
+    measured = np.array([(np.abs(model.measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for model, g in groups])
+    noise = np.array([len(g) * (model.noise.sum(axis=0) - 0.5 * model.noise[0]) for model, g in groups])
+    before = [model.residual(model.simulator.neutral()) for model in models]
+    fitted = ([flight.residual for flight in evidence.flights] for evidence in (base, after))
+    stages = [_powers(residuals, models) for residuals in (before, *fitted)]
     counted = models[0].axes & (measured.sum(axis=0) > THRESHOLDS.validation.motion * noise.sum(axis=0))
 
     def errors(weight: Array, share: Array) -> Array:
@@ -108,6 +104,7 @@ def shrinkage(errors: Array) -> Array:
     return np.asarray(np.where(open_, 100.0 * ((before - after) / np.where(open_, room, 1.0)), 0.0))
 
 
-def _powers(amplitudes: Sequence[Complex], groups: Sequence[tuple[int, NDArray[np.intp]]]) -> Array:
-    """Power (G, 12) by group."""
-    return np.array([power_of(amplitudes[i][g]) for i, g in groups])
+def _powers(residuals: Sequence[Complex], models: Sequence[ResidualModel]) -> Array:
+    """Power (G, 12) of residuals by group of windows."""
+    pairs = zip(residuals, models, strict=True)
+    return np.array([power_of(residual[group]) for residual, model in pairs for group in window_groups(model)])

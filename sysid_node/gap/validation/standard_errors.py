@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit, onset_places
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, onset_places
 from sysid_node.gap.estimation.predictive_density import window_groups
 from sysid_node.gap.instruments.liml import influence
 from sysid_node.gap.selection.onset import onset_uncertainty

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import BAND_EDGES, Complex, power_of
 from sysid_node.gap.selection.forward_selection import Attribution
@@ -35,9 +35,11 @@ class Shape:
     explained: float  # share of its variance that the bins explain
 
 
-def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str, Any]]:
+def where(attribution: Attribution) -> list[dict[str, Any]]:
     """Shares of the gap by station and axis, adding up to one; the largest first."""
     models = attribution.base.fit.models
+    before = [model.residual(model.simulator.neutral()) for model in models]
+    flights = list(zip(models, before, strict=True))
     scale = sum((np.abs(v.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for v in models)
     powers = [_power(before), *(_power(r) for r in _steps(attribution.corrected))]
     stations = [*(c.station for c in attribution.chosen.fit.candidates), "aerodynamics"]
@@ -51,29 +53,29 @@ def where(attribution: Attribution, before: Sequence[Complex]) -> list[dict[str,
         parts["noise", axis] = float(remainder[axis] * (1.0 - attribution.structure_left.share[axis]))
     total = sum(parts.values()) or 1.0
     kept = sorted(((k, p / total) for k, p in parts.items() if p > 0.0), key=lambda pair: -pair[1])
-    return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(models, before, a)} for (s, a), share in kept]
+    return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(flights, a)} for (s, a), share in kept]
 
 
 def _steps(fit: CandidateFit) -> list[list[Complex]]:
     """Residuals with the effects added to the file's model in turn, then with the nuisances too."""
-    neutral = fit.models[0].simulator.neutral()
-    points, steps = [neutral.copy() for _ in fit.models], []
+    neutral = fit.simulator.neutral()
+    partial, steps = [flight.at(neutral.copy()) for flight in fit.flights], []
     for candidate in fit.candidates:
-        for point, fitted in zip(points, fit.points, strict=True):
+        for flight, fitted in zip(partial, fit.flights, strict=True):
             own = list(candidate.entries)
-            point[own] = fitted[own]
-        steps.append([v.residual(p) for v, p in zip(fit.models, points, strict=True)])
-    return [*steps, [v.residual(p) for v, p in zip(fit.models, fit.points, strict=True)]]
+            flight.point[own] = fitted.point[own]
+        steps.append([flight.residual for flight in partial])
+    return [*steps, [flight.residual for flight in fit.flights]]
 
 
 def _power(residuals: Sequence[Complex]) -> Array:
     return np.asarray(sum(power_of(r) for r in residuals))
 
 
-def _when(models: Sequence[ResidualModel], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
+def _when(flights: Sequence[tuple[ResidualModel, Complex]], axis: int) -> dict[str, Any]:
     """Band, time and regime that hold most of an axis's gap."""
-    longest = int(np.argmax([v.windows.count for v in models]))
-    model, power = models[longest], np.abs(residuals[longest][:, 1:, axis]) ** 2
+    model, residual = max(flights, key=lambda pair: pair[0].windows.count)
+    power = np.abs(residual[:, 1:, axis]) ** 2
     by_line, by_window = power.sum(axis=0), power.sum(axis=1)
     low, high = _smallest(np.bincount(model.windows.bands[1:], by_line, len(BAND_EDGES) - 1).astype(float))
     first, last = _smallest(by_window)
@@ -120,8 +122,8 @@ def missing(attribution: Attribution) -> Shape | None:
         return None
     axis = int(np.argmax(np.where(significant, before.coherent, 0.0)))
     fit = attribution.base.fit
-    model, point = fit.models[0], fit.points[0]
-    remainder = model.series[:, axis] - model.predicted_series(point)[:, axis]
+    model = fit.flights[0].model
+    remainder = model.series[:, axis] - model.predicted_series(fit.flights[0].point)[:, axis]
     shapes = [_binned(model, name, unit, axis, remainder) for name, unit in _signals(model).items()]
     return max(shapes, key=lambda shape: shape.explained)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.fit import CandidateFit
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.nuisances import CLOCKS
 from sysid_node.gap.estimation.predictive_density import Evidence
 from sysid_node.gap.instruments.excitation import externally_excited
@@ -63,7 +63,8 @@ def sampling_power(fit: CandidateFit) -> Array:
     squared sample period. This is no clock error, although it is coherent with the commands.
     """
     left, motion = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
-    for model, point in zip(fit.models, fit.points, strict=True):
+    for fitted in fit.flights:
+        model, point = fitted.model, fitted.point
         rates = np.array([model.flight.actuator_rate, model.flight.air_rate])
         slopes = model.slopes(point, [model.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
         left += sum(power_of(slopes[..., i]) / (12.0 * rate**2) for i, rate in enumerate(rates))
@@ -73,5 +74,5 @@ def sampling_power(fit: CandidateFit) -> Array:
 
 def _motion(evidence: Evidence) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
-    power = sum((np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for model in evidence.models)
+    power = sum((np.abs(flight.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for flight in evidence.flights)
     return np.asarray(np.maximum(power, 1e-300))

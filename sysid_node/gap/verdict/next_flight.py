@@ -19,10 +19,12 @@ from sysid_node.errors import InputError
 from sysid_node.excite.manoeuvre import THROTTLE
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.estimation.candidates import Candidate, prior
-from sysid_node.gap.estimation.fit import CandidateFit, real_rows, weights
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
+from sysid_node.gap.estimation.candidates import Candidate
+from sysid_node.gap.estimation.spectral_weights import real_rows, weights
 from sysid_node.gap.flightdata.gap_flight import resampled
 from sysid_node.gap.residuals.build import residual_model_like
+from sysid_node.gap.residuals.parameter_priors import prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.selection.causes import Cause
@@ -109,14 +111,14 @@ def _confused(cause: Cause) -> list[FittedSet]:
 def propose(fit: CandidateFit, pairs: Sequence[tuple[Candidate, CandidateFit]]) -> Proposal | None:
     """The best of the proposals for pairs of a cause and the fit of its rival; None where none can be flown."""
     model = fit.models[0]
-    flown = min(_separation(model, fit.points[0], *pair, fit) for pair in pairs)
+    flown = min(_separation(model, fit.flights[0].point, *pair, fit) for pair in pairs)
     found: list[Proposal] = []
     for words, shape, width, share, throttle in _PROPOSALS:
         try:
             planned = _flown(model, fit, _specs(model, shape, width, share, throttle))
         except InputError:
             continue  # beyond a limit, or it diverges: not a flight to propose
-        found.append(Proposal(words, min(_separation(planned, fit.points[0], *p, fit) for p in pairs), flown))
+        found.append(Proposal(words, min(_separation(planned, fit.flights[0].point, *p, fit) for p in pairs), flown))
     return max(found, key=lambda proposal: proposal.separation, default=None)
 
 
@@ -147,7 +149,7 @@ def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> Residua
     throttle = simulator.aircraft.throttle
     if THROTTLE in plan.deflections and throttle is not None:
         deflections[:, -1] = (throttle.max_thrust or 1.0) * plan.deflections[THROTTLE][: len(record)]
-    sortie = fly_sortie(simulator, deflections, Conditions(_effects(simulator, fit.points[0]), noise=0.0))
+    sortie = fly_sortie(simulator, deflections, Conditions(_effects(simulator, fit.flights[0].point), noise=0.0))
     outputs = np.asarray(sortie.flight.outputs)
     columns = {name: outputs[:, i] for i, name in enumerate(simulator.outputs)}
     columns |= {name: np.asarray(sortie.flight.commands)[:, i] for i, name in enumerate(_symbols(simulator))}
@@ -178,7 +180,7 @@ def _separation(model: ResidualModel, point: Array, cause: Candidate, rival: Can
     without[own] = neutral[own]
     instead[own] = neutral[own]
     added = [i for i in rival.indices if i not in fit.indices]
-    instead[added] = rival.points[0][added]
+    instead[added] = rival.flights[0].point[added]
     weight = weights(model.windows, np.where(model.axes, model.noise, 1.0))
     response = real_rows(model.predicted(point) - model.predicted(instead), weight).ravel()
     moving = [*added, *(i for i in fit.nuisances.indices if i not in own)]

@@ -36,7 +36,7 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
 def corrected_aircraft(found: Diagnosis) -> Aircraft:
     """The aircraft file with the derivatives as the flights have them, within their tolerances."""
     fit = found.attribution.corrected
-    names, point = fit.models[0].simulator.names, fit.points[0]
+    names, point = fit.simulator.names, fit.flights[0].point
     derivatives = {
         n: replace(d, value=float(d.value + point[names.index(f"derivative_error.{n}")]))
         for n, d in found.aircraft.derivatives.items()
@@ -47,11 +47,11 @@ def corrected_aircraft(found: Diagnosis) -> Aircraft:
 def effect_options(found: Diagnosis) -> list[str]:
     """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
     fit = found.attribution.corrected
-    simulator = fit.models[0].simulator
+    simulator = fit.simulator
     options = []
     for cause in found.attribution.causes:
         indices = cause.candidate.entries
-        pairs = [f"{simulator.parameters[i][1].name}={fit.points[0][i]:.6g}" for i in indices]
+        pairs = [f"{simulator.parameters[i][1].name}={fit.flights[0].point[i]:.6g}" for i in indices]
         if cause.candidate.effect != "derivative_error":
             options.append(":".join([cause.candidate.effect, *pairs]))
     return options

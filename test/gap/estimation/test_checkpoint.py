@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.estimation import checkpoint as module
+from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.fit import unfitted, with_candidates
 from sysid_node.gap.estimation.nuisances import nuisances_of
 
 
@@ -15,11 +14,20 @@ def start(aircraft, plain_model):
     return with_candidates(unfitted([plain_model], nuisances), [], nuisances, ())
 
 
-def test_a_finished_fit_is_not_fitted_again(tmp_path, plain_model, start, monkeypatch) -> None:
-    first = Checkpoint.of(tmp_path / "kept", [plain_model]).polished(start)
-    monkeypatch.setattr(module, "converged", lambda fit: pytest.fail("fitted again"))
-    again = Checkpoint.of(tmp_path / "kept", [plain_model]).polished(start)
-    np.testing.assert_array_equal(again.points[0], first.points[0])
+def test_a_finished_fit_is_not_fitted_again(tmp_path, plain_model, start) -> None:
+    """Truth: what lies in the file, which is altered so that no fit would give it."""
+    first = Checkpoint.of(tmp_path, [plain_model]).converged(start)
+    (path,) = tmp_path.iterdir()
+    with np.load(path) as kept:
+        altered = {name: 1.01 * kept[name] for name in kept.files}
+    np.savez(path, **altered)
+    again = Checkpoint.of(tmp_path, [plain_model]).converged(start)
+    np.testing.assert_array_equal(again.flights[0].point, 1.01 * first.flights[0].point)
+
+
+def test_a_restored_fit_is_the_one_that_was_stored(tmp_path, plain_model, start) -> None:
+    first, again = (Checkpoint.of(tmp_path, [plain_model]).converged(start) for _ in range(2))
+    np.testing.assert_array_equal(again.flights[0].point, first.flights[0].point)
     assert again.cost == pytest.approx(first.cost)
 
 
@@ -28,14 +36,14 @@ def test_another_start_is_another_step(tmp_path, plain_model, start) -> None:
     assert steps.table(start, ["a"], lambda: {"a": [1.0]}) == {"a": [1.0]}
     assert steps.table(start, ["a"], lambda: pytest.fail("worked out again")) == {"a": [1.0]}
     moved = with_candidates(start, [], start.nuisances, ())
-    moved.points[0][start.nuisances.indices[0]] += 1e-3
+    moved.flights[0].point[start.nuisances.indices[0]] += 1e-3
     assert steps.table(moved, ["b"], lambda: {"b": [2.0]}) == {"b": [2.0]}
 
 
 def test_nothing_is_left_at_the_end(tmp_path, plain_model, start) -> None:
     steps = Checkpoint.of(tmp_path / "kept", [plain_model])
     steps.table(start, ["a"], lambda: {"a": [1.0]})
-    steps.forget()
+    steps.clear()
     assert not (tmp_path / "kept").exists()
 
 

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid_node.gap.estimation.fit import linearised, unfitted
-from sysid_node.gap.estimation.nuisances import is_gusty, nuisances_of
+from sysid_node.gap.estimation.candidate_fit import linearised, unfitted
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import held_out_evidence
+from sysid_node.gap.residuals.air_motion import is_gusty
 
 
 def test_calm_and_gusty_flights_are_judged_together(aircraft, plain_model) -> None:
@@ -15,7 +16,7 @@ def test_calm_and_gusty_flights_are_judged_together(aircraft, plain_model) -> No
     assert is_gusty(blown) and not is_gusty(plain_model)
     calm, rough = (nuisances_of(aircraft, model, (plain_model, blown)) for model in (plain_model, blown))
     assert calm.indices == rough.indices and len(calm.indices) > len(nuisances_of(aircraft, plain_model).indices)
-    evidence = held_out_evidence(linearised(unfitted([plain_model], calm)), [blown], [rough])
+    evidence = held_out_evidence(linearised(unfitted([plain_model], calm)), [HeldOutFlight(blown, rough)])
     assert np.isfinite(evidence.total)
 
 

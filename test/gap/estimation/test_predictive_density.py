@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.estimation.fit import converged, unfitted
-from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.convergence import converged
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, held_out_evidence, probabilities
 
 
@@ -28,8 +29,8 @@ def test_what_is_flown_is_what_is_written(plain_model) -> None:
     fit = converged(unfitted([plain_model], nuisances), rounds=1)
     others = [i for i, (effect, _) in enumerate(plain_model.simulator.parameters) if effect != "derivative_error"]
     neutral = plain_model.simulator.neutral()
-    assert np.any(fit.points[0][others] != neutral[others])
-    for evidence in (cross_validated_evidence(fit), held_out_evidence(fit, [plain_model], [nuisances])):
-        for point in evidence.points[0]:
+    assert np.any(fit.flights[0].point[others] != neutral[others])
+    for evidence in (cross_validated_evidence(fit), held_out_evidence(fit, [HeldOutFlight(plain_model, nuisances)])):
+        for point in evidence.flights[0].points:
             np.testing.assert_array_equal(point[others], neutral[others])
             assert np.any(point != neutral)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from sysid_node.gap.estimation.fit import converged, unfitted
+from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments.excitation import driven_by_gusts, external_excitation, externally_excited
 from sysid_node.gap.instruments.liml import liml_estimate

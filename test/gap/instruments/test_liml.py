@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from sysid_node.gap.estimation.fit import converged, unfitted
+from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.instruments.liml import _channels, _without_chance, liml_estimate
-from sysid_node.gap.instruments.overidentification import MomentEquations
+from sysid_node.gap.instruments.liml import channel_products, liml_estimate, without_chance
+from sysid_node.gap.instruments.moment_equations import FlightMoments, MomentEquations
 
 ROWS, INSTRUMENTS, DRAWS = 400, 60, 200
 TRUTH = 1.0
@@ -20,15 +21,15 @@ def drawn(random: np.random.Generator) -> MomentEquations:
     along = instruments.T @ slope
     information, right = np.array([[1e-6 + along @ along]]), np.array([along @ (instruments.T @ remainder)])
     rows, slopes = remainder.reshape(1, ROWS, 1), slope.reshape(1, ROWS, 1, 1)
-    return MomentEquations([{0: instruments}], [rows], [slopes], information, right, 0.0)
+    return MomentEquations([FlightMoments({0: instruments}, rows, slopes)], information, right, 0.0)
 
 
 def solved(seen: MomentEquations) -> tuple[float, float]:
     """By two stages, and without what chance gives to them."""
-    channels, two_stages = _channels(seen), seen.right / seen.information[0]
+    channels, two_stages = channel_products(seen), seen.right / seen.information[0]
     step = two_stages
     for _ in range(10):
-        corrected = _without_chance(seen, channels, step, np.array([1e-6]))
+        corrected = without_chance(seen, channels, step, np.array([1e-6]))
         step = corrected.right / corrected.information[0]
     return float(two_stages[0]), float(step[0])
 

@@ -8,18 +8,21 @@ from gap_flights import fly
 from scipy.signal import lsim
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.gap.estimation.fit import _root, converged, unfitted
-from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.instruments import overidentification as structure
+from sysid_node.gap.estimation.bounded_least_squares import upper_factor
+from sysid_node.gap.estimation.candidate_fit import linearised, unfitted
+from sysid_node.gap.estimation.convergence import converged
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.instruments.excitation import external_excitation
-from sysid_node.gap.instruments.overidentification import (
-    OveridentificationTest,
+from sysid_node.gap.instruments.gust_free_signals import (
     command_instruments,
     gust_free_instruments,
+    resonator_instruments,
+)
+from sysid_node.gap.instruments.overidentification import (
+    OveridentificationTest,
     overidentification_of,
     pooled,
     pooled_overidentification,
-    resonator_instruments,
 )
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
@@ -69,10 +72,10 @@ def test_flights_pooled_leave_chance_as_it_is_and_add_up_what_is_in_both() -> No
 
 def test_information_that_rounding_makes_singular_has_a_factor() -> None:
     alike = np.array([[1.0, 1.0], [1.0, 1.0 - 1e-15]])
-    root = _root(alike)
+    root = upper_factor(alike)
     np.testing.assert_allclose(root.T @ root, alike, atol=1e-9)
     clear = np.array([[1.0, 0.5], [0.5, 1.0]])
-    np.testing.assert_array_equal(_root(clear), np.linalg.cholesky(clear).T)
+    np.testing.assert_array_equal(upper_factor(clear), np.linalg.cholesky(clear).T)
 
 
 def foretold(table: np.ndarray, series: np.ndarray) -> float:
@@ -90,18 +93,15 @@ def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_mod
     assert foretold(command_instruments(plain_model)[0], rung - rung.mean()) < 0.75
 
 
-def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_model: ResidualModel, monkeypatch) -> None:
+def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_model: ResidualModel) -> None:
     """On a flight held out, that is; of the one that was fitted they do."""
     nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
-    fit = converged(unfitted([plain_model], nuisances), rounds=1)
+    fit = linearised(unfitted([plain_model], nuisances))
     alone = pooled_overidentification(fit)
-    endless = replace(fit, information=np.full_like(fit.information, np.nan))
-    monkeypatch.setattr(structure, "fit_on_other_flight", lambda *_: endless)
-    np.testing.assert_array_equal(
-        pooled_overidentification(fit, [plain_model], [nuisances]).deviations, alone.deviations
-    )
-    monkeypatch.setattr(structure, "fit_on_other_flight", lambda *_: fit)  # seen twice
-    again = pooled_overidentification(fit, [plain_model], [nuisances])
+    unreadable = replace(plain_model, measured=np.full_like(plain_model.measured, np.nan))
+    left_out = pooled_overidentification(fit, [HeldOutFlight(unreadable, nuisances)])
+    np.testing.assert_array_equal(left_out.deviations, alone.deviations)
+    again = pooled_overidentification(fit, [HeldOutFlight(plain_model, nuisances)])  # the same flight twice
     np.testing.assert_allclose(again.beyond, 2.0 * alone.beyond)
     np.testing.assert_allclose(again.share, alone.share)
 

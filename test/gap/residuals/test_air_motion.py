@@ -3,8 +3,9 @@
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import converged, unfitted, with_candidates
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import is_gusty, nuisances_of
 from sysid_node.gap.residuals.air_motion import gust_speed
 from sysid_node.gap.residuals.build import residual_model_of

@@ -17,7 +17,8 @@ def trial(mean: float, noise: float, random: np.random.Generator) -> SimpleNames
     left[:, 0] = 0.0
     left[:, 0, V] = mean
     model = SimpleNamespace(measured=np.ones((WINDOWS, LINES, 12), complex))
-    return SimpleNamespace(evidence=SimpleNamespace(residuals=(left,), models=(model,)))
+    flight = SimpleNamespace(residual=left, model=model)
+    return SimpleNamespace(evidence=SimpleNamespace(flights=(flight,)))
 
 
 def test_what_is_off_on_average_counts_whatever_weather_is_left(random: np.random.Generator) -> None:
@@ -31,5 +32,5 @@ def test_an_offset_that_nobody_would_look_for_does_not(random: np.random.Generat
 
 def test_nor_what_comes_and_goes(random: np.random.Generator) -> None:
     before = trial(0.0, 0.0, random)
-    before.evidence.residuals[0][:, 0, V] = 2.0 * (-1.0) ** np.arange(WINDOWS)
+    before.evidence.flights[0].residual[:, 0, V] = 2.0 * (-1.0) ** np.arange(WINDOWS)
     assert not _shifts(before, trial(0.0, 0.0, random)).any()

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap.estimation.candidate_fit import unfitted
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.fit import VariableProjection, converged, unfitted
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection import acceptance
 from sysid_node.gap.selection import candidate_fitter as module
@@ -27,8 +29,8 @@ def weak_and_slow(aircraft):
 def test_both_of_two_effects_are_named_with_their_sizes(weak_and_slow) -> None:
     fit = weak_and_slow.chosen.fit
     assert fit.effects == {"motor_lag", "thrust_scale"}
-    names = fit.models[0].simulator.names
-    found = {names[i]: fit.points[0][i] for i in fit.indices}
+    names = fit.simulator.names
+    found = {names[i]: fit.flights[0].point[i] for i in fit.indices}
     assert found["motor_lag.time_constant"] == pytest.approx(0.7, rel=0.15)
     assert found["thrust_scale.error"] == pytest.approx(-0.4, rel=0.15)
 
@@ -71,6 +73,8 @@ def test_what_is_needed_lest_the_others_grow_without_end_contributes_without_end
 def test_a_fit_that_begins_where_nothing_is_finite_ends_as_one_without_numbers(weak_and_slow, monkeypatch) -> None:
     """SciPy's own error for it would end the diagnosis."""
     fit = weak_and_slow.chosen.fit
-    monkeypatch.setattr(VariableProjection, "ahead", lambda self, values: np.full(self.matrix.shape[0], np.inf))
-    with pytest.raises(np.linalg.LinAlgError, match="grows without end"):
+    monkeypatch.setattr(
+        VariableProjection, "residual_and_slopes", lambda self, values: np.full(self.matrix.shape[0], np.inf)
+    )
+    with pytest.raises(np.linalg.LinAlgError, match="diverges"):
         converged(fit, rounds=1)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sysid_node.gap.estimation.candidate_fit import unfitted
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.fit import unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.calibration import CauseEvidence

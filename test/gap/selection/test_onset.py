@@ -4,8 +4,9 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import Candidate, candidates_of
-from sysid_node.gap.estimation.fit import CandidateFit, converged, unfitted, with_candidates
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of

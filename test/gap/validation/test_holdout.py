@@ -53,7 +53,7 @@ def test_the_first_explanation_that_predicts_better_stands(
 ) -> None:
     monkeypatch.setattr(holdout, "check", by_cholesky)
     chosen = SimpleNamespace(fit=least_squares * np.eye(2))
-    _, checked = holdout._standing(Explanation(unbiased * np.eye(2), chosen), (), ())
+    _, checked = holdout._standing(Explanation(unbiased * np.eye(2), chosen), ())
     assert checked.size == pytest.approx(stands)
 
 
@@ -72,10 +72,9 @@ def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(aircra
     beside = attribution.with_file_derivatives()
     fit = beside.corrected
     (lag,) = fit.indices
-    assert beside.keeps_file_derivatives and fit.points[0][lag] == attribution.corrected.points[0][
-        lag
-    ] == pytest.approx(0.08, rel=0.1)
-    assert np.flatnonzero(fit.points[0] != fit.models[0].simulator.neutral()).tolist() == [lag]
+    point, corrected = fit.flights[0].point, attribution.corrected.flights[0].point
+    assert beside.keeps_file_derivatives and point[lag] == corrected[lag] == pytest.approx(0.08, rel=0.1)
+    assert np.flatnonzero(point != fit.simulator.neutral()).tolist() == [lag]
 
 
 def test_a_single_flight_with_each_manoeuvre_once_is_checked_on_its_parts(aircraft) -> None:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import converged, unfitted, with_candidates
+from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, window_groups, with_neighbours
 from sysid_node.gap.residuals.build import residual_model_of
@@ -19,7 +20,7 @@ def test_each_part_is_left_out_of_what_predicts_it(aircraft, plain_model) -> Non
     _, sigma, _ = fit.stacked
     for group, step in zip(window_groups(plain_model), steps, strict=True):
         kept = np.setdiff1d(np.arange(plain_model.windows.count), with_neighbours(group, plain_model.windows.count))
-        J, r = fit.slopes[0][kept].reshape(-1, step.size), fit.rows[0][kept].ravel()
+        J, r = fit.flights[0].slopes[kept].reshape(-1, step.size), fit.flights[0].rows[kept].ravel()
         free = np.linalg.solve(J.T @ J + fit.prior_information, J.T @ r - fit.stacked[0] / sigma**2)
         assert np.abs(step / sigma).max() > 1e-3
         np.testing.assert_allclose(step / sigma, free / sigma, atol=1e-6)
@@ -29,8 +30,9 @@ def test_nuisances_may_be_held(aircraft, plain_model) -> None:
     fit = converged(unfitted([plain_model], nuisances_of(aircraft, plain_model)))
     evidence = kfold_evidence(cross_validated_evidence(fit), fit, filed=True)
     own = [i for i, name in enumerate(plain_model.simulator.names) if name.startswith("derivative_error")]
-    for point in evidence.points[0]:
-        np.testing.assert_allclose(point[own], fit.points[0][own], rtol=0.0, atol=1e-5 * np.ptp(fit.points[0][own]))
+    for point in evidence.flights[0].points:
+        fitted = fit.flights[0].point[own]
+        np.testing.assert_allclose(point[own], fitted, rtol=0.0, atol=1e-5 * np.ptp(fitted))
 
 
 def test_an_onset_stays_where_the_whole_flight_has_it(aircraft) -> None:
@@ -44,11 +46,12 @@ def test_an_onset_stays_where_the_whole_flight_has_it(aircraft) -> None:
     fit = converged(with_candidates(converged(unfitted([model], nuisances)), [loss], nuisances, [0.5, 12.0]))
     _, onset = loss.indices
     evidence = kfold_evidence(cross_validated_evidence(fit), fit)
-    assert [point[onset] for point in evidence.points[0]] == pytest.approx(
-        [fit.points[0][onset]] * len(evidence.points[0]), abs=0.01
+    assert [point[onset] for point in evidence.flights[0].points] == pytest.approx(
+        [fit.flights[0].point[onset]] * len(evidence.flights[0].points), abs=0.01
     )
     bare = converged(unfitted([model], nuisances))
     left, without = (
-        np.abs(e.residuals[0][:, 1:]).max() for e in (evidence, kfold_evidence(cross_validated_evidence(bare), bare))
+        np.abs(e.flights[0].residual[:, 1:]).max()
+        for e in (evidence, kfold_evidence(cross_validated_evidence(bare), bare))
     )
     assert left < 2.0 * without

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
+from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import WINDOW, side_by_side, simulation_gap, weather_suffices
@@ -21,8 +21,7 @@ EFFECTS: dict[str, dict[str, dict[str, float]]] = {
 
 
 def evidence(model: ResidualModel, theta) -> Evidence:
-    count = len(window_groups(model))
-    return Evidence(np.zeros(count), (), (model,), ((theta,) * count,))
+    return Evidence(np.empty(0), (FlightEvidence.throughout(model, theta),))
 
 
 def gap_of(model: ResidualModel, effects: Mapping[str, Mapping[str, float]]):

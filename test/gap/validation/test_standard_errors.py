@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from sysid_node.gap.estimation.candidate_fit import unfitted
 from sysid_node.gap.estimation.checkpoint import Checkpoint
-from sysid_node.gap.estimation.fit import unfitted
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of

@@ -17,7 +17,7 @@ def lagging(aircraft) -> Diagnosis:
 def test_sampling_leaves_what_its_standard_deviation_of_a_delay_leaves(lagging) -> None:
     """Truth: the prediction itself, its commands and air data moved by 1 / sqrt(12) of a sample, without a slope."""
     fit = lagging.attribution.chosen.fit
-    (model,), (point,) = fit.models, fit.points
+    model, point = fit.flights[0].model, fit.flights[0].point
     shifted = np.zeros(6)
     for clock in ("actuator_stamp_delay.delay", "air_data_delay.delay"):
         late = point.copy()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.estimation.fit import CandidateFit, linearised, unfitted, with_candidates
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.verdict.next_flight import propose

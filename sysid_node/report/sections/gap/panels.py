@@ -145,7 +145,7 @@ def flight_figures(found: Diagnosis) -> list[tuple[str, Figure]]:
 def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved, each short flight a line of its own."""
     place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
-    record = side_by_side(found.models[place], found.check.final.points[place])
+    record = side_by_side(found.models[place], found.check.final.flights[place].points)
     span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
     begins = record.begins[span].copy()
     panels = []

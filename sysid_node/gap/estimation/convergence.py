@@ -1,0 +1,59 @@
+"""A fit iterated until it converges: variable projection and weights from the residual's spectrum by turns."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised
+from sysid_node.gap.estimation.spectral_weights import residual_power, spectral_deviance
+from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.residuals.parameter_priors import bounds
+
+#: Most rounds of linearising the nuisances and computing the weights anew.
+_ROUNDS = 8
+
+#: Change of the deviance from one round to the next below which the fit counts as converged.
+_CONVERGED = 0.3
+
+#: Evaluations of the small nonlinear problem in each round.
+_EVALUATIONS = 12
+
+
+def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
+    """The fit at its maximum a posteriori, with the weights of its own residual, linearised there.
+
+    Weights and linearised nuisances of one round may make the next one worse, so the likeliest of all rounds is
+    returned. Raises LinAlgError where the prediction diverges.
+    """
+    best, least, last = fit, np.inf, np.inf
+    for _ in range(rounds):
+        fit = _one_round(fit)
+        residuals = [flight.residual for flight in fit.flights]
+        fit = fit.with_powers([residual_power(m, r) for m, r in zip(fit.models, residuals, strict=True)])
+        raw = ((np.abs(residual) ** 2).mean(axis=0) for residual in residuals)
+        deviance = sum(spectral_deviance(model, power) for model, power in zip(fit.models, raw, strict=True))
+        deviance -= 2.0 * fit.prior_score
+        if not deviance >= least:
+            best, least = fit, deviance
+        if not abs(deviance - last) >= _CONVERGED:
+            break
+        last = deviance
+    return linearised(best)
+
+
+def _one_round(fit: CandidateFit) -> CandidateFit:
+    """The fit with the candidates' parameters and the nuisance parameters at their best for the weights it has."""
+    problem = VariableProjection(fit)
+    values = fit.values
+    if values.size:
+        low, high = bounds(fit.simulator, fit.indices)
+        start = np.clip(problem.joint_start(values, low, high), low + 1e-9, high - 1e-9)
+        if not np.isfinite(problem.residual_and_slopes(start)).all():
+            raise np.linalg.LinAlgError("the prediction diverges")
+        solution = least_squares(
+            problem.residual_and_slopes, start, problem.jacobian, bounds=(low, high),
+            x_scale=fit.simulator.scales[list(fit.indices)], max_nfev=_EVALUATIONS, ftol=1e-4, xtol=1e-4, gtol=1e-6,
+        )  # fmt: skip
+        values = solution.x
+    return fit.at(problem.points(values))

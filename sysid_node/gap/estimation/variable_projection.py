@@ -1,0 +1,204 @@
+"""Variable projection: the candidates' parameters by nonlinear least squares, nuisances eliminated by linear algebra.
+
+At given weights the nuisance parameters enter linearly about where they stand, with their priors as further rows of
+the problem. What is left of the residual and of the slopes after they are projected out is a small nonlinear problem in
+the candidates' parameters alone (Golub & Pereyra (1973), SIAM J. Numer. Anal. 10(2); the approximate Jacobian is
+Kaufman's (1975), BIT 15).
+"""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.bounded_least_squares import bounded_least_squares
+from sysid_node.gap.estimation.candidate_fit import CandidateFit
+from sysid_node.gap.estimation.candidates import Candidate
+from sysid_node.gap.estimation.spectral_weights import amplitudes, real_rows, spectral_deviance
+from sysid_node.gap.residuals.parameter_priors import prior
+
+#: Weighted residual beyond which a prediction counts as divergent.
+_DIVERGENT = 1e100
+
+#: Times that nuisance parameters are put at their limits before what is left beyond is cut off.
+_BINDINGS = 6
+
+#: Share of its limit within which a nuisance parameter stands at it.
+_AT_LIMIT = 1e-6
+
+
+class VariableProjection:
+    """The least-squares problem in the candidates' parameters of a fit, with the nuisance parameters at their best.
+
+    Nuisance parameters that would go beyond their limits are put there and stay: an active set, found anew for each
+    linearisation. They are counted in units of their prior standard deviations. Their priors are then a unit matrix, so
+    that the normal equations are well conditioned even where the flight says little about some of them.
+    """
+
+    def __init__(self, fit: CandidateFit) -> None:
+        self.fit = fit
+        blocks = []
+        for number, flight in enumerate(fit.flights):
+            indices = list(flight.nuisances.indices)
+            slopes = real_rows(flight.model.slopes(flight.point, indices), flight.weights)
+            blocks.append(flight.nuisances.among_all(slopes.reshape(-1, len(indices)), number, len(fit.flights)))
+        self.now, self.spread, self.limit = fit.stacked
+        self.matrix = np.vstack([*(block * self.spread for block in blocks), np.eye(self.now.size)])
+        self.gram = self.matrix.T @ self.matrix
+        self.indices = list(fit.indices)
+        self.centre, self.sigma = prior(fit.simulator, fit.indices)
+        self._kept = (b"", np.empty((0, 0)))
+        self._set_free(np.ones(self.now.size, bool), np.zeros(self.now.size))
+        self._bind(fit.values)
+
+    def _set_free(self, free: NDArray[np.bool_], shift: Array) -> None:
+        """Sets which nuisance parameters may move, and how far the others stand from where the residual is taken."""
+        self.free, self.shift = free, shift
+        self.shifted_rows = self.matrix @ (shift / self.spread)
+        self.factor = cho_factor(self.gram[np.ix_(free, free)], check_finite=False)
+
+    def _best(self, rows: Array) -> Array:
+        """Nuisance parameters (K, ...), in sigmas, that minimise rows (R, ...); those that may not move are zero."""
+        best = np.zeros((self.now.size, *rows.shape[1:]))
+        best[self.free] = cho_solve(self.factor, (self.matrix.T @ rows)[self.free], check_finite=False)
+        return best
+
+    def _bind(self, values: Array) -> None:
+        """Puts at their limits those that would go beyond, until none would."""
+        for _ in range(_BINDINGS):
+            nuisances = self.now + self._nuisance_step(values)
+            beyond = self.free & (np.abs(nuisances) > self.limit)
+            if not beyond.any():
+                return
+            shift = np.where(beyond, np.sign(nuisances) * self.limit - self.now, self.shift)
+            self._set_free(self.free & ~beyond, shift)
+
+    def _nuisance_step(self, values: Array) -> Array:
+        """How far the nuisance parameters' best at these values lies from where the residual is taken."""
+        return np.asarray(self.shift + self.spread * self._best(self._rows(values)))
+
+    def joint_start(self, values: Array, low: Array, high: Array) -> Array:
+        """The values from which to go on: these, or those of a joint step with the nuisance parameters, if better.
+
+        A nuisance parameter at its limit stays there while the values move alone, and may hold what belongs to them:
+        an actuator's bias then moves by a thousandth a round, where the joint step finds it at once. The joint step
+        decides anew which nuisance parameters stand at their limits.
+        """
+        if self.free.all():
+            return values
+        columns, rows = self._columns(values), self._rows(values) + self.shifted_rows
+        cross, corner = self.matrix.T @ columns, columns.T @ columns + np.diag(self.sigma**-2.0)
+        gram = np.block([[self.gram, cross], [cross.T, corner]])
+        right = np.append(self.matrix.T @ rows, columns.T @ rows - (values - self.centre) / self.sigma**2)
+        if self._active_set_holds(gram, right):
+            return values
+        before, deviance = (self.free, self.shift), self.deviance(self.residual(values))
+        limit, now = self.limit / self.spread, self.now / self.spread
+        lower, upper = np.append(-limit - now, low - values), np.append(limit - now, high - values)
+        step = bounded_least_squares(gram, right, lower, upper)
+        moved = now + step[: now.size]
+        beyond = np.abs(moved) > limit * (1.0 - _AT_LIMIT)
+        self._set_free(~beyond, np.where(beyond, np.sign(moved) * self.limit - self.now, 0.0))
+        stepped_values = values + step[now.size :]
+        if self.deviance(self.residual(stepped_values)) < deviance:
+            return stepped_values
+        self._set_free(*before)
+        return values
+
+    def _active_set_holds(self, gram: Array, right: Array) -> bool:
+        """Whether, as everything moves, the nuisance parameters at their limits stay there and no other reaches its."""
+        free, step = np.ones(right.size, bool), np.zeros(right.size)
+        free[: self.now.size], step[: self.now.size] = self.free, self.shift / self.spread
+        step[free] = cho_solve(cho_factor(gram[np.ix_(free, free)]), (right - gram[:, ~free] @ step[~free])[free])
+        moved = self.now + self.spread * step[: self.now.size]
+        pull = np.sign(moved) * (right - gram @ step)[: self.now.size]
+        return bool((pull[~self.free] >= 0.0).all() and (np.abs(moved) <= self.limit * (1.0 + _AT_LIMIT)).all())
+
+    def with_candidate(self, candidate: Candidate) -> VariableProjection:
+        """The same problem with one candidate more, without the nuisance parameters that it is or replaces."""
+        other, simulator, nuisances = copy(self), self.fit.simulator, self.fit.nuisances
+        other.indices = [*self.fit.indices, *candidate.indices]
+        other.centre, other.sigma = prior(simulator, other.indices)
+        kept = nuisances.without(frozenset({candidate.effect}), simulator.names).indices
+        fitted = np.isin(
+            nuisances.indices, candidate.indices
+        )  # now a parameter that moves: from where the others start
+        gone, neutral = (np.zeros(self.now.size, bool) for _ in range(2))
+        for number in range(len(self.fit.flights)):
+            places = nuisances.places(number)
+            gone[places] |= fitted | ~np.isin(nuisances.indices, kept)
+            neutral[places] |= ~fitted
+        if gone.any():
+            other._set_free(self.free & ~gone, np.where(gone, -self.now * neutral, self.shift))
+        return other
+
+    def _rows(self, values: Array) -> Array:
+        """Weighted residuals of all flights at these values, nuisances where they are, then the nuisances' priors."""
+        rows = []
+        for flight in self.fit.flights:
+            point = flight.point.copy()
+            point[self.indices] = values
+            rows.append(real_rows(flight.model.residual(point), flight.weights).ravel())
+        return np.concatenate([*rows, -self.now / self.spread]) - self.shifted_rows
+
+    def residual(self, values: Array) -> Array:
+        """Rows (R,) whose sum of squares is minimised over the values (K,); the values' own priors are last."""
+        rows = self._rows(values)
+        return np.concatenate([rows - self.matrix @ self._best(rows), (values - self.centre) / self.sigma])
+
+    def residual_and_slopes(self, values: Array) -> Array:
+        """``residual``, where ``jacobian`` will be asked for next: the slopes are computed along with it and kept."""
+        self._kept = (values.tobytes(), self._slopes(values))
+        return self.residual(values)
+
+    def jacobian(self, values: Array) -> Array:
+        """Kaufman's approximate Jacobian (R, K) of ``residual``."""
+        key, kept = self._kept
+        return kept if key == values.tobytes() else self._slopes(values)
+
+    def _slopes(self, values: Array) -> Array:
+        matrix = -self._columns(values)
+        return np.vstack([matrix - self.matrix @ self._best(matrix), np.diag(1.0 / self.sigma)])
+
+    def _columns(self, values: Array) -> Array:
+        """Weighted slopes (R, K) of what is predicted with respect to the values, nuisance parameters held."""
+        blocks = []
+        for flight in self.fit.flights:
+            point = flight.point.copy()
+            point[self.indices] = values
+            slopes = real_rows(flight.model.slopes(point, self.indices), flight.weights)
+            blocks.append(slopes.reshape(-1, values.size))
+        return np.vstack([*blocks, np.zeros((self.now.size, values.size))])
+
+    def deviance(self, rows: Array) -> float:
+        """Minus twice the log posterior density of a ``residual`` (R,), up to a constant, the spectrum profiled out.
+
+        With the weights held instead, an effect would be worth little just where what it explains is most of the
+        residual. Infinite where the prediction diverged.
+        """
+        if not np.abs(rows).max(initial=0.0) < _DIVERGENT:
+            return np.inf
+        shapes = [(flight.model.windows.count, flight.weights.size) for flight in self.fit.flights]
+        data = sum(count * size for count, size in shapes)
+        total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.nuisances.widened, 0
+        for flight, shape in zip(self.fit.flights, shapes, strict=True):
+            part = rows[first : first + shape[0] * shape[1]].reshape(shape)
+            first += part.size
+            power = np.mean(np.abs(amplitudes(part, flight.weights)) ** 2, axis=0)
+            total += spectral_deviance(flight.model, power)
+        return total
+
+    def points(self, values: Array) -> tuple[Array, ...]:
+        """All parameters (P,) by flight, with the nuisance parameters at their best for these values (K,)."""
+        moved = np.clip(self.now + self._nuisance_step(values), -self.limit, self.limit)
+        points = []
+        for number, flight in enumerate(self.fit.flights):
+            point = flight.point.copy()
+            point[self.indices] = values
+            point[list(flight.nuisances.indices)] = moved[flight.nuisances.places(number)]
+            points.append(point)
+        return tuple(points)

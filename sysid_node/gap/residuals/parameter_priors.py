@@ -1,0 +1,47 @@
+"""Prior distribution and bounds of the simulator's parameters, as every least-squares step of the diagnosis uses them.
+
+Both depend on the simulator alone. Where a diagnosis knows more than the effect's own definition does (a control
+surface counts as stuck only if nearly all of its movement is gone; a stamp is never early), it narrows the bounds here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.sim import Simulator
+
+#: Effects of message stamps. No message is stamped before the instant that it describes: if stamps could be early, then
+#: late commands and late air data could pass for an early IMU, and the three clocks could not be told apart.
+_STAMP_EFFECTS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay"})
+
+_STRUCTURAL_FREQUENCY = ("structural_mode", "frequency")
+
+#: Standard deviation of an onset's prior, s: it may lie at any time of the flight.
+_ONSET_SIGMA = 100.0
+
+
+def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
+    """Lower and upper bounds (K,) of these entries of the parameter vector, in the parameters' own units."""
+    table = [simulator.parameters[i] for i in indices]
+    lower = [
+        THRESHOLDS.priors.jammed if effect == "stuck_surface" and parameter.switch
+        else THRESHOLDS.priors.lowest_mode if (effect, parameter.name) == _STRUCTURAL_FREQUENCY
+        else 0.0 if effect in _STAMP_EFFECTS
+        else parameter.lower
+        for effect, parameter in table
+    ]  # fmt: skip
+    return np.array(lower), np.array([parameter.upper for _, parameter in table])
+
+
+def prior(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
+    """Mean and standard deviation (K,) of the Gaussian prior of these entries, in the parameters' own units."""
+    parameters = [simulator.parameters[i][1] for i in indices]
+    sigma = [
+        _ONSET_SIGMA if parameter.name == "onset" else THRESHOLDS.priors.scale * simulator.scales[i]
+        for i, parameter in zip(indices, parameters, strict=True)
+    ]
+    return np.array([parameter.neutral for parameter in parameters]), np.array(sigma)
