@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from withheld import ledger
 from withheld.scoreboard import calibration
 
-from sysid_node.gap.selection.calibration import CauseEvidence
+from sysid_node.gap.selection.calibration import CauseEvidence, is_misspecified, regressors
 from sysid_node.gap.thresholds import THRESHOLDS
 
 Array = NDArray[np.float64]
@@ -36,10 +36,10 @@ def main() -> None:
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     known = [row for text in args.sets for row in causes(text)]
-    found = [row for row in known if not row[1].misspecified]
-    X = np.array([grounds.regressors for _, grounds, _ in found])
+    found = [row for row in known if not is_misspecified(row[1])]
+    X = np.array([regressors(grounds) for _, grounds, _ in found])
     right = np.array([there for _, _, there in found], float)
-    refuted = [there for _, grounds, there in known if grounds.misspecified]
+    refuted = [there for _, grounds, there in known if is_misspecified(grounds)]
     publish("bench/gap_credence.py", page([case for case, _, _ in found], X, right, refuted), args.page)
 
 

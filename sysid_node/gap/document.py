@@ -8,6 +8,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
+from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.validation.simulation_error import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
@@ -57,7 +58,7 @@ def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
     effects = {t.added.label: t.added.effect for t in attribution.first_stage if t.added}
     weighed = (*attribution.doubted, *attribution.causes)
     instead = {
-        e: share * cause.evidence.probability_by_evidence for cause in weighed for e, share in cause.alternatives
+        e: share * calibrated_probability(cause.evidence) for cause in weighed for e, share in cause.alternatives
     }
     own = {cause.candidate.label: cause.probability for cause in weighed}
     return [(label, own.get(label, instead.get(effects.get(label, ""))), p) for label, p in attribution.ranking]

@@ -1,128 +1,159 @@
-"""Which effects are accepted: what predicts better beyond doubt, and closes a share of the gap that matters.
+"""Whether a candidate is accepted into an explanation, as a pure function of a table of scores.
 
-Significant is not enough: a clock's odd millisecond is real, and trifling.
+A significant effect is not enough: a delay of a millisecond may be beyond doubt and of no interest. An effect is
+accepted where all of these hold:
+
+1. it is not a time within one sample of the slowest topic, which is a matter of sampling;
+2. with it the explanation predicts flight that was not fitted better, beyond doubt;
+3. on some channel it removes a share of the remainder that matters, and a share of the whole gap comes back without it;
+4. its log Bayes factor, from what the commands predict, makes up for its having been picked from many effects. Gusts
+   can imitate the first three, and a model that is not exact repeats its error with every manoeuvre.
+
+``selection.comparison`` measures the table.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
-from sysid_node.gap.estimation.candidates import TIME_EFFECTS
-from sysid_node.gap.estimation.predictive_density import Evidence, probabilities
-from sysid_node.gap.estimation.variable_projection import VariableProjection
-from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
-from sysid_node.gap.instruments.overidentification import overidentification_of
-from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
-from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.candidate_fitter import FittedSet
-from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.sim import EFFECTS
+from sysid_node.gap.thresholds import THRESHOLDS, Acceptance, Thresholds
 
 
-def likelier(trial: FittedSet, other: FittedSet) -> bool:
-    """Whether a trial predicts better than another, beyond doubt."""
-    return bool(probabilities([trial.evidence.scores, other.evidence.scores])[0] > THRESHOLDS.acceptance.probability)
+@dataclass(frozen=True)
+class RemainingPower:
+    """Power (12,) by channel that is left without and with a candidate."""
+
+    without: Array
+    with_it: Array
+
+    @property
+    def removed(self) -> Array:
+        """Power (12,) that the candidate removes."""
+        return self.without - self.with_it
 
 
-def accepted(base: FittedSet, without: FittedSet, trial: FittedSet) -> bool:
-    """Whether a trial predicts better than what it was tried upon, beyond doubt, and by enough to matter.
+@dataclass(frozen=True)
+class RemainingStructure:
+    """What of the power (12,) left without and with a candidate is structure, in noise levels."""
 
-    Also of what the commands foretell, having been picked from so many: gusts can fake the rest, and where the model is
-    not exact every manoeuvre repeats the last one's error.
+    coherent: RemainingPower
+    total: Array  # all power that is left without it
+
+
+class ComparisonScores(Protocol):
+    """An explanation with a candidate, compared with the explanation without it. Powers are by channel (12,)."""
+
+    @property
+    def time(self) -> float | None:
+        """Size of the candidate, s, where it is an effect of one time; else none."""
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period of the slowest topic, s."""
+
+    @property
+    def probability(self) -> float:
+        """That flight not fitted is better predicted with the candidate than without it."""
+
+    @property
+    def gusty(self) -> bool:
+        """Whether any of the flights is one in gusts."""
+
+    @property
+    def motion(self) -> Array:
+        """Power of what was measured, about the windows' means."""
+
+    @property
+    def power(self) -> RemainingPower:
+        """Power left on flight not fitted."""
+
+    @property
+    def structure(self) -> RemainingStructure:
+        """Of the flights fitted, what of the power is structure. Asked for in gusts only."""
+
+    @property
+    def mean_power(self) -> RemainingPower:
+        """Power of the means of what is left, which gusts do not change. Asked for in gusts only."""
+
+    @property
+    def contribution(self) -> Array:
+        """Power that comes back without the candidate, the others held, as a share of what nuisances alone leave."""
+
+    @property
+    def log_bayes_factor(self) -> float:
+        """Of the explanation with the candidate against the one without, from what the commands predict, nats."""
+
+    @property
+    def searched(self) -> int:
+        """Number of effects that the candidate was picked from."""
+
+
+@dataclass(frozen=True)
+class ComparisonTable:
+    """The scores of one comparison as plain values: recorded, or made by hand."""
+
+    time: float | None
+    sample_period: float
+    probability: float
+    gusty: bool
+    motion: Array
+    power: RemainingPower
+    structure: RemainingStructure
+    mean_power: RemainingPower
+    contribution: Array
+    log_bayes_factor: float
+    searched: int
+
+
+def is_accepted(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether the candidate is accepted."""
+    return rejection(scores, thresholds) is None
+
+
+def rejection(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> str | None:
+    """The first rule that the candidate fails, in words; none where it is accepted.
+
+    Scores are read in the order of the rules, so that those of later rules need not be measured.
     """
-    if _trifling(trial) or not likelier(trial, without):
-        return False
-    matters = _matters_in_gusts(without, trial) if _in_gusts(trial) else _matters(without, trial)
-    if not np.any(matters & (_contributed(base, without, trial) > THRESHOLDS.acceptance.share_of_gap)):
-        return False
-    return log_bayes_factor(trial.fit, without.fit) > THRESHOLDS.acceptance.log_bayes_factor(len(EFFECTS))
+    limits = thresholds.acceptance
+    if scores.time is not None and abs(scores.time) < scores.sample_period:
+        return "its time is within one sample"
+    if not predicts_better(scores.probability, thresholds):
+        return "it does not predict better beyond doubt"
+    if not np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap)):
+        return "it removes too little"
+    if not scores.log_bayes_factor > limits.log_bayes_factor(scores.searched):
+        return "what the commands predict does not support it"
+    return None
 
 
-def _matters(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
-    """Channels (12,) on which a trial takes enough of the remainder away."""
-    left, motion = power_left(without.evidence), _motion(trial)
-    gone = left - power_left(trial.evidence)
-    return np.asarray(
-        (
-            (gone > THRESHOLDS.acceptance.share_of_remainder * left)
-            & (gone > THRESHOLDS.acceptance.noticeable_error**2 * motion)
-        )
-        | (gone > THRESHOLDS.acceptance.large_error**2 * motion)
-    )
+def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether a probability that one explanation predicts better than another is beyond doubt."""
+    return probability > thresholds.acceptance.probability
 
 
-def _matters_in_gusts(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
-    """The same, of forces and moments by what of the remainder is structure: the rest is weather."""
-    before, after = overidentification_of(without.fit, trial.fit.powers), overidentification_of(trial.fit)
-    scale = power_left(without.evidence) / np.maximum(before.total, 1e-300)
-    gone = before.coherent - after.coherent
-    structured = (gone > THRESHOLDS.acceptance.share_of_remainder * before.coherent) & (
-        gone * scale > THRESHOLDS.acceptance.noticeable_error**2 * _motion(trial)
-    )
-    forces = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
-    return np.where(forces, structured | _shifts(without, trial), _matters(without, trial))
+def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
+    """Channels (12,) on which the candidate removes enough of the remainder to matter.
 
-
-def _shifts(without: FittedSet, trial: FittedSet) -> NDArray[np.bool_]:
-    """Channels (12,) on which a trial takes enough of what is off on average away: gusts average out."""
-    left, now = (_power_of_means(t.evidence) for t in (without, trial))
-    return np.asarray(
-        (left - now > THRESHOLDS.acceptance.share_of_remainder * left)
-        & (left - now > THRESHOLDS.acceptance.noticeable_error**2 * _motion(trial))
-    )
-
-
-def _power_of_means(evidence: Evidence) -> Array:
-    """Power (12,) of the flights' means of what is left, as ``spectra.power_of`` counts it."""
-    return np.asarray(
-        sum(0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in (f.residual for f in evidence.flights))
-    )
-
-
-def _motion(trial: FittedSet) -> Array:
-    """Power (12,) of what was measured, about the windows' means."""
-    return np.asarray(sum((np.abs(f.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for f in trial.evidence.flights))
-
-
-def _in_gusts(trial: FittedSet) -> bool:
-    return any(is_gusty(model) for model in trial.fit.models)
-
-
-def _contributed(base: FittedSet, without: FittedSet, trial: FittedSet) -> Array:
-    """Power (12,) that comes back when what a trial has more than another is taken away, the others as they are.
-
-    As a share of what nuisances alone leave, which do their best. The others would bend to hold what is gone: a lag
-    twice as long for an engine half as strong. Where the others alone grow without end, so does what comes back.
+    In gusts most of what is left of forces and moments is weather; there what of it is structure counts, and the mean.
     """
-    kept = [c for c in trial.fit.candidates if c.effect in without.fit.effects]
-    lacking = with_candidates(trial.fit, kept, base.fit.nuisances, ()).with_powers(without.fit.powers)
-    try:
-        lacking = lacking.at(VariableProjection(lacking).points(lacking.values))
-    except np.linalg.LinAlgError:
-        return np.full(len(CHANNELS), np.inf)
-    back, now, whole = (_powers(fit) for fit in (lacking, trial.fit, base.fit))
-    return np.asarray(np.max((back - now) / np.maximum(whole, 1e-300), axis=0))
+    removed, motion = scores.power.removed, scores.motion
+    enough = _matters(scores.power, 1.0, motion, limits) | (removed > limits.large_error**2 * motion)
+    if not scores.gusty:
+        return np.asarray(enough)
+    structure = scores.structure
+    scale = scores.power.without / np.maximum(structure.total, 1e-300)  # of noise levels to power
+    of_forces = _matters(structure.coherent, scale, motion, limits) | _matters(scores.mean_power, 1.0, motion, limits)
+    return np.where(np.arange(len(CHANNELS)) < len(COEFFICIENTS), of_forces, enough)
 
 
-def _powers(fit: CandidateFit) -> Array:
-    """Power (2, 12) that a fit leaves of the flights, and without the means, beside which all else may be small."""
-    residuals = [flight.residual for flight in fit.flights]
-    swinging = [np.concatenate([0.0 * r[:, :1], r[:, 1:]], axis=1) for r in residuals]
-    return np.array([sum(power_of(r) for r in some) for some in (residuals, swinging)])
-
-
-def _trifling(trial: FittedSet) -> bool:
-    """Whether what was added is a time within one sample of the slowest topic: a matter of sampling."""
-    if trial.added is None or trial.added.effect not in TIME_EFFECTS:
-        return False
-    slowest = min(min(m.flight.actuator_rate, m.flight.air_rate) for m in trial.fit.models)
-    return bool(abs(trial.fit.flights[0].point[trial.added.indices[0]]) < 1.0 / slowest)
-
-
-def power_left(evidence: Evidence) -> Array:
-    """Power (12,) of what is left on flight not fitted."""
-    return np.asarray(sum(power_of(flight.residual) for flight in evidence.flights))
+def _matters(power: RemainingPower, scale: Array | float, motion: Array, limits: Acceptance) -> NDArray[np.bool_]:
+    """Channels (12,) on which enough of a power is removed: as a share of itself, and of the motion."""
+    share = power.removed > limits.share_of_remainder * power.without
+    return np.asarray(share & (power.removed * scale > limits.noticeable_error**2 * motion))

@@ -1,20 +1,26 @@
-"""Causes against their rivals, the other causes given: whether another would do as well in a cause's place."""
+"""Stepwise replacement: every cause against its alternatives, the other causes given.
+
+The first effect was chosen before the others were known. Another may take its place now, or none may be needed.
+``selection.replacement`` decides each step; here its scores are measured and what it asks for is fitted.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
-from sysid_node.gap.selection.acceptance import accepted
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet
+from sysid_node.gap.selection.comparison import Comparison
+from sysid_node.gap.selection.replacement import next_step
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
 class CauseAlternatives:
-    """A cause's place in the explanation: what is left without it, and all that was tried in its stead."""
+    """A cause of an explanation, the explanation without it, and all that was fitted in its place."""
 
     candidate: Candidate
     without: FittedSet
@@ -26,54 +32,95 @@ def replace_stepwise(
     base: FittedSet,
     chosen: FittedSet,
     stages: Sequence[list[FittedSet]],
-    late: Sequence[Candidate],
+    always: Sequence[Candidate],
     barred: frozenset[str] = frozenset(),
 ) -> tuple[FittedSet, tuple[CauseAlternatives, ...]]:
-    """The explanation after every cause has stood against its rivals, given the others; some are ``barred`` by label.
+    """The explanation after every cause was compared with its alternatives, and these.
 
-    The first effect was chosen before the others were known: another may take its place now, or none may be needed.
+    Alternatives are the candidates that were fitted in some stage of the forward selection, and those that are
+    ``always`` tried; some are ``barred`` by label from taking a cause's place.
     """
-    tried = [t.added for trials in stages for t in trials if t.added]
-    pool = list({candidate.label: candidate for candidate in (*tried, *late)}.values())
+    fitted = [each.added for stage in stages for each in stage if each.added]
+    pool = list({candidate.label: candidate for candidate in (*fitted, *always)}.values())
     for _ in range(THRESHOLDS.search.sweeps):
-        places = tuple(_place(fitter, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
-        better = _replacement(base, chosen, places, barred)
-        if better is None:
-            return chosen, places
-        chosen = better
-    return chosen, tuple(_place(fitter, base, chosen, c, stages[0], pool) for c in chosen.fit.candidates)
+        positions = _positions(fitter, base, chosen, stages[0], pool)
+        step = next_step([_Position(base, chosen, each) for each in positions], barred)
+        if step is None:
+            return chosen, positions
+        position = positions[step.position]
+        chosen = position.without if step.alternative is None else position.alternatives[step.alternative]
+    return chosen, _positions(fitter, base, chosen, stages[0], pool)
 
 
-def _place(
+def _positions(
+    fitter: CandidateFitter, base: FittedSet, chosen: FittedSet, first: list[FittedSet], pool: list[Candidate]
+) -> tuple[CauseAlternatives, ...]:
+    """Every cause of an explanation with its alternatives, fitted."""
+    return tuple(_alternatives(fitter, base, chosen, cause, first, pool) for cause in chosen.fit.candidates)
+
+
+def _alternatives(
     fitter: CandidateFitter,
     base: FittedSet,
     chosen: FittedSet,
-    candidate: Candidate,
+    cause: Candidate,
     first: list[FittedSet],
     pool: list[Candidate],
 ) -> CauseAlternatives:
-    """Against the likeliest rivals, and where the response is late against all that could make it so."""
-    others = [c for c in chosen.fit.candidates if c is not candidate]
+    """A cause with the likeliest alternatives; where the cause delays the response, with all that delay it.
+
+    Alternatives to a single cause were fitted in the first stage of the forward selection.
+    """
+    others = [candidate for candidate in chosen.fit.candidates if candidate is not cause]
     without = fitter.fit_set(chosen.fit, others) if others else base
-    rest = [c for c in pool if c.effect not in without.fit.effects]
-    looks = fitter.screen_upon([without], rest, lambda s, t: None)
-    likely = looks[: THRESHOLDS.search.alternatives] if others else []
-    late = [(t, look) for t, look in looks[len(likely) :] if {look[1].effect, candidate.effect} <= RESPONSE_DELAYS]
-    rivals = {t.added.label: t for _, t in fitter.fit_screened([*likely, *late], lambda s, t: None) if t.added}
-    known = {} if others else {t.added.label: t for t in first if t.added}
-    return CauseAlternatives(candidate, without, tuple({**known, **rivals}.values()))
+    rest = [candidate for candidate in pool if candidate.effect not in without.fit.effects]
+    screened = fitter.screen_upon([without], rest, lambda share, text: None)
+    likely = screened[: THRESHOLDS.search.alternatives] if others else []
+    delays = [pair for pair in screened[len(likely) :] if {pair[1][1].effect, cause.effect} <= RESPONSE_DELAYS]
+    fitted = fitter.fit_screened([*likely, *delays], lambda share, text: None)
+    by_label = {} if others else {each.added.label: each for each in first if each.added}
+    by_label |= {each.added.label: each for _, each in fitted if each.added}
+    return CauseAlternatives(cause, without, tuple(by_label.values()))
 
 
-def _replacement(
-    base: FittedSet, chosen: FittedSet, places: Sequence[CauseAlternatives], barred: frozenset[str]
-) -> FittedSet | None:
-    """A better explanation, by both kinds of evidence: one effect less, or another in its place; None where there is
-    none."""
-    needless = [p.without for p in places if len(places) > 1 and not accepted(base, p.without, chosen)]
-    if needless:
-        return max(needless, key=lambda trial: trial.evidence.total)
-    new = [(p, t) for p in places for t in p.alternatives if t.added is None or t.added.label not in barred]
-    rivals = [t for p, t in new if accepted(base, p.without, t)]
-    ahead = {id(t): t.evidence.total - chosen.evidence.total + log_bayes_factor(t.fit, chosen.fit) for t in rivals}
-    best = max(rivals, key=lambda trial: ahead[id(trial)], default=None)
-    return best if best is not None and ahead[id(best)] > THRESHOLDS.search.lead else None
+@dataclass(frozen=True)
+class _Position:
+    """Scores of a cause's position, measured when they are read: ``replacement.PositionScores``."""
+
+    base: FittedSet
+    chosen: FittedSet
+    measured: CauseAlternatives
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        return Comparison(self.base, self.measured.without, self.chosen)
+
+    @property
+    def score_without(self) -> float:
+        return self.measured.without.evidence.total
+
+    @cached_property
+    def alternatives(self) -> tuple[_Alternative, ...]:
+        return tuple(_Alternative(self, fitted) for fitted in self.measured.alternatives)
+
+
+@dataclass(frozen=True)
+class _Alternative:
+    """Scores of one alternative, measured when they are read: ``replacement.AlternativeScores``."""
+
+    position: _Position
+    fitted: FittedSet
+
+    @property
+    def label(self) -> str:
+        return self.fitted.added.label if self.fitted.added else ""
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        return Comparison(self.position.base, self.position.measured.without, self.fitted)
+
+    @cached_property
+    def lead(self) -> float:
+        chosen = self.position.chosen
+        predictive = self.fitted.evidence.total - chosen.evidence.total
+        return predictive + log_bayes_factor(self.fitted.fit, chosen.fit)

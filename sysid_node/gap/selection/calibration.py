@@ -1,11 +1,10 @@
-"""How far a cause can be believed: what speaks for it, and how often as much has spoken for what was there.
+"""The calibrated probability that a cause is there, from its evidence.
 
-Evidence says how much better one model of the list predicts than another. Where the truth is none of them, the least
-wrong one wins by as many nats as there are data, and no number of these is a probability (Bernardo & Smith (1994),
-Bayesian Theory, sect. 6.1: the M-open case). So a cause whose law is refuted by what it leaves is not believed at all,
-and for the others the nats are made a probability by a logistic regression over causes whose truth was known (Platt
-(1999), Advances in Large Margin Classifiers). ``bench/gap_credence.py`` learns its weights from the withheld
-effects that earlier versions were judged by.
+Evidence says how much better one model of the list predicts than another. If the true cause is not in the list, the log
+evidence of the nearest candidate grows with the amount of data, and no such number is a probability (Bernardo & Smith
+(1994), Bayesian Theory, sect. 6.1: the M-open case). A cause whose equation is refuted by what it leaves therefore has
+no probability, and for the others the log Bayes factor is calibrated by a logistic regression over causes whose truth
+was known (Platt (1999), Advances in Large Margin Classifiers). ``bench/gap_credence.py`` learns its weights.
 """
 
 from __future__ import annotations
@@ -15,51 +14,63 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.gap.selection.misspecification import Misspecification
-from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 
 
 @dataclass(frozen=True)
 class CauseEvidence:
-    """What speaks for a cause and against it."""
+    """The evidence for and against one cause, the other causes given."""
 
-    log_bayes_factor: float  # nats by which it accounts better for what the commands foretell, the other causes given
-    misfit: float  # of what it does, what is left that goes with it: amplitude, on the channels where any is left
-    flexible: bool  # as what works through the file's own derivatives is
-
-    @classmethod
-    def of(cls, effect: str, foretold: float, adequacy: Misspecification) -> CauseEvidence:
-        """From the effect, the nats, and what it leaves."""
-        seen = (adequacy.done > THRESHOLDS.calibration.counted * adequacy.done.sum()) & (
-            adequacy.deviations > THRESHOLDS.calibration.deviations
-        )
-        misfit = np.sqrt(adequacy.left[seen].sum() / adequacy.done[seen].sum()) if seen.any() else 0.0
-        return cls(foretold, float(misfit), effect in THRESHOLDS.calibration.flexible_effects)
-
-    @property
-    def regressors(self) -> tuple[float, float, float]:
-        """What the weights belong to."""
-        return 1.0, float(np.log(max(self.log_bayes_factor, 1.0))), float(self.flexible)
-
-    @property
-    def misspecified(self) -> bool:
-        """Whether what is left goes with the cause by too much: then the law is another, however many the nats."""
-        return self.misfit > THRESHOLDS.calibration.misfit
-
-    @property
-    def probability_by_evidence(self) -> float:
-        """Probability that the cause, or a rival named with it, is there."""
-        return 0.0 if self.misspecified else self._by_nats
-
-    @property
-    def supported_but_misspecified(self) -> bool:
-        """Whether it would be believed but for its law: then something is there, but not this."""
-        return self.misspecified and self._by_nats >= THRESHOLDS.calibration.probability
-
-    @property
-    def _by_nats(self) -> float:
-        return 1.0 / (1.0 + float(np.exp(-np.dot(THRESHOLDS.calibration.weights, self.regressors))))
+    log_bayes_factor: float  # nats by which what the commands predict is better accounted for with the cause
+    misfit: float  # amplitude of what is left and depends on the cause, as a share of what the cause does
+    flexible: bool  # the effect acts as other values of the file's derivatives
 
 
-def prior_odds(effect: str) -> float:
-    """Odds of an effect before any flight, beside those that are not flexible."""
-    return float(np.exp(THRESHOLDS.calibration.flexible)) if effect in THRESHOLDS.calibration.flexible_effects else 1.0
+def evidence_of(
+    effect: str, log_bayes_factor: float, tested: Misspecification, thresholds: Thresholds = THRESHOLDS
+) -> CauseEvidence:
+    """The evidence of an effect from its log Bayes factor (nats) and the test of its equation."""
+    flexible = effect in thresholds.calibration.flexible_effects
+    return CauseEvidence(log_bayes_factor, misfit_of(tested, thresholds), flexible)
+
+
+def misfit_of(tested: Misspecification, thresholds: Thresholds = THRESHOLDS) -> float:
+    """The misfit: amplitude ratio over the channels on which the cause counts and the misfit is significant."""
+    limits = thresholds.calibration
+    counts = tested.contributed > limits.counted * tested.contributed.sum()
+    significant = counts & (tested.deviations > limits.deviations)
+    if not significant.any():
+        return 0.0
+    return float(np.sqrt(tested.explained[significant].sum() / tested.contributed[significant].sum()))
+
+
+def calibrated_probability(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Probability that the cause, or an alternative named with it, is there; zero where it is misspecified."""
+    return 0.0 if is_misspecified(evidence, thresholds) else _probability_by_support(evidence, thresholds)
+
+
+def is_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether too much of what is left depends on the cause: its equation is another, however large its support."""
+    return evidence.misfit > thresholds.calibration.misfit
+
+
+def is_supported_but_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether the cause would be kept but for its misfit: then something is there, but not this effect."""
+    likely = _probability_by_support(evidence, thresholds) >= thresholds.calibration.probability
+    return is_misspecified(evidence, thresholds) and likely
+
+
+def regressors(evidence: CauseEvidence) -> tuple[float, float, float]:
+    """Regressors (3,) of the logistic regression: one, log of the log Bayes factor (at least 1 nat), flexibility."""
+    return 1.0, float(np.log(max(evidence.log_bayes_factor, 1.0))), float(evidence.flexible)
+
+
+def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Odds of an effect before any flight, relative to an effect that is not flexible."""
+    limits = thresholds.calibration
+    return float(np.exp(limits.flexible)) if effect in limits.flexible_effects else 1.0
+
+
+def _probability_by_support(evidence: CauseEvidence, thresholds: Thresholds) -> float:
+    """The logistic regression's probability, whatever the misfit."""
+    return 1.0 / (1.0 + float(np.exp(-np.dot(thresholds.calibration.weights, regressors(evidence)))))

@@ -1,9 +1,15 @@
-"""Which causes are believed, and how probable each is."""
+"""The causes that are kept, each with its probability and the alternatives to it.
+
+After the stepwise replacement every cause is weighed: by its share of the probability among its alternatives, and by
+its calibrated evidence. ``selection.retention`` decides which cause has to give way and to what; here its scores are
+measured, and the explanation is fitted again until all causes are kept.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,40 +18,48 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
-from sysid_node.gap.selection.acceptance import accepted, power_left
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
-from sysid_node.gap.selection.calibration import CauseEvidence, prior_odds
+from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, evidence_of, prior_odds
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet
+from sysid_node.gap.selection.comparison import Comparison, power_left
 from sysid_node.gap.selection.misspecification import misspecification_of
+from sysid_node.gap.selection.retention import (
+    CauseTable,
+    combined_shares,
+    next_challenge,
+    shares_by_effect,
+    successor,
+)
 from sysid_node.gap.thresholds import THRESHOLDS
 
-#: Effects by which commands are on another clock than the IMU.
+#: Effects by which the commands are late against the IMU's clock.
 _COMMANDS_CLOCK = frozenset({"command_delay", "actuator_stamp_delay"})
 
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect that is blamed, beside the alternatives to it."""
+    """An effect of the explanation, with its evidence and the alternatives to it."""
 
     candidate: Candidate
-    share: float  # of the probability that it has with its rivals
-    power_removed: Array  # power (12,) that it takes away on flight not fitted, the other causes given
-    alternatives: tuple[tuple[str, float], ...]  # effects that would do nearly as well, and their probabilities
+    share: float  # of the probability that it has together with its alternatives
+    power_removed: Array  # (12,) that it removes on flight not fitted, the other causes given
+    alternatives: tuple[tuple[str, float], ...]  # effects that may be there in its place, and their shares
     evidence: CauseEvidence
     fit: CandidateFit  # of the explanation that it was part of when it was weighed
-    alternative_sets: tuple[FittedSet, ...]  # what was tried in its stead
+    alternative_sets: tuple[FittedSet, ...]  # what was fitted in its place
     without: FittedSet  # the explanation without it
-    replaced: bool = False  # for a rival that can be believed
+    replaced: bool = False  # whether a probable alternative took its place
 
     @property
     def probability(self) -> float:
-        """That it is there."""
-        return self.share * self.evidence.probability_by_evidence
+        """Probability that it is there."""
+        return self.share * calibrated_probability(self.evidence)
 
     @property
-    def likelier(self) -> bool:
-        """Whether a rival is likelier."""
-        return any(share > self.share for _, share in self.alternatives)
+    def table(self) -> CauseTable:
+        """The scores that decide whether it is kept."""
+        largest = max((share for _, share in self.alternatives), default=0.0)
+        return CauseTable(self.candidate.label, self.share, largest, calibrated_probability(self.evidence))
 
 
 def select_causes(
@@ -53,35 +67,33 @@ def select_causes(
     base: FittedSet,
     chosen: FittedSet,
     stages: Sequence[list[FittedSet]],
-    late: Sequence[Candidate],
+    always: Sequence[Candidate],
 ) -> tuple[FittedSet, tuple[Cause, ...], tuple[Cause, ...]]:
-    """The explanation without what is less likely to be there than not, and such causes, one after another.
+    """The explanation whose causes are all kept, these causes, the most probable first, and the doubted ones.
 
-    A rival that can be believed takes the place of each, where there is one, and one that is likelier that of any.
+    ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried
+    are alternatives to any cause. ``base`` has nuisances only.
     """
     doubted: list[Cause] = []
-    yielded: frozenset[str] = frozenset()  # labels of what made way
+    challenged: frozenset[str] = frozenset()
     while True:
-        barred = frozenset(cause.candidate.label for cause in doubted)
-        chosen, places = replace_stepwise(fitter, base, chosen, stages, late, barred | yielded)
-        causes = [_cause(fitter, chosen, place, barred) for place in places]
-        second = [cause for cause in causes if cause.likelier and cause.candidate.label not in yielded]
-        worst = min(causes, key=lambda cause: cause.evidence.probability_by_evidence, default=None)
-        unlikely = worst is not None and worst.evidence.probability_by_evidence < THRESHOLDS.calibration.probability
-        out = second[0] if second else worst if unlikely else None
-        if out is None:
-            causes = [_beside_its_twin(cause, chosen) for cause in causes]
+        excluded = frozenset(cause.candidate.label for cause in doubted)
+        chosen, positions = replace_stepwise(fitter, base, chosen, stages, always, excluded | challenged)
+        causes = [_weighed(fitter, chosen, position, excluded) for position in positions]
+        challenge = next_challenge([cause.table for cause in causes], challenged)
+        if challenge is None:
+            causes = [_with_late_imu(cause, chosen) for cause in causes]
             return chosen, tuple(sorted(causes, key=lambda cause: -cause.probability)), tuple(doubted)
-        place = places[causes.index(out)]
-        yielded |= {out.candidate.label}
-        rival = _instead(base, place, out, barred | yielded)
-        if not second:
-            doubted.append(replace(out, replaced=rival is not None))
-        chosen = rival or (chosen if second else place.without)
+        cause, position = causes[challenge.index], positions[challenge.index]
+        challenged |= {cause.candidate.label}
+        new = _successor(base, position, cause, excluded | challenged)
+        if challenge.improbable:
+            doubted.append(replace(cause, replaced=new is not None))
+        chosen = new or (position.without if challenge.improbable else chosen)
 
 
-def _beside_its_twin(cause: Cause, chosen: FittedSet) -> Cause:
-    """Without vanes a late IMU does what late commands do: each is as likely."""
+def _with_late_imu(cause: Cause, chosen: FittedSet) -> Cause:
+    """The cause beside a late IMU where no vane was flown: then a late IMU and late commands cannot be told apart."""
     inferred = any(model.flight.inferred for model in chosen.fit.models)
     if not inferred or cause.candidate.effect not in _COMMANDS_CLOCK:
         return cause
@@ -89,72 +101,91 @@ def _beside_its_twin(cause: Cause, chosen: FittedSet) -> Cause:
     return replace(cause, share=half, alternatives=(("imu_delay", half), *cause.alternatives))
 
 
-def _instead(base: FittedSet, place: CauseAlternatives, cause: Cause, barred: frozenset[str]) -> FittedSet | None:
-    """The likeliest rival that can be believed in a cause's place, None where there is none."""
-    likely = dict(cause.alternatives)
-    rivals = [
-        t for t in place.alternatives if t.added and t.added.label not in barred and accepted(base, place.without, t)
-    ]
-    for trial in sorted(rivals, key=lambda t: (-likely.get(t.added.effect if t.added else "", 0.0), -t.evidence.total)):
-        if _grounds(trial, place.without, trial.added).probability_by_evidence >= THRESHOLDS.calibration.probability:
-            return trial
-    return None
+def _successor(base: FittedSet, position: CauseAlternatives, cause: Cause, barred: frozenset[str]) -> FittedSet | None:
+    """The explanation with the alternative that takes a challenged cause's place; none where there is none."""
+    shares = dict(cause.alternatives)
+    scores = [_Successor(base, position.without, each, shares) for each in position.alternatives if each.added]
+    found = successor(scores, barred)
+    return None if found is None else scores[found].fitted
 
 
-def _grounds(trial: FittedSet, without: FittedSet, candidate: Candidate | None) -> CauseEvidence:
-    """What speaks for a candidate that a trial has more than another."""
-    assert candidate is not None
-    return CauseEvidence.of(
-        candidate.effect, log_bayes_factor(trial.fit, without.fit), misspecification_of(trial.fit, candidate)
-    )
+@dataclass(frozen=True)
+class _Successor:
+    """Scores of a possible successor, measured when they are read: ``retention.SuccessorScores``."""
+
+    base: FittedSet
+    without: FittedSet
+    fitted: FittedSet
+    shares: dict[str, float]
+
+    @property
+    def added(self) -> Candidate:
+        assert self.fitted.added is not None
+        return self.fitted.added
+
+    @property
+    def label(self) -> str:
+        return self.added.label
+
+    @property
+    def share(self) -> float:
+        return self.shares.get(self.added.effect, 0.0)
+
+    @property
+    def score(self) -> float:
+        return self.fitted.evidence.total
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        return Comparison(self.base, self.without, self.fitted)
+
+    @cached_property
+    def probability(self) -> float:
+        return calibrated_probability(_evidence(self.fitted, self.without, self.added))
 
 
-def _cause(fitter: CandidateFitter, chosen: FittedSet, place: CauseAlternatives, barred: frozenset[str]) -> Cause:
-    """Its probability, summed over all sets of effects that were tried with it, and who else could be to blame.
+def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> CauseEvidence:
+    """The evidence of a candidate that one fitted set has and another has not."""
+    factor = log_bayes_factor(fitted.fit, without.fit)
+    return evidence_of(candidate.effect, factor, misspecification_of(fitted.fit, candidate))
 
-    A rival is to blame instead only as far as it does not predict still better beside the cause: what adds up is no
-    alternative (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
+
+def _weighed(
+    fitter: CandidateFitter, chosen: FittedSet, position: CauseAlternatives, excluded: frozenset[str]
+) -> Cause:
+    """A cause with its share of the probability, summed over all sets of effects that were fitted with it.
+
+    An alternative counts only as far as it does not predict still better beside the cause: effects that add up are no
+    alternatives (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
+    Alternatives whose labels are ``excluded`` are left out.
     """
-    candidate = place.candidate
-    others = barred | {candidate.label}
-    rivals = [t for t in place.alternatives if t.added is not None and t.added.label not in others]
-    instead = _shares([chosen], rivals)[1:]
-    strong = [t for t, share in zip(rivals, instead, strict=True) if share > THRESHOLDS.search.tried_beside]
-    tried = [fitter.add_candidate(chosen, t.added) for t in strong if t.added and t.added.effect != candidate.effect]
-    sets = [chosen, *(trial for trial in tried if trial is not None)]
-    odds = [prior_odds(candidate.effect)] * len(sets) + [prior_odds(t.added.effect) for t in rivals if t.added] + [1.0]
-    shares = np.array(odds) * _shares(sets, [*rivals, place.without])
-    shares = shares / shares.sum()
-    by_effect = {candidate.effect: float(shares[: len(sets)].sum())}
-    for trial, share in zip(rivals, shares[len(sets) : -1], strict=True):
-        effect = trial.added.effect if trial.added else ""
-        by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
-    rivals_left = sorted(((e, p) for e, p in by_effect.items() if e != candidate.effect), key=lambda pair: -pair[1])
-    taken = np.maximum(power_left(place.without.evidence) - power_left(chosen.evidence), 0.0)
-    grounds = _grounds(chosen, place.without, candidate)
+    candidate, without = position.candidate, position.without
+    left_out = excluded | {candidate.label}
+    rivals = [(each, each.added) for each in position.alternatives if each.added and each.added.label not in left_out]
+    fitted = [each for each, _ in rivals]
+    in_its_place = _shares([chosen], fitted)[1:]
+    strong = [added for (_, added), share in zip(rivals, in_its_place, strict=True)
+              if share > THRESHOLDS.search.tried_beside]  # fmt: skip
+    beside = [fitter.add_candidate(chosen, added) for added in strong if added.effect != candidate.effect]
+    sets = [chosen, *(each for each in beside if each is not None)]
+    effects = [added.effect for _, added in rivals]
+    odds = [*[prior_odds(candidate.effect)] * len(sets), *(prior_odds(effect) for effect in effects), 1.0]
+    share, alternatives = shares_by_effect(candidate.effect, effects, _shares(sets, [*fitted, without]), np.array(odds))
     return Cause(
-        candidate,
-        by_effect[candidate.effect],
-        taken,
-        tuple(rivals_left),
-        grounds,
-        chosen.fit,
-        place.alternatives,
-        place.without,
+        candidate=candidate,
+        share=share,
+        power_removed=np.maximum(power_left(without.evidence) - power_left(chosen.evidence), 0.0),
+        alternatives=alternatives,
+        evidence=_evidence(chosen, without, candidate),
+        fit=chosen.fit,
+        alternative_sets=position.alternatives,
+        without=without,
     )
 
 
 def _shares(sets: Sequence[FittedSet], others: Sequence[FittedSet]) -> Array:
-    """Probabilities of sets of effects that hold a cause, then of others that do not.
-
-    Each is as probable, beside the likeliest, as it is by prediction or by what the commands foretell, whichever is
-    more: what either cannot exclude is not excluded.
-    """
-    predicted = probabilities([t.evidence.scores for t in (*sets, *others)])
-    best = int(np.argmax(predicted[: len(sets)]))
-    ahead = np.array([log_bayes_factor(sets[best].fit, t.fit) for t in others])
-    foretold = np.zeros(predicted.size)
-    lead = min(float(ahead.min(initial=0.0)), 0.0)
-    foretold[best], foretold[len(sets) :] = np.exp(lead), np.exp(lead - ahead)
-    shares = np.maximum(predicted / predicted.max(), foretold)
-    return np.asarray(shares / shares.sum())
+    """Probabilities (K,) of fitted sets that hold a cause, then of others that do not."""
+    predictive = probabilities([each.evidence.scores for each in (*sets, *others)])
+    best = sets[int(np.argmax(predictive[: len(sets)]))]
+    leads = np.array([log_bayes_factor(best.fit, each.fit) for each in others])
+    return combined_shares(predictive, len(sets), leads)

@@ -1,8 +1,7 @@
-"""Which effects: candidates tried one upon another, accepted by how well they predict flight not fitted.
+"""Forward selection of effects, and the explanation that follows.
 
-Forward selection up to three effects, each of which must predict better beyond doubt and close a share of the gap that
-matters (``acceptance``); then each stands against its rivals (``rivals``), and against what is known of causes with
-such grounds (``belief``).
+Candidates are added one at a time, up to three, each where it is accepted (``acceptance``). Then every cause is
+compared with its alternatives (``alternatives``), and those that are improbable are dropped or replaced (``causes``).
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
-from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, candidates_of
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate, candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
@@ -22,7 +21,7 @@ from sysid_node.gap.instruments.overidentification import (
     pooled_overidentification,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import accepted, likelier
+from sysid_node.gap.selection.acceptance import is_accepted, predicts_better
 from sysid_node.gap.selection.candidate_fitter import (
     CandidateFitter,
     FittedSet,
@@ -31,6 +30,7 @@ from sysid_node.gap.selection.candidate_fitter import (
     with_found_onsets,
 )
 from sysid_node.gap.selection.causes import Cause, select_causes
+from sysid_node.gap.selection.comparison import Comparison, probability_against
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
@@ -108,31 +108,56 @@ def attribute(
     models: Sequence[ResidualModel],
     nuisances: Nuisances,
     progress: Progress,
-    steps: Checkpoint | None = None,
+    checkpoint: Checkpoint | None = None,
     held_out: Sequence[HeldOutFlight] = (),
 ) -> Attribution:
-    """Fits everything that has to be, and chooses; flights held out have a say but no fit."""
+    """The explanation of flights. Nothing is fitted to flights held out, but explanations must predict them, too."""
+    fitter = CandidateFitter(nuisances, checkpoint or Checkpoint(), held_out)
     candidates = candidates_of(models[0].simulator, models)
-    fitter = CandidateFitter(nuisances, steps or Checkpoint(), held_out)
     progress(0.0, "derivatives within their tolerances")
     base = fitter.fit_set(unfitted(models, nuisances), [])
-    chosen, stages, frontier = base, [], [base]
+    chosen, stages = _forward(fitter, base, candidates, progress)
+    progress(0.8, "whether another effect would do as well")
+    delays = [each for each in candidates if each.effect in RESPONSE_DELAYS]
+    chosen, causes, doubted = select_causes(fitter, base, chosen, stages, delays)
+    return Attribution(
+        base=base,
+        chosen=chosen,
+        corrected=liml_estimate(chosen.fit),
+        structure_before=overidentification_of(base.fit, chosen.fit.powers),
+        structure_left=pooled_overidentification(chosen.fit, held_out),
+        causes=causes,
+        doubted=doubted,
+        ranking=_ranking(base, stages[0]),
+        first_stage=tuple(stages[0]),
+        held_out=tuple(held_out),
+    )
+
+
+def _forward(
+    fitter: CandidateFitter, base: FittedSet, candidates: list[Candidate], progress: Progress
+) -> tuple[FittedSet, list[list[FittedSet]]]:
+    """The explanation that forward selection ends with, and what was fitted in each stage, the best first.
+
+    In each stage candidates are added to the best explanations of the stage before, of which the best need not be part
+    of the best larger one. It goes on as long as a candidate is accepted and the larger explanation predicts better
+    than the best smaller one.
+    """
+    best, frontier, stages = base, [base], list[list[FittedSet]]()
     for count, (width, most) in enumerate(THRESHOLDS.search.stages):
-        looks = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
-        tried = fitter.fit_screened(best_screened(looks, most), _share_of(progress, count))
-        candidates = with_found_onsets(candidates, [look for _, look in looks])
-        stages.append([trial for _, trial in tried])
-        better = [t for upon, t in tried if likelier(t, chosen) and accepted(base, upon, t)]
+        screened = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
+        fitted = fitter.fit_screened(best_screened(screened, most), _share_of(progress, count))
+        candidates = with_found_onsets(candidates, [each for _, each in screened])
+        stages.append([larger for _, larger in fitted])
+        better = [
+            larger
+            for smaller, larger in fitted
+            if predicts_better(probability_against(larger, best)) and is_accepted(Comparison(base, smaller, larger))
+        ]
         if not better:
             break
-        chosen, frontier = better[0], better
-    progress(0.8, "whether another effect would do as well")
-    late = [candidate for candidate in candidates if candidate.effect in RESPONSE_DELAYS]
-    chosen, causes, doubted = select_causes(fitter, base, chosen, stages, late)
-    before, left = overidentification_of(base.fit, chosen.fit.powers), pooled_overidentification(chosen.fit, held_out)
-    ranked, corrected = _ranked(base, stages[0]), liml_estimate(chosen.fit)
-    found = Attribution(base, chosen, corrected, before, left, causes, doubted, ranked, tuple(stages[0]))
-    return replace(found, held_out=tuple(held_out))
+        best, frontier = better[0], better
+    return best, stages
 
 
 def _share_of(progress: Progress, count: int) -> Progress:
@@ -140,9 +165,8 @@ def _share_of(progress: Progress, count: int) -> Progress:
     return lambda share, text: progress((count + share) / (len(THRESHOLDS.search.stages) + 1.0), text)
 
 
-def _ranked(base: FittedSet, trials: Sequence[FittedSet]) -> tuple[tuple[str, float], ...]:
-    """Every effect that was fitted to the end as the only one, with its probability; none among them."""
-    scores = [*(t.evidence.scores for t in trials), base.evidence.scores]
-    shares = probabilities(scores)
-    labels = [*(t.added.label for t in trials if t.added), "none"]
+def _ranking(base: FittedSet, fitted: Sequence[FittedSet]) -> tuple[tuple[str, float], ...]:
+    """Every effect that was fitted alone, and "none", each with its probability by prediction; the best first."""
+    shares = probabilities([*(each.evidence.scores for each in fitted), base.evidence.scores])
+    labels = [*(each.added.label for each in fitted if each.added), "none"]
     return tuple(sorted(zip(labels, shares.tolist(), strict=True), key=lambda pair: -pair[1]))

@@ -29,9 +29,9 @@ _RIDGE = 1e-6
 class Misspecification:
     """By channel (12,), powers in noise levels: of what an effect does, and of what of the remainder goes with it."""
 
-    done: Array
-    left: Array  # beyond chance
-    deviations: Array  # how many standard deviations that lies above chance
+    contributed: Array  # of what the effect does
+    explained: Array  # of what of the remainder depends on it, beyond chance
+    deviations: Array  # standard deviations by which that exceeds chance
 
 
 def misspecification_of(fit: CandidateFit, candidate: Candidate) -> Misspecification:

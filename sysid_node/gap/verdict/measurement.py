@@ -14,7 +14,8 @@ from sysid_node.gap.instruments.excitation import externally_excited
 from sysid_node.gap.residuals.admissibility import signal_to_noise
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.acceptance import power_left
+from sysid_node.gap.selection.calibration import is_supported_but_misspecified
+from sysid_node.gap.selection.comparison import power_left
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation.holdout import Check
 from sysid_node.gap.validation.spectral_error import Gap
@@ -33,7 +34,7 @@ def measure(models: Sequence[ResidualModel], attribution: Attribution, check: Ch
         externally_excited=any(externally_excited(model) for model in models),
         causes=tuple(CauseScores(c.candidate.label, c.share, c.power_removed) for c in attribution.causes),
         doubted=tuple(
-            DoubtedScores(c.candidate.label, c.evidence.supported_but_misspecified, c.replaced)
+            DoubtedScores(c.candidate.label, is_supported_but_misspecified(c.evidence), c.replaced)
             for c in attribution.doubted
         ),
         score_before=check.base.total,

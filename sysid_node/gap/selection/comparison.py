@@ -1,0 +1,142 @@
+"""Explanations compared: the scores of a fitted set of candidates against one that lacks some of them.
+
+Every score is computed when it is first read, because the later ones are costly and seldom needed
+(``selection.acceptance``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
+from sysid_node.gap.estimation.candidates import TIME_EFFECTS
+from sysid_node.gap.estimation.predictive_density import Evidence, probabilities
+from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
+from sysid_node.gap.instruments.overidentification import overidentification_of
+from sysid_node.gap.residuals.air_motion import is_gusty
+from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.gap.residuals.windowed_spectra import power_of
+from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
+from sysid_node.gap.selection.candidate_fitter import FittedSet
+from sysid_node.sim import EFFECTS
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A fitted set against one without some of its candidates; ``base`` has nuisances only.
+
+    Its attributes are those of ``acceptance.ComparisonScores``.
+    """
+
+    base: FittedSet
+    without: FittedSet
+    fitted: FittedSet
+
+    @property
+    def time(self) -> float | None:
+        """Size of what was added, s, where it is an effect of one time."""
+        added = self.fitted.added
+        if added is None or added.effect not in TIME_EFFECTS:
+            return None
+        return float(self.fitted.fit.flights[0].point[added.indices[0]])
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period of the slowest topic, s."""
+        models = self.fitted.fit.models
+        return 1.0 / min(min(model.flight.actuator_rate, model.flight.air_rate) for model in models)
+
+    @cached_property
+    def probability(self) -> float:
+        """That flight not fitted is better predicted with what was added."""
+        return probability_against(self.fitted, self.without)
+
+    @property
+    def gusty(self) -> bool:
+        """Whether any of the flights is one in gusts."""
+        return any(is_gusty(model) for model in self.fitted.fit.models)
+
+    @cached_property
+    def motion(self) -> Array:
+        """Power (12,) of what was measured, about the windows' means."""
+        flights = self.fitted.evidence.flights
+        return np.asarray(sum((np.abs(flight.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for flight in flights))
+
+    @cached_property
+    def power(self) -> RemainingPower:
+        """Power left on flight not fitted."""
+        return RemainingPower(power_left(self.without.evidence), power_left(self.fitted.evidence))
+
+    @cached_property
+    def structure(self) -> RemainingStructure:
+        """Of the flights fitted, what of the power is structure, in the noise that the larger set leaves."""
+        before = overidentification_of(self.without.fit, self.fitted.fit.powers)
+        after = overidentification_of(self.fitted.fit)
+        return RemainingStructure(RemainingPower(before.coherent, after.coherent), before.total)
+
+    @cached_property
+    def mean_power(self) -> RemainingPower:
+        """Power of the means of what is left."""
+        return RemainingPower(_power_of_means(self.without.evidence), _power_of_means(self.fitted.evidence))
+
+    @cached_property
+    def contribution(self) -> Array:
+        """Power (12,) that comes back without what was added, as a share of what nuisances alone leave.
+
+        The other candidates are held, and nuisances are fitted: free, the others would fit what is gone (a lag twice as
+        long for an engine half as strong). Infinite where nothing finite can be predicted without what was added.
+        """
+        fit = self.fitted.fit
+        kept = [c for c in fit.candidates if c.effect in self.without.fit.effects]
+        lacking = with_candidates(fit, kept, self.base.fit.nuisances, ()).with_powers(self.without.fit.powers)
+        try:
+            lacking = lacking.at(VariableProjection(lacking).points(lacking.values))
+        except np.linalg.LinAlgError:
+            return np.full(len(CHANNELS), np.inf)
+        without, now, whole = (_powers(each) for each in (lacking, fit, self.base.fit))
+        return np.asarray(np.max((without - now) / np.maximum(whole, 1e-300), axis=0))
+
+    @cached_property
+    def log_bayes_factor(self) -> float:
+        """From what the commands predict, nats."""
+        return log_bayes_factor(self.fitted.fit, self.without.fit)
+
+    @property
+    def searched(self) -> int:
+        """Number of effects."""
+        return len(EFFECTS)
+
+    def table(self) -> ComparisonTable:
+        """All scores as plain values."""
+        return ComparisonTable(**{entry.name: getattr(self, entry.name) for entry in fields(ComparisonTable)})
+
+
+def probability_against(fitted: FittedSet, other: FittedSet) -> float:
+    """That one fitted set predicts flight not fitted better than another."""
+    return float(probabilities([fitted.evidence.scores, other.evidence.scores])[0])
+
+
+def power_left(evidence: Evidence) -> Array:
+    """Power (12,) of what is left on flight not fitted."""
+    return np.asarray(sum(power_of(flight.residual) for flight in evidence.flights))
+
+
+def _power_of_means(evidence: Evidence) -> Array:
+    """Power (12,) of the flights' means of what is left, counted as ``windowed_spectra.power_of`` counts it."""
+    means = (0.5 * len(r) * np.abs(r[:, 0].mean(axis=0)) ** 2 for r in (flight.residual for flight in evidence.flights))
+    return np.asarray(sum(means))
+
+
+def _powers(fit: CandidateFit) -> Array:
+    """Power (2, 12) of a fit's residuals: with the means, and without them.
+
+    Beside a large mean the rest may be small.
+    """
+    residuals = [flight.residual for flight in fit.flights]
+    about_means = [np.concatenate([0.0 * r[:, :1], r[:, 1:]], axis=1) for r in residuals]
+    return np.array([sum(power_of(r) for r in each) for each in (residuals, about_means)])
