@@ -1,36 +1,158 @@
-"""What an effect must take away. Truth: remainders made by hand."""
+"""Which candidates are accepted, from tables of scores made by hand; truth: each rule, at its boundary."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.selection.acceptance import _shifts
+from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
+from sysid_node.gap.selection.acceptance import (
+    ComparisonTable,
+    RemainingPower,
+    RemainingStructure,
+    channels_improved,
+    is_accepted,
+    rejection,
+)
+from sysid_node.gap.thresholds import THRESHOLDS
 
-WINDOWS, LINES = 6, 5
+LIMITS = THRESHOLDS.acceptance
+NOTHING = RemainingPower(np.zeros(12), np.zeros(12))
 V = CHANNELS.index("V")
+LOG_ODDS = LIMITS.log_bayes_factor(30)
 
 
-def trial(mean: float, noise: float, random: np.random.Generator) -> SimpleNamespace:
-    """Of a flight whose motion has a power of one at each line; ``mean`` of the remainder of the airspeed."""
-    left = noise * (random.standard_normal((WINDOWS, LINES, 12)) + 1j * random.standard_normal((WINDOWS, LINES, 12)))
-    left[:, 0] = 0.0
-    left[:, 0, V] = mean
-    model = SimpleNamespace(measured=np.ones((WINDOWS, LINES, 12), complex))
-    flight = SimpleNamespace(residual=left, model=model)
-    return SimpleNamespace(evidence=SimpleNamespace(flights=(flight,)))
+def channels(value: float, rest: float = 0.0, channel: int = 0) -> np.ndarray:
+    """One of twelve channels at a value, the others at another."""
+    found = np.full(12, rest)
+    found[channel] = value
+    return found
 
 
-def test_what_is_off_on_average_counts_whatever_weather_is_left(random: np.random.Generator) -> None:
-    shifted = _shifts(trial(0.5, 3.0, random), trial(0.1, 3.0, random))
-    assert np.flatnonzero(shifted).tolist() == [V]
+def removed(without: float, with_it: float, channel: int = 0) -> RemainingPower:
+    """Power of one channel, the others at zero."""
+    return RemainingPower(channels(without, channel=channel), channels(with_it, channel=channel))
 
 
-def test_an_offset_that_nobody_would_look_for_does_not(random: np.random.Generator) -> None:
-    assert not _shifts(trial(0.05, 3.0, random), trial(0.0, 3.0, random)).any()
+def table(**changes: object) -> ComparisonTable:
+    """A candidate that is accepted: it removes 90 % of what is left of CL, a tenth of the motion's power."""
+    scores = ComparisonTable(
+        time=None, sample_period=0.01, probability=0.99, gusty=False, motion=np.ones(12), power=removed(0.1, 0.01),
+        structure=RemainingStructure(NOTHING, np.zeros(12)), mean_power=NOTHING, contribution=channels(0.5),
+        log_bayes_factor=50.0, searched=30,
+    )  # fmt: skip
+    return replace(scores, **changes)
 
 
-def test_nor_what_comes_and_goes(random: np.random.Generator) -> None:
-    before = trial(0.0, 0.0, random)
-    before.evidence.flights[0].residual[:, 0, V] = 2.0 * (-1.0) ** np.arange(WINDOWS)
-    assert not _shifts(before, trial(0.0, 0.0, random)).any()
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, None),
+        ({"time": 0.005}, "within one sample"),
+        ({"time": -0.005}, "within one sample"),
+        ({"time": 0.1}, None),
+        ({"probability": 0.5}, "predict better"),
+        ({"power": removed(0.1, 0.09)}, "too little"),
+        ({"contribution": np.zeros(12)}, "too little"),
+        ({"contribution": channels(0.5, channel=1)}, "too little"),  # not on the channel that it improves
+        ({"contribution": np.full(12, np.inf)}, None),  # without it nothing finite is predicted
+        ({"log_bayes_factor": 0.0}, "commands"),
+        ({"log_bayes_factor": np.nan}, "commands"),
+    ],
+)
+def test_each_rule(changes: dict[str, object], reason: str | None) -> None:
+    found = rejection(table(**changes))
+    assert found is None if reason is None else reason in str(found)
+    assert is_accepted(table(**changes)) is (reason is None)
+
+
+@pytest.mark.parametrize(("time", "accepted"), [(0.01 - 1e-9, False), (0.01, True), (0.01 + 1e-9, True)])
+def test_boundary_of_one_sample(time: float, accepted: bool) -> None:
+    assert is_accepted(table(time=time)) is accepted
+    assert is_accepted(table(time=-time)) is accepted
+
+
+@pytest.mark.parametrize(("change", "accepted"), [(-1e-9, False), (0.0, False), (1e-9, True)])
+def test_a_probability_at_the_threshold_is_not_beyond_doubt(change: float, accepted: bool) -> None:
+    assert is_accepted(table(probability=LIMITS.probability + change)) is accepted
+
+
+@pytest.mark.parametrize(("change", "accepted"), [(-1e-9, False), (0.0, False), (1e-9, True)])
+def test_boundary_of_the_share_that_comes_back(change: float, accepted: bool) -> None:
+    assert is_accepted(table(contribution=channels(LIMITS.share_of_gap + change))) is accepted
+
+
+@pytest.mark.parametrize(("change", "accepted"), [(-1e-9, False), (0.0, False), (1e-9, True)])
+def test_boundary_of_the_log_bayes_factor(change: float, accepted: bool) -> None:
+    assert is_accepted(table(log_bayes_factor=LOG_ODDS + change)) is accepted
+
+
+def test_picked_from_more_effects_a_candidate_needs_more_support() -> None:
+    scores = table(log_bayes_factor=LOG_ODDS + 0.1)
+    assert is_accepted(scores) and not is_accepted(replace(scores, searched=60))
+
+
+@pytest.mark.parametrize(("change", "improved"), [(-1e-9, False), (1e-9, True)])
+def test_boundary_of_the_share_of_the_remainder(change: float, improved: bool) -> None:
+    """A quarter of 0.1 of the motion."""
+    power = removed(0.1, 0.1 * (1.0 - LIMITS.share_of_remainder) - change)
+    assert bool(channels_improved(table(power=power))[0]) is improved
+
+
+@pytest.mark.parametrize(("change", "improved"), [(-1e-9, False), (1e-9, True)])
+def test_boundary_of_a_noticeable_error(change: float, improved: bool) -> None:
+    """All that is left of a channel is removed: it matters from 5 % of the motion (rms)."""
+    power = removed(LIMITS.noticeable_error**2 + change, 0.0)
+    assert bool(channels_improved(table(power=power))[0]) is improved
+
+
+@pytest.mark.parametrize(("change", "improved"), [(-1e-9, False), (1e-9, True)])
+def test_a_large_error_counts_whatever_share_of_the_remainder_it_is(change: float, improved: bool) -> None:
+    power = removed(1.0, 1.0 - LIMITS.large_error**2 - change)
+    assert bool(channels_improved(table(power=power))[0]) is improved
+
+
+def test_powers_count_as_shares_of_the_motion() -> None:
+    assert not is_accepted(table(motion=np.full(12, 100.0)))
+
+
+def structure(without: float, with_it: float) -> RemainingStructure:
+    """Of CL, in noise levels; of 100 of all power."""
+    return RemainingStructure(removed(without, with_it), channels(100.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("found", "improved"),
+    [
+        (structure(40.0, 10.0), True),  # 30 % of the power, which is a tenth of the motion's: 3 %
+        (structure(40.0, 31.0), False),  # less than a quarter of the structure
+        (structure(2.0, 0.0), False),  # 0.2 % of the motion: not noticeable
+        (structure(2.6, 0.0), True),
+    ],
+)
+def test_in_gusts_what_is_structure_of_forces_counts(found: RemainingStructure, improved: bool) -> None:
+    """Of the power, hardly any is removed: the rest is weather."""
+    scores = table(gusty=True, power=removed(0.1, 0.09), structure=found)
+    assert bool(channels_improved(scores)[0]) is improved
+    assert not channels_improved(replace(scores, gusty=False))[0]
+
+
+@pytest.mark.parametrize(
+    ("means", "improved"), [((0.1, 0.01), True), ((0.1, 0.08), False), ((0.0024, 0.0), False), ((0.0026, 0.0), True)]
+)
+def test_in_gusts_what_is_off_on_average_counts(means: tuple[float, float], improved: bool) -> None:
+    scores = table(gusty=True, power=removed(0.1, 0.1), mean_power=removed(*means))
+    assert bool(channels_improved(scores)[0]) is improved
+
+
+def test_in_gusts_a_reading_counts_by_its_power() -> None:
+    """Air data and attitude are predicted from the inertial instruments, in which gusts are."""
+    assert len(COEFFICIENTS) <= V
+    scores = table(gusty=True, power=removed(0.1, 0.01, V), contribution=channels(0.5, channel=V))
+    assert is_accepted(scores)
+    assert not channels_improved(replace(scores, power=removed(0.1, 0.01)))[0]  # a force's power does not count
+
+
+def test_other_thresholds_decide_otherwise() -> None:
+    strict = replace(THRESHOLDS, acceptance=replace(LIMITS, probability=0.999))
+    assert is_accepted(table()) and not is_accepted(table(), strict)

@@ -1,46 +1,103 @@
-"""More nats make a cause more credible, what it leaves less; neither says that it is certain."""
+"""The calibrated probability of a cause; truth: the regression by hand, and each rule at its boundary."""
 
+from dataclasses import replace
+
+import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid_node.gap.selection.calibration import CauseEvidence
+from sysid_node.gap.selection.calibration import (
+    CauseEvidence,
+    calibrated_probability,
+    evidence_of,
+    is_misspecified,
+    is_supported_but_misspecified,
+    misfit_of,
+    prior_odds,
+    regressors,
+)
+from sysid_node.gap.selection.misspecification import Misspecification
 from sysid_node.gap.thresholds import THRESHOLDS
 
-LIKELY, REFUTED = THRESHOLDS.calibration.probability, THRESHOLDS.calibration.misfit
+LIMITS = THRESHOLDS.calibration
 NATS, MISFITS = st.floats(-1e3, 1e6), st.floats(0.0, 2.0)
 
 
+def evidence(nats: float, misfit: float = 0.0, flexible: bool = False) -> CauseEvidence:
+    return CauseEvidence(nats, misfit, flexible)
+
+
 @given(NATS, st.floats(0.0, 1e5), MISFITS)
-def test_more_nats_are_more_credible(nats, more, misfit) -> None:
-    assert (
-        CauseEvidence(nats, misfit, flexible=False).probability_by_evidence
-        <= CauseEvidence(nats + more, misfit, flexible=False).probability_by_evidence
-    )
+def test_more_support_is_more_probable(nats: float, more: float, misfit: float) -> None:
+    assert calibrated_probability(evidence(nats, misfit)) <= calibrated_probability(evidence(nats + more, misfit))
 
 
 @given(NATS, MISFITS, st.floats(0.0, 1.0))
-def test_what_is_left_counts_against_a_cause(nats, misfit, more) -> None:
-    assert (
-        CauseEvidence(nats, misfit + more, flexible=False).probability_by_evidence
-        <= CauseEvidence(nats, misfit, flexible=False).probability_by_evidence
-    )
+def test_misfit_counts_against_a_cause(nats: float, misfit: float, more: float) -> None:
+    assert calibrated_probability(evidence(nats, misfit + more)) <= calibrated_probability(evidence(nats, misfit))
 
 
 @given(NATS)
-def test_what_leaves_nothing_is_not_wanting(nats) -> None:
-    assert not CauseEvidence(nats, 0.0, flexible=False).supported_but_misspecified
+def test_a_flexible_effect_is_less_probable(nats: float) -> None:
+    assert calibrated_probability(evidence(nats, flexible=True)) < calibrated_probability(evidence(nats))
 
 
 @given(NATS)
-def test_a_law_that_is_refuted_is_not_believed(nats) -> None:
-    """More data of a wrong law are more nats."""
-    grounds = CauseEvidence(nats, 2.0 * REFUTED, flexible=False)
-    assert grounds.probability_by_evidence == 0.0
-    assert grounds.supported_but_misspecified is (
-        CauseEvidence(nats, 0.0, flexible=False).probability_by_evidence >= LIKELY
+def test_a_misspecified_cause_has_no_probability_however_large_its_support(nats: float) -> None:
+    """The evidence for a wrong equation grows with the data."""
+    wrong = evidence(nats, 2.0 * LIMITS.misfit)
+    assert calibrated_probability(wrong) == 0.0
+    assert is_supported_but_misspecified(wrong) is (calibrated_probability(evidence(nats)) >= LIMITS.probability)
+    assert not is_supported_but_misspecified(evidence(nats))
+
+
+@pytest.mark.parametrize(("change", "misspecified"), [(-1e-9, False), (0.0, False), (1e-9, True)])
+def test_boundary_of_the_misfit(change: float, misspecified: bool) -> None:
+    assert is_misspecified(evidence(1e4, LIMITS.misfit + change)) is misspecified
+
+
+def test_the_probability_is_the_logistic_regressions() -> None:
+    """By hand: log odds of -4.02 + 1.18 ln(100) - 1.12."""
+    odds = np.exp(-4.02 + 1.18 * np.log(100.0) - 1.12)
+    assert calibrated_probability(evidence(100.0, flexible=True)) == pytest.approx(odds / (1.0 + odds))
+    assert regressors(evidence(100.0, flexible=True)) == (1.0, pytest.approx(np.log(100.0)), 1.0)
+    assert regressors(evidence(-5.0)) == (1.0, 0.0, 0.0)  # no support counts as one nat
+
+
+def test_no_support_is_not_probable_and_a_large_one_is() -> None:
+    assert calibrated_probability(evidence(0.0)) < LIMITS.probability < calibrated_probability(evidence(1e4))
+
+
+def test_prior_odds_are_lower_for_flexible_effects() -> None:
+    assert prior_odds("actuator_lag") == 1.0
+    assert prior_odds("mass_error") == pytest.approx(np.exp(LIMITS.flexible))
+    assert evidence_of("mass_error", 10.0, misfit_table()).flexible
+    assert not evidence_of("actuator_lag", 10.0, misfit_table()).flexible
+
+
+def misfit_table(contributed: float = 90.0, deviations: float = 10.0) -> Misspecification:
+    """The test of an effect on two channels: one as given, one that holds the rest and is fitted exactly."""
+    return Misspecification(
+        np.array([contributed, 100.0 - contributed]), np.array([10.0, 0.0]), np.array([deviations, 0.0])
     )
 
 
-def test_nothing_foretold_is_not_believed() -> None:
-    assert CauseEvidence(0.0, 0.0, flexible=False).probability_by_evidence < LIKELY
-    assert CauseEvidence(1e4, 0.0, flexible=False).probability_by_evidence > LIKELY
+def test_misfit_is_the_amplitude_ratio_on_the_channels_where_it_is_significant() -> None:
+    assert misfit_of(misfit_table()) == pytest.approx(np.sqrt(10.0 / 90.0))
+
+
+@pytest.mark.parametrize(("change", "counts"), [(-1e-9, False), (0.0, False), (1e-9, True)])
+def test_boundary_of_the_deviations_of_a_misfit(change: float, counts: bool) -> None:
+    assert (misfit_of(misfit_table(deviations=LIMITS.deviations + change)) > 0.0) is counts
+
+
+@pytest.mark.parametrize(("change", "counts"), [(-1e-6, False), (1e-6, True)])
+def test_a_channel_with_little_of_the_effect_does_not_count(change: float, counts: bool) -> None:
+    assert (misfit_of(misfit_table(contributed=100.0 * LIMITS.counted + change)) > 0.0) is counts
+
+
+def test_other_thresholds_decide_otherwise() -> None:
+    strict = replace(THRESHOLDS, calibration=replace(LIMITS, misfit=0.1))
+    assert calibrated_probability(evidence(1e4, 0.2)) > 0.9
+    assert calibrated_probability(evidence(1e4, 0.2), strict) == 0.0

@@ -10,7 +10,7 @@ from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.calibration import CauseEvidence
+from sysid_node.gap.selection.calibration import calibrated_probability, evidence_of, is_supported_but_misspecified
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.misspecification import misspecification_of
 from sysid_node.sim import Simulator
@@ -26,7 +26,7 @@ def misfit(aircraft):
         fitter = CandidateFitter(nuisances, Checkpoint())
         base = fitter.fit_set(unfitted([model], nuisances), [])
         (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "imu_scale")
-        return CauseEvidence.of(
+        return evidence_of(
             "imu_scale", 1000.0, misspecification_of(fitter.add_candidate(base, candidate).fit, candidate)
         )
 
@@ -35,9 +35,9 @@ def misfit(aircraft):
 
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 def test_a_gyro_that_reads_low_is_one(misfit, make_flight, turbulence) -> None:
-    grounds = misfit(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
-    assert grounds.misfit < 0.2
-    assert grounds.probability_by_evidence > 0.9
+    evidence = misfit(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
+    assert evidence.misfit < 0.2
+    assert calibrated_probability(evidence) > 0.9
 
 
 @pytest.mark.parametrize("turbulence", ["none", "light"])
@@ -46,6 +46,6 @@ def test_a_gyro_that_saturates_is_not_one_that_reads_low(misfit, make_flight, tu
     rate = flight.record["p"]
     cut = np.clip(rate, -0.4 * np.abs(rate).max(), 0.4 * np.abs(rate).max())
     clipped = replace(flight.record, columns={**flight.record.columns, "p": cut})
-    grounds = misfit(replace(flight, record=clipped))
-    assert grounds.misfit > 0.4
-    assert grounds.supported_but_misspecified
+    evidence = misfit(replace(flight, record=clipped))
+    assert evidence.misfit > 0.4
+    assert is_supported_but_misspecified(evidence)

@@ -1,0 +1,74 @@
+"""Scores of one explanation against another; truth: powers counted by hand, and the effect that was flown."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from gap_flights import fly
+
+from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.candidates import candidates_of
+from sysid_node.gap.estimation.checkpoint import Checkpoint
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.selection.acceptance import ComparisonTable, is_accepted
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
+from sysid_node.gap.selection.comparison import Comparison, power_left, probability_against
+from sysid_node.sim import EFFECTS, Simulator
+
+
+@pytest.fixture(scope="module")
+def lag(aircraft) -> Comparison:
+    """A servo's lag against nuisances alone, on a flight with that lag."""
+    flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.1}}, seed=14)
+    model = residual_model_of(Simulator(aircraft, 50.0), flight)
+    nuisances = nuisances_of(aircraft, model)
+    fitter = CandidateFitter(nuisances, Checkpoint())
+    base = fitter.fit_set(unfitted([model], nuisances), [])
+    (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "actuator_lag")
+    return Comparison(base, base, fitter.add_candidate(base, candidate))
+
+
+def test_the_true_effect_is_accepted_by_every_score(lag) -> None:
+    assert lag.time == pytest.approx(0.1, rel=0.1)
+    assert lag.sample_period == pytest.approx(0.01)
+    assert lag.probability > 0.99 and lag.log_bayes_factor > 100.0
+    assert lag.searched == len(EFFECTS) and not lag.gusty
+    assert is_accepted(lag)
+
+
+def test_the_table_decides_as_the_measured_scores_do(lag) -> None:
+    table = lag.table()
+    assert is_accepted(table)
+    for entry in fields(ComparisonTable):
+        assert getattr(table, entry.name) is not None
+
+
+def test_powers_are_those_of_the_residuals(lag) -> None:
+    """By hand: every line counts once, the mean by half; the motion is about the windows' means."""
+    residual = lag.without.evidence.flights[0].residual
+    power = np.abs(residual) ** 2
+    np.testing.assert_allclose(power_left(lag.without.evidence), (power[:, 1:].sum(axis=1) + 0.5 * power[:, 0]).sum(0))
+    np.testing.assert_allclose(lag.power.without, power_left(lag.without.evidence))
+    means = 0.5 * len(residual) * np.abs(residual[:, 0].mean(axis=0)) ** 2
+    np.testing.assert_allclose(lag.mean_power.without, means)
+    measured = lag.fitted.fit.models[0].measured
+    np.testing.assert_allclose(lag.motion, (np.abs(measured[:, 1:]) ** 2).sum(axis=(0, 1)))
+
+
+def test_the_gap_that_comes_back_is_most_of_it(lag) -> None:
+    """The only effect there is: without it, nuisances leave what they left before or more."""
+    assert 0.5 < lag.contribution.max() < np.inf
+
+
+def test_what_cannot_be_predicted_without_the_effect_comes_back_without_end(lag) -> None:
+    """Noise so unequal that the nuisances' normal equations are singular: no error of the diagnosis."""
+    power = np.full_like(lag.without.fit.powers[0], 1e30)
+    power[3, 0] = 1e-40
+    endless = replace(lag.without, fit=lag.without.fit.with_powers([power]))
+    assert np.isinf(Comparison(lag.base, endless, lag.fitted).contribution).all()
+
+
+def test_an_explanation_against_itself_is_even(lag) -> None:
+    assert probability_against(lag.fitted, lag.fitted) == pytest.approx(0.5)
+    assert probability_against(lag.without, lag.fitted) == pytest.approx(1.0 - lag.probability)

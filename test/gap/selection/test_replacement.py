@@ -1,0 +1,83 @@
+"""The next step of the stepwise replacement, from tables made by hand; truth: each rule, tie and boundary."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
+from sysid_node.gap.selection.replacement import AlternativeTable, PositionTable, Step, next_step
+from sysid_node.gap.thresholds import THRESHOLDS
+
+NOTHING = RemainingPower(np.zeros(12), np.zeros(12))
+ACCEPTED = ComparisonTable(
+    time=None, sample_period=0.01, probability=0.99, gusty=False, motion=np.ones(12),
+    power=RemainingPower(np.full(12, 0.1), np.zeros(12)), structure=RemainingStructure(NOTHING, np.zeros(12)),
+    mean_power=NOTHING, contribution=np.ones(12), log_bayes_factor=50.0, searched=30,
+)  # fmt: skip
+REJECTED = replace(ACCEPTED, probability=0.5)
+LEAD = THRESHOLDS.search.lead
+
+
+def cause(*alternatives: AlternativeTable, needed: bool = True, score_without: float = -100.0) -> PositionTable:
+    return PositionTable(ACCEPTED if needed else REJECTED, score_without, alternatives)
+
+
+def alternative(label: str, lead: float, accepted: bool = True) -> AlternativeTable:
+    return AlternativeTable(label, ACCEPTED if accepted else REJECTED, lead)
+
+
+def test_an_explanation_without_better_alternatives_is_kept() -> None:
+    assert next_step([]) is None
+    assert next_step([cause(), cause()]) is None
+    assert next_step([cause(alternative("cg_shift", -5.0)), cause(alternative("mass_error", 0.5))]) is None
+
+
+def test_a_cause_that_is_not_needed_is_dropped() -> None:
+    assert next_step([cause(), cause(needed=False)]) == Step(1)
+
+
+def test_a_single_cause_is_not_dropped() -> None:
+    assert next_step([cause(needed=False)]) is None
+
+
+@pytest.mark.parametrize(("scores", "position"), [((-100.0, -90.0), 1), ((-90.0, -100.0), 0), ((-90.0, -90.0), 0)])
+def test_of_several_the_one_whose_absence_predicts_best_is_dropped(scores: tuple[float, float], position: int) -> None:
+    """In a tie the first."""
+    first, second = (cause(needed=False, score_without=score) for score in scores)
+    assert next_step([first, second]) == Step(position)
+
+
+def test_dropping_comes_before_replacing() -> None:
+    assert next_step([cause(alternative("cg_shift", 100.0)), cause(needed=False)]) == Step(1)
+
+
+def test_the_alternative_with_the_largest_lead_takes_the_place() -> None:
+    positions = [
+        cause(alternative("cg_shift", 2.0), alternative("mass_error", 7.0)),
+        cause(alternative("air_data_lag", 5.0)),
+    ]
+    assert next_step(positions) == Step(0, 1)
+    assert next_step(positions, frozenset({"mass_error"})) == Step(1, 0)
+    assert next_step(positions, frozenset({"mass_error", "air_data_lag"})) == Step(0, 0)
+    assert next_step(positions, frozenset({"mass_error", "air_data_lag", "cg_shift"})) is None
+
+
+def test_in_a_tie_the_first_alternative_takes_the_place() -> None:
+    positions = [cause(alternative("cg_shift", 2.0)), cause(alternative("mass_error", 2.0))]
+    assert next_step(positions) == Step(0, 0)
+
+
+@pytest.mark.parametrize(("change", "step"), [(-1e-9, None), (0.0, None), (1e-9, Step(0, 0))])
+def test_boundary_of_the_lead(change: float, step: Step | None) -> None:
+    assert next_step([cause(alternative("cg_shift", LEAD + change))]) == step
+
+
+def test_an_alternative_that_is_not_accepted_takes_no_place() -> None:
+    assert next_step([cause(alternative("cg_shift", 100.0, accepted=False))]) is None
+
+
+def test_a_larger_lead_may_be_asked_for() -> None:
+    strict = replace(THRESHOLDS, search=replace(THRESHOLDS.search, lead=10.0))
+    positions = [cause(alternative("cg_shift", 5.0))]
+    assert (next_step(positions), next_step(positions, thresholds=strict)) == (Step(0, 0), None)
