@@ -54,7 +54,7 @@ def test_a_fit_without_numbers_is_no_explanation(late) -> None:
     """Where slopes grow without end a matrix is not positive definite."""
 
     class Failing(Checkpoint):
-        def polished(self, fit):
+        def converged(self, fit):
             raise np.linalg.LinAlgError("not positive definite")
 
     fitter, base, candidates = late
