@@ -29,8 +29,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
 from sysid_node.faults.model.blocks import of_record
-from sysid_node.faults.settings import Settings
-from sysid_node.faults.state import State
+from sysid_node.faults.settings import FaultMonitorSettings
+from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import (
     AIRSPEED,
     DAMAGE,
@@ -163,11 +163,11 @@ def believed(seed: int) -> Aircraft:
     return replace(AIRCRAFT, derivatives=drawn)
 
 
-def monitored(seed: int, identified: bool) -> State:
+def monitored(seed: int, identified: bool) -> MonitorState:
     """A monitor that has seen nothing."""
     if not identified:
-        return monitor.init(believed(seed), Settings())
-    state = monitor.init(AIRCRAFT, Settings())
+        return monitor.init(believed(seed), FaultMonitorSettings())
+    state = monitor.init(AIRCRAFT, FaultMonitorSettings())
     off = np.random.default_rng(2000 + seed).standard_normal(len(state.held.values))
     state.held.errors = IDENTIFIED * np.abs(state.held.values) + 1e-5
     state.held.values = state.held.values + state.held.errors * off
@@ -197,7 +197,7 @@ class Seen:
         return self.found and self.kind in case.kinds and self.part == case.part
 
 
-def watch(state: State, time: Array, samples: Array, onset: float) -> Seen:
+def watch(state: MonitorState, time: Array, samples: Array, onset: float) -> Seen:
     """Let the monitor judge a flight."""
     early, found, named = 0, math.inf, None
     for block in of_record(state.aircraft, time, samples):

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import controller
-from sysid_node.control.estimates import beliefs_of
-from sysid_node.control.settings import Settings as Control
-from sysid_node.control.types import Sensed, SetPoints
+from sysid_node.control.estimates import identified_derivatives
+from sysid_node.control.settings import ControllerSettings as Control
+from sysid_node.control.types import Measurements, SetPoints
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter import ExcitationSettings as Excitation
 from sysid_node.excite.relative_precision import relative_precision
@@ -118,7 +118,9 @@ def fly(sortie: Sortie) -> Flown:
     )
 
 
-def _estimate(session: Session, pilot: controller.State, excitation: exciter.ExciterState, now: live.Reading) -> None:
+def _estimate(
+    session: Session, pilot: controller.ControllerState, excitation: exciter.ExciterState, now: live.Reading
+) -> None:
     """Messages into the estimator, and what falls due to those who use it."""
     stamp = round(1e9 * now.time)
     *surfaces, thrust = now.surfaces.tolist()
@@ -130,21 +132,21 @@ def _estimate(session: Session, pilot: controller.State, excitation: exciter.Exc
     V, alpha, beta = now.outputs[9:].tolist()
     session.air_data(stamp, (V, alpha, beta, now.density))
     for due in session.imu(stamp, tuple(now.outputs[:6].tolist())):
-        controller.hear(pilot, now.time, beliefs_of(due.estimates))
+        controller.receive_estimates(pilot, now.time, identified_derivatives(due.estimates))
         precision = relative_precision(due.estimates.derivatives.values(), session.aircraft)
         if exciter.receive_estimates(excitation, now.time, precision):
             session.reset()
 
 
 def _command(
-    pilot: controller.State, excitation: exciter.ExciterState, now: live.Reading, points: SetPoints
+    pilot: controller.ControllerState, excitation: exciter.ExciterState, now: live.Reading, points: SetPoints
 ) -> tuple[Sequence[float], Array]:
     """Command (4,) and what was wanted: pitch, roll, sideslip (3,)."""
     _, _, az, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
     if not excitation.events and now.time >= BEGIN:
         exciter.start(excitation, now.time)
     extra = exciter.step(excitation, now.time, exciter.FlightCondition(phi, theta, V, -az / exciter.GRAVITY))
-    sensed = Sensed(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
+    sensed = Measurements(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
     command = controller.step(pilot, sensed, points, extra.tolist())
     wanted = pilot.law.wanted
     assert wanted is not None

@@ -110,6 +110,6 @@ class Aircraft:
         return tuple(control.symbol for control in self.controls.values())
 
     @property
-    def structure(self) -> dict[str, tuple[str, ...]]:
+    def model_structure(self) -> dict[str, tuple[str, ...]]:
         """Regressors of each coefficient: ``{"Cm": ("0", "alpha", "q", "de"), ...}``."""
         return model_structure(self.derivatives)

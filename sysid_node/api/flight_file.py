@@ -12,7 +12,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.data_frames import data_frame
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.logs import load_flight
+from sysid_node.flight.logs import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.topics import topic_names
 
@@ -41,7 +41,9 @@ class FlightFile:
 
     def aligned(self, max_gap: float) -> FlightRecord:
         """The samples, those left out that stand more than ``max_gap`` s from a message. Raises InputError."""
-        record = load_flight(self.path, self.aircraft, topics=self.topics, frame=self.body_frame, max_gap=max_gap)
+        record = load_flight_record(
+            self.path, self.aircraft, topics=self.topics, frame=self.body_frame, max_gap=max_gap
+        )
         return replace(record, name=self.name)
 
     def plot(self) -> Figure:

@@ -13,11 +13,11 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
 from sysid_node.errors import InputError
-from sysid_node.faults.model.reference_model import known_of
-from sysid_node.faults.recorded_flight import Heard, Verdict, judge
-from sysid_node.faults.settings import Settings as FaultSettings
+from sysid_node.faults.model.reference_model import identifier_estimates
+from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, judge
+from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
-from sysid_node.flight.align import flat, why_nothing_aligned
+from sysid_node.flight.align import counts_by_reason, why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commands import read_commands
 from sysid_node.flight.streams import Stamps, Streams
@@ -57,7 +57,7 @@ class Replay(EstimatedRun):
     final: Estimates  # after the last sample, whether or not one was due
     streams: Streams
     truth: Truth  # empty where it is not known
-    faults: Verdict | None = None  # None: nothing was judged
+    faults: FaultVerdict | None = None  # None: nothing was judged
 
     @cached_property
     def run(self) -> RunResult:  # type: ignore[override]  # computed when it is first needed
@@ -73,7 +73,7 @@ class Replay(EstimatedRun):
             time=time,
             samples=flow_angle_filter.complete_many(flow, time, self.aligned.samples, gap),
             history=list(shown.values()),
-            rejected=flat(self.aligned.rejected),
+            rejected=counts_by_reason(self.aligned.rejected),
             truth=self.truth.values,
             truth_since=self.truth.since,
             faults=self.faults,
@@ -153,10 +153,10 @@ def _estimated(
     return Replay(flight.aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams, truth)
 
 
-def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> Verdict:
+def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> FaultVerdict:
     """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
     pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
-    heard = (Heard(stamp, known_of(estimates)) for stamp, estimates in pairs)
+    heard = (RecordedEstimates(stamp, identifier_estimates(estimates)) for stamp, estimates in pairs)
     return judge(found.aircraft, FaultSettings(), found.streams, read_commands(bag), heard, progress)
 
 

@@ -116,7 +116,7 @@ def predicted_coefficients(
         except InputError:
             continue  # a flight without, say, a sideslip vane can be integrated, but its coefficients cannot be formed
         modelled: dict[str, Array] = {}
-        for coefficient, regressors in aircraft.structure.items():
+        for coefficient, regressors in aircraft.model_structure.items():
             names = [f"{coefficient}_{name}" for name in regressors]
             if coefficient in flight.coefficients and all(name in values for name in names):
                 modelled[coefficient] = regressor_matrix(flight, regressors) @ np.array(

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.flight.autopilots.base import Settings, adapter_for
+from sysid_node.flight.autopilots.base import AdapterSettings, adapter_for
 from sysid_node.flight.autopilots.known import ADAPTERS
 from sysid_node.flight.autopilots.recorded import read_recorded
 from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.frames import BODY_FRAMES
-from sysid_node.flight.logs import READERS, read_log, streams_of
+from sysid_node.flight.logs import READERS, read_log, streams_from_record
 from sysid_node.flight.streams import Streams
 
 if TYPE_CHECKING:
@@ -30,10 +30,13 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("--autopilot", choices=list(ADAPTERS), help="LOG is a bag of this autopilot's own topics")
     parser.add_argument("--joints", default="", help="with --autopilot: NAME=OUTPUT:TRIM:SCALE ... in one argument")
     parser.add_argument(
-        "--air-temperature", type=float, default=Settings.air_temperature, help="with --autopilot: degC (default: 15)"
+        "--air-temperature",
+        type=float,
+        default=AdapterSettings.air_temperature,
+        help="with --autopilot: degC (default: 15)",
     )
     parser.add_argument(
-        "--air-data-delay", type=float, default=Settings.air_data_delay, help="with --autopilot: s (default: 0)"
+        "--air-data-delay", type=float, default=AdapterSettings.air_data_delay, help="with --autopilot: s (default: 0)"
     )
     parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
     parser.add_argument(
@@ -55,9 +58,9 @@ def run(args: argparse.Namespace) -> None:
 
 def _logged(args: argparse.Namespace) -> Streams:
     aircraft = load_aircraft(args.aircraft) if args.aircraft else None
-    return streams_of(read_log(args.log), aircraft)
+    return streams_from_record(read_log(args.log), aircraft)
 
 
 def _recorded(args: argparse.Namespace) -> Streams:
-    settings = Settings(args.joints, args.air_temperature, args.air_data_delay)
+    settings = AdapterSettings(args.joints, args.air_temperature, args.air_data_delay)
     return read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings))

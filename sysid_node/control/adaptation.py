@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from sysid_node.control.axis import Axis
 from sysid_node.control.margins import margins
-from sysid_node.control.settings import Settings
-from sysid_node.control.types import Belief
+from sysid_node.control.settings import ControllerSettings
+from sysid_node.control.types import IdentifiedDerivative
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ LAPSE = 5.0
 LEAST_AUTHORITY = 0.1
 
 
-class Flown(NamedTuple):
+class AxisParameters(NamedTuple):
     """What the law flies on: derivatives (D,) for the feedforward, gains (m, n) for the feedback."""
 
     values: Array
@@ -48,7 +48,7 @@ class Flown(NamedTuple):
 
 
 @dataclass
-class Check:
+class MarginCheck:
     """Gains under test: the corners (N, D) of the intervals, how many have passed, and with how much caution."""
 
     values: Array  # (D,)
@@ -59,37 +59,37 @@ class Check:
 
 
 @dataclass
-class Adaptation:
+class AxisAdaptation:
     """Of one axis."""
 
     axis: Axis
-    flown: Flown
-    target: Flown
-    check: Check | None = None
+    flown: AxisParameters
+    target: AxisParameters
+    check: MarginCheck | None = None
     checked_at: float = -math.inf  # s
     used: tuple[str, ...] = ()  # derivatives whose estimates are in the target
     verdict: str = "baseline"
     accepted: int = 0
     refused: int = 0
-    left: Flown | None = None  # the target that was left for the baseline, to be taken up again
+    left: AxisParameters | None = None  # the target that was left for the baseline, to be taken up again
     left_at: float = math.nan  # s
 
 
-def init(axis: Axis) -> Adaptation:
+def init(axis: Axis) -> AxisAdaptation:
     """Flying the baseline."""
-    baseline = Flown(axis.believed, axis.baseline)
-    return Adaptation(axis, baseline, baseline)
+    baseline = AxisParameters(axis.believed, axis.baseline)
+    return AxisAdaptation(axis, baseline, baseline)
 
 
-def fall_back(state: Adaptation, why: str, now: float) -> None:
+def fall_back(state: AxisAdaptation, why: str, now: float) -> None:
     """Head for the baseline at a time (s)."""
     if state.left is None:
         state.left, state.left_at = state.target, now
     state.check, state.verdict = None, f"baseline: {why}"
-    state.target = Flown(state.axis.believed, state.axis.baseline)
+    state.target = AxisParameters(state.axis.believed, state.axis.baseline)
 
 
-def resume(state: Adaptation, now: float) -> None:
+def resume(state: AxisAdaptation, now: float) -> None:
     """All is well again: head for what was flown before, if that is not long ago; it has passed its check."""
     if state.left is None:
         return
@@ -100,7 +100,9 @@ def resume(state: Adaptation, now: float) -> None:
     state.left = None
 
 
-def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Settings, now: float) -> None:
+def consider(
+    state: AxisAdaptation, beliefs: Mapping[str, IdentifiedDerivative], settings: ControllerSettings, now: float
+) -> None:
     """Begin the check of what new estimates ask for, if none is under way and the last is long enough ago."""
     if state.check is not None or abs(now - state.checked_at) < PERIOD:
         return
@@ -119,18 +121,18 @@ def consider(state: Adaptation, beliefs: Mapping[str, Belief], settings: Setting
     if not _same_sense(state.axis, gains):
         state.verdict = "kept: a steady deflection would do the opposite"
         return
-    state.check, state.checked_at = Check(values, _corners(state.axis, values, half), gains), now
+    state.check, state.checked_at = MarginCheck(values, _corners(state.axis, values, half), gains), now
     state.used = tuple(used)
 
 
-def advance(state: Adaptation, settings: Settings, step: float) -> None:
+def advance(state: AxisAdaptation, settings: ControllerSettings, step: float) -> None:
     """Look at some corners, and move for ``step`` (s) towards the target."""
     if state.check is not None:
         _look(state, state.check, settings)
     state.flown = _moved(state.axis, state.flown, state.target, settings.gain_rate * step)
 
 
-def _usable(belief: Belief, half: float, explained: float) -> bool:
+def _usable(belief: IdentifiedDerivative, half: float, explained: float) -> bool:
     """Whether an estimate may be used; NaN never is.
 
     In a closed loop an estimate is biased by the share of the surfaces' motion that answers to disturbances (Ljung,
@@ -150,7 +152,7 @@ def _corners(axis: Axis, values: Array, half: Array) -> Array:
     return np.vstack([values, corners])
 
 
-def _look(state: Adaptation, check: Check, settings: Settings) -> None:
+def _look(state: AxisAdaptation, check: MarginCheck, settings: ControllerSettings) -> None:
     """The next few corners with the gains under test."""
     corners = check.corners[check.passed : check.passed + A_STEP]
     if not _have_margins(state.axis, corners, check.gains, settings):
@@ -158,20 +160,20 @@ def _look(state: Adaptation, check: Check, settings: Settings) -> None:
         return
     check.passed += len(corners)
     if check.passed == len(check.corners):
-        state.target, state.check = Flown(check.values, check.gains), None
+        state.target, state.check = AxisParameters(check.values, check.gains), None
         state.accepted += 1
         caution = CAUTIONS[check.caution]
         state.verdict = "adapted" if caution == 1.0 else f"adapted, caution {caution:g}"
 
 
-def _have_margins(axis: Axis, corners: Array, gains: Array, settings: Settings) -> bool:
+def _have_margins(axis: Axis, corners: Array, gains: Array, settings: ControllerSettings) -> bool:
     if not np.isfinite(gains).all():
         return False
     found = margins(axis.model(corners), gains, axis.delay)
     return bool(found.enough(settings.gain_margin, settings.phase_margin).all())
 
 
-def _be_more_cautious(state: Adaptation, check: Check) -> None:
+def _be_more_cautious(state: AxisAdaptation, check: MarginCheck) -> None:
     check.caution, check.passed = check.caution + 1, 0
     if check.caution == len(CAUTIONS):
         state.check, state.refused, state.verdict = None, state.refused + 1, "kept: no margins at the corners"
@@ -196,11 +198,11 @@ def _same_sense(axis: Axis, gains: Array) -> bool:
     return not float(gains[:, axis.integral] @ axis.baseline[:, axis.integral]) <= 0.0
 
 
-def _between(start: Flown, end: Flown, share: float) -> Flown:
-    return Flown(*(a + share * (b - a) for a, b in zip(start, end, strict=True)))
+def _between(start: AxisParameters, end: AxisParameters, share: float) -> AxisParameters:
+    return AxisParameters(*(a + share * (b - a) for a, b in zip(start, end, strict=True)))
 
 
-def _moved(axis: Axis, flown: Flown, target: Flown, most: float) -> Flown:
+def _moved(axis: Axis, flown: AxisParameters, target: AxisParameters, most: float) -> AxisParameters:
     """Towards the target by at most ``most`` of the baseline's gains, or of a derivative's size."""
     size = np.abs(axis.baseline).max(axis=0)  # (n,) by what each state is fed back
     gains = np.abs(target.gains - flown.gains).max(axis=0) / np.maximum(size, 0.1 * size.max())

@@ -15,35 +15,35 @@ from dataclasses import dataclass
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import adaptation, law
-from sysid_node.control.adaptation import Adaptation
+from sysid_node.control.adaptation import AxisAdaptation
 from sysid_node.control.axis import axes
-from sysid_node.control.law import LONGEST_STEP, Law
-from sysid_node.control.settings import Settings
-from sysid_node.control.types import Belief, Command, Sensed, SetPoints
+from sysid_node.control.law import LONGEST_STEP, LawState
+from sysid_node.control.settings import ControllerSettings
+from sysid_node.control.types import Command, IdentifiedDerivative, Measurements, SetPoints
 
 NO_EXCITATION = (0.0, 0.0, 0.0)
 FIRST_STEP = 0.005  # s
 
 
 @dataclass
-class State:
+class ControllerState:
     """All that the controller remembers."""
 
-    settings: Settings
-    axes: tuple[Adaptation, Adaptation]  # pitch, lateral
-    law: Law
+    settings: ControllerSettings
+    axes: tuple[AxisAdaptation, AxisAdaptation]  # pitch, lateral
+    law: LawState
     time: float = math.nan  # s, of the last step
     heard: float = -math.inf  # s, of the last estimates
     stale: str = "no estimates yet"  # why the baseline is flown; empty where estimates are used
 
 
-def init(aircraft: Aircraft, settings: Settings) -> State:
+def init(aircraft: Aircraft, settings: ControllerSettings) -> ControllerState:
     """A controller that flies the baseline. Raises InputError where the aircraft's file or actuators do not do."""
     pitch, lateral = (adaptation.init(axis) for axis in axes(aircraft, settings.actuator_lag, settings.delay))
-    return State(settings, (pitch, lateral), law.init(aircraft, settings))
+    return ControllerState(settings, (pitch, lateral), law.init(aircraft, settings))
 
 
-def hear(state: State, time: float, beliefs: Mapping[str, Belief]) -> None:
+def receive_estimates(state: ControllerState, time: float, beliefs: Mapping[str, IdentifiedDerivative]) -> None:
     """Estimates that came at a time (s) of the sensors' clock."""
     state.heard = time
     if state.settings.adapt and not state.stale:
@@ -51,7 +51,9 @@ def hear(state: State, time: float, beliefs: Mapping[str, Belief]) -> None:
             adaptation.consider(axis, beliefs, state.settings, time)
 
 
-def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION) -> Command:
+def step(
+    state: ControllerState, sensed: Measurements, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION
+) -> Command:
     """The command at ``sensed.time``; ``excitation`` (rad) of elevator, aileron and rudder comes on top."""
     passed = sensed.time - state.time
     duration = min(passed, LONGEST_STEP) if passed > 0.0 else FIRST_STEP
@@ -69,7 +71,7 @@ def step(state: State, sensed: Sensed, points: SetPoints, excitation: Sequence[f
     return law.step(state.law, sensed, points, flown, excitation, duration)
 
 
-def _why_not(state: State, sensed: Sensed) -> str:
+def _why_not(state: ControllerState, sensed: Measurements) -> str:
     """Why the baseline is flown: a silent sensor, old estimates; empty where estimates may be used."""
     silent = [name for name, value in sensed._asdict().items() if not math.isfinite(value)]
     if silent:

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import reference
-from sysid_node.control.adaptation import Flown
+from sysid_node.control.adaptation import AxisParameters
 from sysid_node.control.axis import Axis, level_flight
 from sysid_node.control.plant import GRAVITY, Scales
-from sysid_node.control.reference import Behind, Reference, Wanted
-from sysid_node.control.settings import Settings
-from sysid_node.control.types import Command, Sensed, SetPoints
+from sysid_node.control.reference import DelayedReference, ReferenceMotion, ReferenceState
+from sysid_node.control.settings import ControllerSettings
+from sysid_node.control.types import Command, Measurements, SetPoints
 
 Array = NDArray[np.float64]
 
@@ -36,15 +36,15 @@ PRESSURES = (0.4, 2.5)  # dynamic pressure over the reference one, within which 
 
 
 @dataclass
-class Law:
+class LawState:
     """What the law remembers."""
 
     aircraft: Aircraft
-    settings: Settings
+    settings: ControllerSettings
     limits: Array  # (3,) rad
     most_thrust: float  # N
-    behind: Behind
-    reference: Reference | None = None
+    behind: DelayedReference
+    reference: ReferenceState | None = None
     airspeed: float = math.nan  # m/s, filtered
     density: float = math.nan
     integrals: Array = field(default_factory=lambda: np.zeros(2))  # of theta's and phi's errors, rad s
@@ -53,23 +53,23 @@ class Law:
     surfaces: Array = field(default_factory=lambda: np.zeros(3))  # rad, what feedback has moved them by
     gains: tuple[Array, ...] = ()  # (m, n) of both axes, the last
     coming: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback on its way to the actuators
-    wanted: Wanted | None = None  # the reference that the motion is compared with
+    wanted: ReferenceMotion | None = None  # the reference that the motion is compared with
 
 
-def init(aircraft: Aircraft, settings: Settings) -> Law:
+def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
     """Nothing flown yet."""
     throttle = aircraft.throttle
     weight = aircraft.mass * GRAVITY
     limits = np.array([aircraft.controls[c].limit or settings.command_limit for c in ("elevator", "aileron", "rudder")])
     most = 0.0 if throttle is None else throttle.max_thrust or 2.0 * weight
-    return Law(aircraft, settings, limits, most, Behind(settings.actuator_lag, settings.delay))
+    return LawState(aircraft, settings, limits, most, DelayedReference(settings.actuator_lag, settings.delay))
 
 
 def step(
-    law: Law,
-    sensed: Sensed,
+    law: LawState,
+    sensed: Measurements,
     points: SetPoints,
-    flown: tuple[tuple[Axis, Flown], tuple[Axis, Flown]],
+    flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]],
     excitation: Sequence[float],
     step: float,
 ) -> Command:
@@ -80,9 +80,11 @@ def step(
     speed = law.aircraft.reference.airspeed
     points = reference.limited(points, level, speed, law.settings)
     if law.reference is None:
-        law.reference = Reference(_finite(sensed.theta, level), _finite(sensed.phi, 0.0))
+        law.reference = ReferenceState(_finite(sensed.theta, level), _finite(sensed.phi, 0.0))
     pitch, side = (dict(zip(axis.derivatives, f.values.tolist(), strict=True)) for axis, f in flown)
-    flight = reference.Flight(law.airspeed, level, scales.force * side.get("CY_beta", 0.0), law.settings.bandwidth)
+    flight = reference.FlightCondition(
+        law.airspeed, level, scales.force * side.get("CY_beta", 0.0), law.settings.bandwidth
+    )
     wanted = reference.advance(law.reference, points, step, flight)
     forward = _feedforward(law.reference, wanted, pitch, side, scales, step)
     late = law.wanted = reference.follow(law.behind, sensed.time, wanted, step)
@@ -97,7 +99,7 @@ def step(
     return Command(elevator, aileron, rudder, _thrust(law, sensed, points, late, level, step))
 
 
-def _condition(law: Law, sensed: Sensed, points: SetPoints, step: float) -> Scales:
+def _condition(law: LawState, sensed: Measurements, points: SetPoints, step: float) -> Scales:
     """The flight condition, filtered; where the airspeed is not measured, the last, or what is asked for."""
     known = law.aircraft.reference
     if math.isnan(law.airspeed):
@@ -111,7 +113,7 @@ def _condition(law: Law, sensed: Sensed, points: SetPoints, step: float) -> Scal
     return Scales.of(law.aircraft, law.airspeed, law.density)
 
 
-def _pressure(law: Law) -> float:
+def _pressure(law: LawState) -> float:
     """Dynamic pressure over the reference one."""
     known = law.aircraft.reference
     share = law.density * law.airspeed**2 / (known.air_density * known.airspeed**2)
@@ -119,7 +121,12 @@ def _pressure(law: Law) -> float:
 
 
 def _feedforward(
-    ref: Reference, wanted: Wanted, pitch: dict[str, float], side: dict[str, float], scales: Scales, step: float
+    ref: ReferenceState,
+    wanted: ReferenceMotion,
+    pitch: dict[str, float],
+    side: dict[str, float],
+    scales: Scales,
+    step: float,
 ) -> Array:
     """(3,) rad: the surfaces whose moments make the reference's accelerations, and the angle of attack that follows."""
     rate = wanted.q + wanted.turn
@@ -140,7 +147,7 @@ def _feedforward(
     return np.array([elevator, aileron, rudder])
 
 
-def _errors(law: Law, sensed: Sensed, late: Wanted, level: float) -> tuple[Array, Array]:
+def _errors(law: LawState, sensed: Measurements, late: ReferenceMotion, level: float) -> tuple[Array, Array]:
     """Of alpha, q, theta, its integral; of beta, p, r, phi, its integral; and what feedback has moved surfaces by.
 
     What is not measured has no error.
@@ -155,7 +162,7 @@ def _errors(law: Law, sensed: Sensed, late: Wanted, level: float) -> tuple[Array
 
 
 def _bear_new_gains(
-    law: Law, errors: tuple[Array, Array], flown: tuple[tuple[Axis, Flown], tuple[Axis, Flown]]
+    law: LawState, errors: tuple[Array, Array], flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]]
 ) -> None:
     """Set the integrals, in ``errors`` too, so that gains that move do not move the surfaces (bumpless transfer).
 
@@ -170,13 +177,13 @@ def _bear_new_gains(
     law.gains = gains
 
 
-def _follow_surfaces(law: Law, time: float, feedback: Array, step: float) -> None:
+def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -> None:
     """Move the surfaces' model behind the delay and the lag of the actuators."""
     late = reference.delayed(law.coming, time, feedback, law.settings.delay)
     law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (late - law.surfaces)
 
 
-def _limited(law: Law, asked: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
+def _limited(law: LawState, asked: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
     """The command (3,) within amplitude and rate, and which of it was held back."""
     within = np.clip(asked, -law.limits, law.limits)
     if law.command is not None:
@@ -186,14 +193,16 @@ def _limited(law: Law, asked: Array, step: float) -> tuple[Array, NDArray[np.boo
     return within, np.abs(within - asked) > 1e-9
 
 
-def _integrate(law: Law, errors: tuple[Array, Array], held: NDArray[np.bool_], step: float) -> None:
+def _integrate(law: LawState, errors: tuple[Array, Array], held: NDArray[np.bool_], step: float) -> None:
     """Errors of theta and phi add up while their surface has travel left: no winding up."""
     for i, (error, stuck) in enumerate(zip((errors[0][2], errors[1][3]), held[:2], strict=True)):
         if not stuck:
             law.integrals[i] = min(max(law.integrals[i] + step * error, -MOST_INTEGRAL), MOST_INTEGRAL)
 
 
-def _thrust(law: Law, sensed: Sensed, points: SetPoints, late: Wanted, level: float, step: float) -> float:
+def _thrust(
+    law: LawState, sensed: Measurements, points: SetPoints, late: ReferenceMotion, level: float, step: float
+) -> float:
     """N: level flight's drag, the climb's weight, and what the airspeed's error asks for."""
     if law.most_thrust == 0.0:
         return 0.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
 from sysid_node.control.plant import GRAVITY
-from sysid_node.control.settings import Settings
+from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import SetPoints
 
 T = TypeVar("T")
@@ -21,7 +21,7 @@ DAMPING = 0.9
 MOST_RATE, MOST_ACCELERATION = 1.5, 8.0  # rad/s, rad/s^2
 
 
-class Wanted(NamedTuple):
+class ReferenceMotion(NamedTuple):
     """The reference motion at one instant, rad, rad/s; accelerations rad/s^2. ``alpha`` from level flight's."""
 
     theta: float
@@ -37,7 +37,7 @@ class Wanted(NamedTuple):
     turn: float = 0.0  # pitch rate of the turn, rad/s
 
 
-class Flight(NamedTuple):
+class FlightCondition(NamedTuple):
     """What the reference depends on."""
 
     airspeed: float  # m/s
@@ -47,7 +47,7 @@ class Flight(NamedTuple):
 
 
 @dataclass
-class Reference:
+class ReferenceState:
     """What the models remember, rad and rad/s; ``alpha`` from level flight's."""
 
     theta: float
@@ -59,16 +59,16 @@ class Reference:
 
 
 @dataclass
-class Behind:
+class DelayedReference:
     """The reference as late as the actuators make the aircraft: what its motion is compared with."""
 
     lag: float  # s
     delay: float  # s
-    coming: deque[tuple[float, Wanted]] = field(default_factory=deque)
-    now: Wanted | None = None
+    coming: deque[tuple[float, ReferenceMotion]] = field(default_factory=deque)
+    now: ReferenceMotion | None = None
 
 
-def limited(points: SetPoints, level: float, speed: float, settings: Settings) -> SetPoints:
+def limited(points: SetPoints, level: float, speed: float, settings: ControllerSettings) -> SetPoints:
     """Set-points that may be flown; ``level`` pitch (rad) and reference ``speed`` (m/s) stand for NaN."""
 
     def within(value: float, otherwise: float, most: float) -> float:
@@ -83,7 +83,7 @@ def limited(points: SetPoints, level: float, speed: float, settings: Settings) -
     )
 
 
-def advance(state: Reference, points: SetPoints, step: float, flight: Flight) -> Wanted:
+def advance(state: ReferenceState, points: SetPoints, step: float, flight: FlightCondition) -> ReferenceMotion:
     """The motion one ``step`` (s) on, but for alpha, which follows from the elevator: the caller moves it."""
     w, level, airspeed = flight.bandwidth, flight.level, flight.airspeed
     q_rate = _pitch_acceleration(state, points, w)
@@ -100,10 +100,10 @@ def advance(state: Reference, points: SetPoints, step: float, flight: Flight) ->
     r_rate = (flight.side * beta_rate + sin * p_rate + pull * math.cos(state.phi) * state.p) / cos
     turn = GRAVITY / airspeed * math.tan(state.phi) * math.sin(state.phi)
     p = state.p - r * math.tan(level)
-    return Wanted(state.theta, state.q, state.phi, p, r, state.alpha, state.beta, q_rate, p_rate, r_rate, turn)
+    return ReferenceMotion(state.theta, state.q, state.phi, p, r, state.alpha, state.beta, q_rate, p_rate, r_rate, turn)
 
 
-def _pitch_acceleration(state: Reference, points: SetPoints, w: float) -> float:
+def _pitch_acceleration(state: ReferenceState, points: SetPoints, w: float) -> float:
     if math.isnan(points.pitch_rate):
         return _toward(w * w * (points.pitch - state.theta) - 2.0 * DAMPING * w * state.q, MOST_ACCELERATION)
     return _toward(2.0 * w * (points.pitch_rate - state.q), MOST_ACCELERATION)
@@ -123,11 +123,11 @@ def delayed(coming: deque[tuple[float, T]], time: float, value: T, delay: float)
     return coming[0][1]
 
 
-def follow(state: Behind, time: float, wanted: Wanted, step: float) -> Wanted:
+def follow(state: DelayedReference, time: float, wanted: ReferenceMotion, step: float) -> ReferenceMotion:
     """The reference ``wanted`` now (s), behind delay and lag."""
     late = delayed(state.coming, time, wanted, state.delay)
     if state.now is None:
         state.now = late
     share = 1.0 - math.exp(-step / state.lag)
-    state.now = Wanted(*(a + share * (b - a) for a, b in zip(state.now, late, strict=True)))
+    state.now = ReferenceMotion(*(a + share * (b - a) for a, b in zip(state.now, late, strict=True)))
     return state.now

@@ -29,7 +29,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 
 
 @dataclass(frozen=True)
-class Settings:
+class ControllerSettings:
     """Settings of the controller; defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
     adapt: bool = True  # false: the gains of the aircraft file, whatever is identified
@@ -57,7 +57,7 @@ class Settings:
                 raise InputError(f"setting {name} = {value!r}: expected {lower:g} to {upper:g}")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Settings:
+    def from_mapping(cls, values: Mapping[str, Any]) -> ControllerSettings:
         """Those of the values that are settings. Raises InputError on impossible ones."""
         names = {field.name for field in fields(cls)}
         return cls(**{name: value for name, value in values.items() if name in names})

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 
-class Sensed(NamedTuple):
+class Measurements(NamedTuple):
     """What the sensors say at a time (s). NaN = not measured, or too old."""
 
     time: float
@@ -34,7 +34,7 @@ class SetPoints(NamedTuple):
     pitch_rate: float = math.nan
 
 
-class Belief(NamedTuple):
+class IdentifiedDerivative(NamedTuple):
     """A derivative as the identifier has it, with its 95 % interval, and how well its equation holds."""
 
     value: float

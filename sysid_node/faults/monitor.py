@@ -23,27 +23,27 @@ from sysid_node.faults.hypotheses.bayes_factors import Shifts
 from sysid_node.faults.hypotheses.catalogue import hypotheses
 from sysid_node.faults.hypotheses.weighing import (
     VANES,
-    Stretch,
-    doubted,
+    FlightInterval,
+    allowing_for_gusts,
+    changed_since,
     excess,
     explained,
+    last_interval,
     onsets,
     promising,
-    since,
     statistics,
-    stretch,
     stuck_vanes,
     vane_noise,
     weights,
 )
 from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening
 from sysid_node.faults.model.blocks import PERIOD, Block
-from sysid_node.faults.model.reference_model import Belief, Known
+from sysid_node.faults.model.reference_model import IdentifierEstimate, ModelPrior
 from sysid_node.faults.model.residual_whitening import ORDER
 from sysid_node.faults.model.terms import Terms, terms
-from sysid_node.faults.report import Found, fault_of
-from sysid_node.faults.settings import Settings
-from sysid_node.faults.state import LAG, SPANS, Alarm, Piece, State
+from sysid_node.faults.report import Detection, fault_of
+from sysid_node.faults.settings import FaultMonitorSettings
+from sysid_node.faults.state import LAG, SPANS, Alarm, MonitorState, WhitenedBlock
 from sysid_node.faults.types import DAMAGE, VANE_STUCK, Fault
 from sysid_node.online.frequency.regression_signals import OFFSET
 
@@ -63,21 +63,21 @@ CHANCE = 10.0  # energy, in that of a block's noise, that chance may leave more 
 OUTLIER = 10.0  # a statistic beyond this is no usual one
 
 
-def init(aircraft: Aircraft, settings: Settings) -> State:
+def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> MonitorState:
     """A monitor that has seen nothing."""
     made = blocks.init(aircraft)
     known = terms(aircraft, made.layout)
     colour = residual_whitening.init(settings.memory, PERIOD)
-    return State(aircraft, settings, known, made, reference_model.init(known), colour)
+    return MonitorState(aircraft, settings, known, made, reference_model.init(known), colour)
 
 
-def hear(state: State, time: float, known: Mapping[str, Known]) -> None:
+def receive_estimates(state: MonitorState, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
     """The identifier's estimates at a time (s, as of the samples)."""
     if state.alarm is None:
-        reference_model.hear(state.held, time, known)
+        reference_model.receive_estimates(state.held, time, known)
 
 
-def update(state: State, time: float, sample: Sequence[float]) -> Fault | None:
+def update(state: MonitorState, time: float, sample: Sequence[float]) -> Fault | None:
     """Take in a sample; returns what is wrong at present."""
     block = blocks.add(state.blocks, time, sample)
     if block is not None:
@@ -85,7 +85,7 @@ def update(state: State, time: float, sample: Sequence[float]) -> Fault | None:
     return state.fault
 
 
-def take(state: State, block: Block) -> None:
+def take(state: MonitorState, block: Block) -> None:
     """Take in a block."""
     if not block.follows:
         state.raw.clear()
@@ -107,14 +107,14 @@ def take(state: State, block: Block) -> None:
     state.raw.append(_against_held(state, block))
 
 
-def _against_held(state: State, block: Block) -> tuple[Array, Array]:
+def _against_held(state: MonitorState, block: Block) -> tuple[Array, Array]:
     """A block's regressors by term (6, D), and its residual (6,) against the held values."""
     design = np.zeros((6, len(state.terms.names)))
     design[state.terms.output, np.arange(design.shape[1])] = block.regressors[state.terms.column]
     return design, block.outputs - design @ state.held.values
 
 
-def _piece(state: State, block: Block, design: Array, residual: Array) -> Piece:
+def _piece(state: MonitorState, block: Block, design: Array, residual: Array) -> WhitenedBlock:
     """The block, whitened."""
     k = block.regressors[OFFSET]
     off = residual - k * state.held.offsets
@@ -124,10 +124,10 @@ def _piece(state: State, block: Block, design: Array, residual: Array) -> Piece:
         off = off - share * (before - k * state.held.offsets)
     *begun, A = (state.colour.unmix @ one for one in designs)
     b = state.colour.unmix @ off
-    return Piece(block, residual, A, tuple(begun), b, A.T @ A, A.T @ b)
+    return WhitenedBlock(block, residual, A, tuple(begun), b, A.T @ A, A.T @ b)
 
 
-def _judge(state: State, piece: Piece) -> None:
+def _judge(state: MonitorState, piece: WhitenedBlock) -> None:
     if state.alarm is not None:
         if state.count % EVERY == 0:
             _follow(state, state.alarm)
@@ -141,7 +141,7 @@ def _judge(state: State, piece: Piece) -> None:
         _learn_model(state)
 
 
-def _learn(state: State, block: Block, residual: Array) -> None:
+def _learn(state: MonitorState, block: Block, residual: Array) -> None:
     """From a block of sound flight."""
     residual_whitening.learn(state.colour, residual, block.follows)
     known = state.held
@@ -150,7 +150,7 @@ def _learn(state: State, block: Block, residual: Array) -> None:
     known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
 
 
-def _learn_model(state: State) -> None:
+def _learn_model(state: MonitorState) -> None:
     """From the block that is old enough, the coefficients whose motion the model explains in the time after it.
 
     In a closed loop surfaces answer to gusts, and where gusts make the motion least squares are biased by that (Ljung,
@@ -179,24 +179,26 @@ def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
     return found
 
 
-def _renew(state: State, now: Block) -> None:
+def _renew(state: MonitorState, now: Block) -> None:
     """What is held, and how it could fail, from what has been learned."""
     residual_whitening.settle(state.colour)
-    if reference_model.ripen(state.held, now.time):
+    if reference_model.adopt_estimates(state.held, now.time):
         _rebuild(state)
     variances = vane_noise(state, now.samples)
     noise = {
         vane: reference_model.noise_of(state.terms, state.colour, vane, variance)
         for vane, variance in variances.items()
     }
-    state.belief = reference_model.belief(state.held, sum(noise.values()) * state.held.blocks, state.settings.slack)
+    state.belief = reference_model.model_prior(
+        state.held, sum(noise.values()) * state.held.blocks, state.settings.slack
+    )
     believed = state.held.values + state.belief.shift
     state.flattened = {vane: (variances[vane], added @ believed) for vane, added in noise.items()}
     state.hypotheses = hypotheses(state.aircraft, state.terms, reference_model.whole(state.held, state.belief.shift))
     state.shifts = Shifts([hypothesis.shift for hypothesis in state.hypotheses])
 
 
-def _rebuild(state: State) -> None:
+def _rebuild(state: MonitorState) -> None:
     """Make the last pieces anew, against other values; the first ones go, whose past is not known any more."""
     last = [piece.block for piece in state.pieces]
     state.pieces.clear()
@@ -209,13 +211,13 @@ def _rebuild(state: State) -> None:
     state.raw.pop()  # ``take`` adds the newest
 
 
-def _watch(state: State) -> None:
+def _watch(state: MonitorState) -> None:
     """Look for a fault in the spans that are due."""
     new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses)))
     for row, span in enumerate(SPANS):
         if state.count % max(span // EVERY, 1) or span > len(state.pieces):
             continue
-        over = stretch(state, span)
+        over = last_interval(state, span)
         usual = state.usual[-span - 1][row] if span < len(state.usual) else new[row]
         squares = statistics(state, over)
         if _proven(state, over, usual, squares) > state.settings.threshold:
@@ -226,15 +228,15 @@ def _watch(state: State) -> None:
     state.usual.append(new)
 
 
-def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
+def _proven(state: MonitorState, over: FlightInterval, usual: Array, squares: Array) -> float:
     """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
     threshold = state.settings.threshold
     whole = np.array([hypothesis.whole for hypothesis in state.hypotheses])
-    usual = gust_correlation.surprise(whole, usual, len(over.pieces))
+    usual = gust_correlation.usual_size_in_gusts(whole, usual, len(over.pieces))
     found = promising(state, over, usual, squares, threshold)
     best = float(stuck_vanes(state, over.pieces).max()) if len(over.pieces) >= PATIENT else 0.0
     if any(weighed.factor > threshold for weighed in found):
-        over = doubted(state, over)
+        over = allowing_for_gusts(state, over)
         found = weights(state, over, usual)
     for place, weighed in enumerate(found):
         if weighed.factor > threshold:
@@ -243,14 +245,14 @@ def _proven(state: State, over: Stretch, usual: Array, squares: Array) -> float:
     return best
 
 
-def _alarm(state: State, over: Stretch, usual: Array) -> None:
+def _alarm(state: MonitorState, over: FlightInterval, usual: Array) -> None:
     """Something has failed."""
     now, earliest = over.pieces[-1].block.time, state.pieces[-min(len(state.pieces), LAG)].block.time - PERIOD
     state.alarm = Alarm(now, earliest, earliest, usual, over.belief)
     _follow(state, state.alarm)
 
 
-def _follow(state: State, alarm: Alarm) -> None:
+def _follow(state: MonitorState, alarm: Alarm) -> None:
     """Weigh what has come since the onset; end the alarm where the last seconds speak of nothing.
 
     Damage explains any single moment as well as the surface that made it: it is not said before more has come.
@@ -260,11 +262,11 @@ def _follow(state: State, alarm: Alarm) -> None:
     now = state.pieces[-1].block.time
     if now - alarm.found <= DATED:
         alarm.since, alarm.belief = _onset(state, alarm)
-    over = since(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)), alarm.belief)
+    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)), alarm.belief)
     found = explained(state, over, alarm.usual)
     factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
     place = int(np.argmax(factors))
-    times = Found(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
+    times = Detection(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
     if place >= len(found):
         state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
     elif state.hypotheses[place].kind != DAMAGE or now - alarm.found > (EVERY - 0.5) * PERIOD:
@@ -275,19 +277,19 @@ def _follow(state: State, alarm: Alarm) -> None:
         state.usual.clear()
 
 
-def _sure(state: State, factors: Array, place: int) -> float:
+def _sure(state: MonitorState, factors: Array, place: int) -> float:
     """The probability of a hypothesis among all, together with those that are called the same."""
     names = [*((h.kind, h.part) for h in state.hypotheses), *((VANE_STUCK, vane) for vane in VANES)]
     share = np.exp(factors - factors[place])
     return float(share[[name == names[place] for name in names]].sum() / share.sum())
 
 
-def _since(state: State, time: float) -> int:
+def _since(state: MonitorState, time: float) -> int:
     """Blocks since a time (s)."""
     return sum(piece.block.time > time + 0.5 * PERIOD for piece in state.pieces)
 
 
-def _onset(state: State, alarm: Alarm) -> tuple[float, Belief]:
+def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
     """Since when (s), and what is believed then: the likelihood's maximum over the onset, of what explains the rest.
 
     One with much freedom explains the moment of the change, too, and so sets in too early: of the hypotheses that
@@ -297,7 +299,7 @@ def _onset(state: State, alarm: Alarm) -> tuple[float, Belief]:
     counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
     spans = onsets(state, counts, counts[-1])
 
-    def at(place: int) -> tuple[float, Belief]:
+    def at(place: int) -> tuple[float, ModelPrior]:
         return state.pieces[-counts[place]].block.time - PERIOD, spans[place].belief
 
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
@@ -312,15 +314,15 @@ def _onset(state: State, alarm: Alarm) -> tuple[float, Belief]:
     return at(next(i for i, rest in zip(best, left, strict=True) if rest <= LITTLE * min(left)))
 
 
-def _left(state: State, over: Stretch, usual: Array) -> float:
+def _left(state: MonitorState, over: FlightInterval, usual: Array) -> float:
     """The least energy beyond the noise's that a hypothesis leaves in a stretch, and what chance may make of it."""
     found = enumerate(weights(state, over, usual))
     share = min(excess(state, over, place, weighed) for place, weighed in found)
     return max(share - 1.0, 0.0) * len(over.pieces) + CHANCE
 
 
-def _over(state: State, place: int, alarm: Alarm) -> bool:
+def _over(state: MonitorState, place: int, alarm: Alarm) -> bool:
     """Whether the last seconds speak against the fault."""
-    over = stretch(state, min(LAG, len(state.pieces)), alarm.belief)
+    over = last_interval(state, min(LAG, len(state.pieces)), alarm.belief)
     factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over.pieces)[0]]
     return bool(factors[place] < 0.0)

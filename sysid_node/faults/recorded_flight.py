@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import watch as watching
-from sysid_node.faults.model.reference_model import Known
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import FORCES, Fault
-from sysid_node.faults.watch import PERIOD, STALE_AFTER, Speech, Watch
+from sysid_node.faults.watch import PERIOD, STALE_AFTER, Announcements, MessageWatch
 from sysid_node.flight.commands import JointMessage
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stream, Streams
@@ -24,14 +24,14 @@ from sysid_node.flight.streams import Stream, Streams
 _SECOND = 1e9  # ns
 
 
-class Heard(NamedTuple):
+class RecordedEstimates(NamedTuple):
     """What the identifier said of the sample with a header stamp."""
 
     stamp_ns: int
-    known: Mapping[str, Known]
+    known: Mapping[str, IdentifierEstimate]
 
 
-class Said(NamedTuple):
+class FaultReport(NamedTuple):
     """What was said after the sample with a header stamp, at a time (s since the first IMU message)."""
 
     stamp_ns: int
@@ -53,11 +53,11 @@ class Episode(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FaultVerdict:
     """Of a flight: seconds that were judged, all that was said, and each fault in the order in which it was found."""
 
     judged: float
-    said: Sequence[Said] = ()
+    said: Sequence[FaultReport] = ()
     episodes: Sequence[Episode] = ()
 
     @property
@@ -72,15 +72,15 @@ class Verdict:
 
 def judge(
     aircraft: Aircraft,
-    settings: Settings,
+    settings: FaultMonitorSettings,
     streams: Streams,
     commands: Sequence[JointMessage] = (),
-    estimates: Iterable[Heard] = (),
+    estimates: Iterable[RecordedEstimates] = (),
     progress: Callable[[float], None] | None = None,
-) -> Verdict:
+) -> FaultVerdict:
     """Let the monitor hear a recording; ``commands`` in log order, ``progress`` hears the share that is done."""
-    watch, speech = watching.init(aircraft, settings, STALE_AFTER), Speech()
-    said: list[Said] = []
+    watch, speech = watching.init(aircraft, settings, STALE_AFTER), Announcements()
+    said: list[FaultReport] = []
     heard = iter(estimates)
     coming = next(heard, None)
     messages = _messages(streams, commands)
@@ -92,17 +92,17 @@ def judge(
             looks += 1
             faults = watching.wrong(watch, looks * PERIOD)
             if speech.due(faults, looks * PERIOD):
-                said.append(Said(watch.stamp_ns, watch.now, tuple(faults)))
+                said.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
         message.take(watch, now)
         while coming is not None and coming.stamp_ns <= watch.stamp_ns:
             watching.on_estimates(watch, coming.known)
             coming = next(heard, None)
         if progress is not None:
             progress((message.log_ns - begin) / max(end - begin, 1))
-    return Verdict(watch.judged, said, episodes(said))
+    return FaultVerdict(watch.judged, said, episodes(said))
 
 
-def episodes(said: Sequence[Said]) -> list[Episode]:
+def episodes(said: Sequence[FaultReport]) -> list[Episode]:
     """The faults among all that was said, each once."""
     found: dict[tuple[str, float, str], Episode] = {}
     there: set[tuple[str, float, str]] = set()
@@ -125,17 +125,17 @@ class _Message(NamedTuple):
 
     log_ns: int
     order: int
-    take: Callable[[Watch, float], None]
+    take: Callable[[MessageWatch, float], None]
 
 
 def _messages(streams: Streams, commands: Sequence[JointMessage]) -> list[_Message]:
     """All messages in the order in which they were recorded; of the same moment, commands come last."""
     names = streams.actuators.names
 
-    def on_actuators(watch: Watch, now: float, stamp_ns: int, positions: tuple[float, ...]) -> None:
+    def on_actuators(watch: MessageWatch, now: float, stamp_ns: int, positions: tuple[float, ...]) -> None:
         watching.on_actuators(watch, now, stamp_ns, names, positions)
 
-    def on_command(command: JointMessage, watch: Watch, _: float) -> None:
+    def on_command(command: JointMessage, watch: MessageWatch, _: float) -> None:
         watching.on_command(watch, command.stamp_ns, command.names, command.positions)
 
     found = [
@@ -148,9 +148,9 @@ def _messages(streams: Streams, commands: Sequence[JointMessage]) -> list[_Messa
 
 
 def _of_stream(
-    stream: Stream, values: Array, take: Callable[[Watch, float, int, tuple[float, ...]], None]
+    stream: Stream, values: Array, take: Callable[[MessageWatch, float, int, tuple[float, ...]], None]
 ) -> list[_Message]:
-    def taken(stamp_ns: int, row: tuple[float, ...], watch: Watch, now: float) -> None:
+    def taken(stamp_ns: int, row: tuple[float, ...], watch: MessageWatch, now: float) -> None:
         take(watch, now, stamp_ns, row)
 
     arrival = stream.arrival

@@ -20,7 +20,7 @@ AT_LIMIT = 0.9  # share of its travel beyond which a stuck surface is hard over
 SURE = 3.0  # standard errors beyond which a derivative has changed for sure
 
 
-class Found(NamedTuple):
+class Detection(NamedTuple):
     """Times (s) of onset and alarm, and the probability among all hypotheses."""
 
     since: float
@@ -28,7 +28,7 @@ class Found(NamedTuple):
     probability: float
 
 
-def fault_of(hypothesis: Hypothesis, weighed: Weighed, terms: Terms, found: Found) -> Fault:
+def fault_of(hypothesis: Hypothesis, weighed: Weighed, terms: Terms, found: Detection) -> Fault:
     """The fault that a hypothesis stands for, as it was weighed."""
     kind, part, freely = hypothesis.kind, hypothesis.part, weighed.size.size == 1
     if kind == DAMAGE or not freely:

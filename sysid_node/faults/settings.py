@@ -21,7 +21,7 @@ TESTS_AN_HOUR = 36000.0 * 40.0  # blocks, times hypotheses and spans
 
 
 @dataclass(frozen=True)
-class Settings:
+class FaultMonitorSettings:
     """Settings of the monitor; defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
     false_alarms: float = 0.02  # an hour, that chance may make

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.hypotheses.bayes_factors import Shifts
 from sysid_node.faults.hypotheses.catalogue import Hypothesis
-from sysid_node.faults.model.blocks import Block, Blocks
-from sysid_node.faults.model.reference_model import Belief, Held
-from sysid_node.faults.model.residual_whitening import ORDER, Colour
+from sysid_node.faults.model.blocks import Block, BlockAverager
+from sysid_node.faults.model.reference_model import ModelPrior, ReferenceModel
+from sysid_node.faults.model.residual_whitening import ORDER, WhiteningFilter
 from sysid_node.faults.model.terms import Terms
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import Fault
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ LAG = SPANS[-1]  # blocks that must have shown nothing before what is older is l
 LONGEST = 200  # blocks of a fault that are weighed
 
 
-class Piece(NamedTuple):
+class WhitenedBlock(NamedTuple):
     """A block against the held model."""
 
     block: Block
@@ -46,24 +46,24 @@ class Alarm:
     earliest: float
     since: float
     usual: Array  # (H,) size of the statistics before it
-    belief: Belief  # what is weighed against
+    belief: ModelPrior  # what is weighed against
 
 
 @dataclass
-class State:
+class MonitorState:
     """All that the monitor remembers."""
 
     aircraft: Aircraft
-    settings: Settings
+    settings: FaultMonitorSettings
     terms: Terms
-    blocks: Blocks
-    held: Held
-    colour: Colour
-    pieces: deque[Piece] = field(default_factory=lambda: deque(maxlen=LONGEST))
+    blocks: BlockAverager
+    held: ReferenceModel
+    colour: WhiteningFilter
+    pieces: deque[WhitenedBlock] = field(default_factory=lambda: deque(maxlen=LONGEST))
     raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
     hypotheses: list[Hypothesis] = field(default_factory=list)
     shifts: Shifts | None = None  # the hypotheses'
-    belief: Belief | None = None  # what the blocks are weighed against
+    belief: ModelPrior | None = None  # what the blocks are weighed against
     flattened: dict[str, tuple[float, Array]] = field(
         default_factory=dict
     )  # by vane: its noise's variance, and (D,) ...

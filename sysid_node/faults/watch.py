@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
 from sysid_node.faults.hypotheses import servo_check as servos
-from sysid_node.faults.hypotheses.servo_check import Servos
+from sysid_node.faults.hypotheses.servo_check import ServoState
 from sysid_node.faults.model import blocks
-from sysid_node.faults.model.reference_model import Known
-from sysid_node.faults.settings import Settings
-from sysid_node.faults.state import State
+from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.settings import FaultMonitorSettings
+from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import ARRIVAL, SILENT, Fault
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
@@ -35,11 +35,11 @@ _SECOND = 1e9  # ns
 
 
 @dataclass
-class Watch:
+class MessageWatch:
     """What is remembered of the messages."""
 
-    state: State
-    servos: Servos
+    state: MonitorState
+    servos: ServoState
     intake: IntakeState
     stale_after: float  # s
     now: float = 0.0  # s, of the last sample
@@ -54,25 +54,27 @@ class Watch:
         return max(0.0, self.state.count * blocks.PERIOD - self.state.settings.learning)
 
 
-def init(aircraft: Aircraft, settings: Settings, stale_after: float) -> Watch:
+def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:
     """Nothing heard; a topic that was heard and then is silent for ``stale_after`` s is a fault."""
     taken = intake.init(aircraft, blocks.MOST_GAP)
-    return Watch(monitor.init(aircraft, settings), servos.init(aircraft, settings), taken, stale_after)
+    return MessageWatch(monitor.init(aircraft, settings), servos.init(aircraft, settings), taken, stale_after)
 
 
-def on_imu(watch: Watch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
+def on_imu(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
     """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD."""
     watch.heard[IMU] = (arrived, watch.now)
     _take(watch, intake.on_imu(watch.intake, stamp_ns, values))
 
 
-def on_air_data(watch: Watch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
+def on_air_data(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
     """Take an air data message: true airspeed (m/s), flow angles (rad), air density (kg/m^3)."""
     watch.heard[AIR_DATA] = (arrived, watch.now)
     _take(watch, intake.on_air_data(watch.intake, stamp_ns, values))
 
 
-def on_actuators(watch: Watch, arrived: float, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
+def on_actuators(
+    watch: MessageWatch, arrived: float, stamp_ns: int, names: Sequence[str], positions: Sequence[float]
+) -> None:
     """Take joint positions: rad, throttle 0..1 or N."""
     watch.heard[ACTUATORS] = (arrived, watch.now)
     controls = _controls(watch.intake.actuation, names, positions)
@@ -82,7 +84,7 @@ def on_actuators(watch: Watch, arrived: float, stamp_ns: int, names: Sequence[st
     _take(watch, intake.on_actuators(watch.intake, stamp_ns, names, positions))
 
 
-def on_command(watch: Watch, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
+def on_command(watch: MessageWatch, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
     """Take what the joints are told; without a stamp it counts from the last positions on."""
     controls = _controls(watch.intake.actuation, names, positions)
     moment = _time_of(watch.intake, stamp_ns) if stamp_ns and watch.intake.bases else watch.moved
@@ -90,12 +92,12 @@ def on_command(watch: Watch, stamp_ns: int, names: Sequence[str], positions: Seq
         servos.command(watch.servos, moment, controls)
 
 
-def on_estimates(watch: Watch, known: Mapping[str, Known]) -> None:
+def on_estimates(watch: MessageWatch, known: Mapping[str, IdentifierEstimate]) -> None:
     """Take the identifier's estimates of the last sample."""
-    monitor.hear(watch.state, watch.now, known)
+    monitor.receive_estimates(watch.state, watch.now, known)
 
 
-def wrong(watch: Watch, now: float) -> list[Fault]:
+def wrong(watch: MessageWatch, now: float) -> list[Fault]:
     """All faults at a time ``now`` (s, of the arrivals' clock). While a topic is silent forces speak of nothing."""
     silent = [
         Fault(
@@ -117,7 +119,7 @@ def wrong(watch: Watch, now: float) -> list[Fault]:
 
 
 @dataclass
-class Speech:
+class Announcements:
     """Says what is wrong when it is news, and once a second."""
 
     news: str = ""
@@ -132,7 +134,7 @@ class Speech:
         return True
 
 
-def _take(watch: Watch, samples: Sequence[Complete]) -> None:
+def _take(watch: MessageWatch, samples: Sequence[Complete]) -> None:
     for moment, sample, _ in samples:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
         monitor.update(watch.state, moment, sample)

@@ -36,7 +36,7 @@ Rejected = dict[str, dict[str, int]]  # topic -> reason -> messages
 
 
 @dataclass(frozen=True)
-class Screened:
+class ScreenedMessages:
     """The messages of a topic that are believed."""
 
     kept: NDArray[np.intp]  # places in the stream
@@ -56,8 +56,8 @@ class Alignment:
     aircraft's order. The air interval (s) is the time between the air-data messages on either side.
     """
 
-    imu: Screened
-    others: tuple[Screened, Screened]  # air data, actuators
+    imu: ScreenedMessages
+    others: tuple[ScreenedMessages, ScreenedMessages]  # air data, actuators
     right: tuple[NDArray[np.intp], NDArray[np.intp]]  # of each IMU sample: its right neighbour in each
     used: NDArray[np.intp]  # of the IMU's kept samples, those that were aligned
     samples: Array
@@ -88,7 +88,7 @@ def seconds_since(start_ns: int | np.int64, stamps: Stamps) -> Array:
     return time
 
 
-def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> Screened:
+def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> ScreenedMessages:
     """Leaves out messages with a fault (N,) of their own, then those with a stamp that is absent, repeated or late."""
     good = np.array([fault is None for fault in faults], bool) if faults.size else np.empty(0, bool)
     rejected = Counter(faults[~good].tolist())
@@ -99,7 +99,7 @@ def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> Scre
     rejected[DUPLICATE] = int(np.count_nonzero(step == 0))
     rejected[OUT_OF_ORDER] = int(np.count_nonzero(step < 0))
     fresh = kept[step > 0]
-    return Screened(
+    return ScreenedMessages(
         fresh,
         arrival.stamp_ns[fresh],
         values[fresh],
@@ -160,7 +160,7 @@ def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
     return Alignment(imu, (air, actuators), (right_air, right_act), used, samples, rejected)
 
 
-def _screen_air_data(aircraft: Aircraft, streams: Streams) -> Screened:
+def _screen_air_data(aircraft: Aircraft, streams: Streams) -> ScreenedMessages:
     """Air data, with the reference density where it is not measured."""
     values = streams.air_data.values
     density = np.where(np.isnan(values[:, 3]), aircraft.reference.air_density, values[:, 3])
@@ -214,7 +214,7 @@ def interpolate(stamps: Stamps, values: Array, right: NDArray[np.intp], at: Stam
     return result
 
 
-def flat(rejected: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+def counts_by_reason(rejected: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
     """Counts by ``"<topic>: <reason>"``."""
     return {f"{topic}: {reason}": n for topic, reasons in rejected.items() for reason, n in reasons.items()}
 
@@ -233,7 +233,7 @@ def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> Fligh
     attitude = streams.imu.attitude[aligned.imu.kept[aligned.used]]
     columns |= dict(zip(("phi", "theta", "psi"), np.ascontiguousarray(attitude.T), strict=True))
     start = int(aligned.imu.stamps[0])
-    return FlightRecord(aligned.time, columns, streams.name, start, flat(aligned.rejected))
+    return FlightRecord(aligned.time, columns, streams.name, start, counts_by_reason(aligned.rejected))
 
 
 def _columns(aircraft: Aircraft) -> tuple[str, ...]:
@@ -261,6 +261,6 @@ def why_nothing_aligned(streams: Streams, rejected: Mapping[str, Mapping[str, in
     if max(start for start, _ in spans.values()) > min(stop for _, stop in spans.values()):
         said = ", ".join(f"{topic} {start:.3f} to {stop:.3f} s" for topic, (start, stop) in spans.items())
         return f"{streams.name}: the header stamps do not overlap: {said}; stamp all topics with one clock"
-    worst = sorted(flat(rejected).items(), key=lambda item: -item[1])[:3]
+    worst = sorted(counts_by_reason(rejected).items(), key=lambda item: -item[1])[:3]
     said = "; ".join(f"{count} x {reason}" for reason, count in worst) or "fewer than two IMU messages"
     return f"{streams.name}: no two samples could be aligned: {said}; correct the messages or the aircraft file"

@@ -37,7 +37,7 @@ def read_log(path: str | Path) -> FlightRecord:
     return reader(path)
 
 
-def load_flight(
+def load_flight_record(
     path: str | Path,
     aircraft: Aircraft,
     *,
@@ -51,7 +51,7 @@ def load_flight(
     return flight_record(aircraft, read_streams(path, topics, frame), max_gap)
 
 
-def streams_of(flight: FlightRecord, aircraft: Aircraft | None = None) -> Streams:
+def streams_from_record(flight: FlightRecord, aircraft: Aircraft | None = None) -> Streams:
     """A flight as messages, one on each topic per sample, stamped from the flight's start.
 
     Joints are the aircraft's where one is given (its map turned round), else ``elevator``, ``aileron``,

@@ -47,7 +47,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
     """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate."""
     layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
     unformed = regression_signals.unformed(aircraft)
-    structure = {c: rs for c, rs in aircraft.structure.items() if c not in unformed and set(rs) - {"0"}}
+    structure = {c: rs for c, rs in aircraft.model_structure.items() if c not in unformed and set(rs) - {"0"}}
     if not structure:
         raise InputError(f"aircraft {aircraft.name!r}: derivatives: expected at least one besides offsets")
     memory = settings.forgetting_time or math.inf

@@ -21,11 +21,11 @@ from sysid_node.flight.autopilots.attitude import other_axes
 from sysid_node.flight.autopilots.base import (
     RANGES,
     Adapter,
+    AdapterSettings,
     AirSample,
     ImuSample,
     JointSample,
     Sample,
-    Settings,
     Vector,
     adapter_for,
 )
@@ -41,7 +41,7 @@ from sysid_node.ros.support.spin import run_program, serve
 #: Autopilots' bridges publish best effort; a burst after a pause of the process is not to be lost.
 HEARD_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-_DEFAULT = Settings()
+_DEFAULT = AdapterSettings()
 
 PARAMETERS = (
     Parameter("autopilot", "", "", f"Whose topics: {', '.join(ADAPTERS)}. Needed.", "For every autopilot."),
@@ -184,8 +184,8 @@ def _flu(vector: Vector) -> Vector3:
     return Vector3(x=x, y=-y, z=-z)
 
 
-def _settings(values: Mapping[str, Any]) -> Settings:
-    return Settings(values["joints"], values["air_temperature"], values["air_data_delay"])
+def _settings(values: Mapping[str, Any]) -> AdapterSettings:
+    return AdapterSettings(values["joints"], values["air_temperature"], values["air_data_delay"])
 
 
 def _refuse(changes: Iterable[Any]) -> SetParametersResult:

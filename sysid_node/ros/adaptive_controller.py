@@ -15,10 +15,10 @@ from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.control import controller
 from sysid_node.control.allocation import Allocation
-from sysid_node.control.estimates import beliefs_of
+from sysid_node.control.estimates import identified_derivatives
 from sysid_node.control.plant import CONTROLS
-from sysid_node.control.settings import RANGES, Settings
-from sysid_node.control.types import Command, Sensed, SetPoints
+from sysid_node.control.settings import RANGES, ControllerSettings
+from sysid_node.control.types import Command, Measurements, SetPoints
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.arrivals import Arrivals
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
@@ -41,7 +41,7 @@ from sysid_node.ros.support.loop_node import (
 )
 from sysid_node.ros.support.spin import run_program, serve
 
-_DEFAULT = Settings()
+_DEFAULT = ControllerSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
@@ -96,7 +96,7 @@ class AdaptiveController(LoopNode):
 
     def __init__(self) -> None:
         super().__init__("adaptive_controller", PARAMETERS)
-        self._state = controller.init(self.aircraft, Settings.from_mapping(self.values))
+        self._state = controller.init(self.aircraft, ControllerSettings.from_mapping(self.values))
         self._allocation = Allocation.of(self.aircraft)
         self._points = SetPoints()
         self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
@@ -144,7 +144,7 @@ class AdaptiveController(LoopNode):
         self._imu_count += 1
         taken, air = self._air
         V, alpha, beta, density = air if abs(now - taken) <= SENSOR_AGE else (math.nan,) * 4
-        self._fly(Sensed(now, p, q, r, phi, theta, V, alpha, beta, density))
+        self._fly(Measurements(now, p, q, r, phi, theta, V, alpha, beta, density))
 
     def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
         stamp, values = messages.air_data(numbers)
@@ -154,7 +154,7 @@ class AdaptiveController(LoopNode):
     def _on_estimates(self, message: Any) -> None:
         estimates = conversion.estimates_from_message(message, self._start_ns)
         self._others[DERIVATIVES].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
-        controller.hear(self._state, estimates.time, beliefs_of(estimates))
+        controller.receive_estimates(self._state, estimates.time, identified_derivatives(estimates))
 
     def _on_excitation(self, numbers: Numbers, texts: Texts) -> None:
         stamp, values = by_name(numbers, texts)
@@ -171,9 +171,9 @@ class AdaptiveController(LoopNode):
         if self._imu.silent():
             silence = time.monotonic() - self._imu.heard
             self._blind += 1
-            self._fly(Sensed(self._now + silence, *(math.nan,) * (len(Sensed._fields) - 1)))
+            self._fly(Measurements(self._now + silence, *(math.nan,) * (len(Measurements._fields) - 1)))
 
-    def _fly(self, sensed: Sensed) -> None:
+    def _fly(self, sensed: Measurements) -> None:
         start = time.perf_counter()
         heard, extra = self._extra
         excitation = extra if time.monotonic() - heard < EXCITATION_AGE else controller.NO_EXCITATION
@@ -183,7 +183,7 @@ class AdaptiveController(LoopNode):
         self._tracking.publish(named(stamp, self._errors(sensed)))
         self._work.add(time.perf_counter() - start)
 
-    def _errors(self, sensed: Sensed) -> dict[str, float]:
+    def _errors(self, sensed: Measurements) -> dict[str, float]:
         """What the set-points' reference asks for, and how far off the aircraft is, rad."""
         wanted = self._state.law.wanted
         if wanted is None:

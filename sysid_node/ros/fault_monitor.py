@@ -13,10 +13,10 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.faults import watch as watching
-from sysid_node.faults.model.reference_model import Known
-from sysid_node.faults.settings import RANGES, Settings
+from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.settings import RANGES, FaultMonitorSettings
 from sysid_node.faults.types import Fault
-from sysid_node.faults.watch import PERIOD, STALE_AFTER, Speech
+from sysid_node.faults.watch import PERIOD, STALE_AFTER, Announcements
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
@@ -26,7 +26,7 @@ from sysid_node.ros.support import conversion
 from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
 from sysid_node.ros.support.spin import run_program, serve
 
-_DEFAULT = Settings()
+_DEFAULT = FaultMonitorSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
@@ -64,9 +64,9 @@ class FaultMonitor(LoopNode):
 
     def __init__(self) -> None:
         super().__init__("fault_monitor", PARAMETERS)
-        settings = Settings(**{name: self.values[name] for name in RANGES})
+        settings = FaultMonitorSettings(**{name: self.values[name] for name in RANGES})
         self._watch = watching.init(self.aircraft, settings, self.values["stale_after"])
-        self._work, self._speech = Durations(), Speech()
+        self._work, self._speech = Durations(), Announcements()
         self._faults = self.create_publisher(DiagnosticArray, "~/faults", 10)
         self.listen(Imu, IMU, PATHS[IMU], self._on_imu, SENSOR_QOS)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, SENSOR_QOS)
@@ -107,7 +107,7 @@ class FaultMonitor(LoopNode):
         watching.on_command(self._watch, *messages.actuators(numbers, texts))
 
     def _on_estimates(self, message: Any) -> None:
-        known = {d.name: Known(d.value, d.standard_error, d.valid) for d in message.derivatives}
+        known = {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in message.derivatives}
         watching.on_estimates(self._watch, known)
 
     # What is said

@@ -90,7 +90,7 @@ class Identifier(CarefulNode):
             self._listen(AirData, AIR_DATA, self._on_air_data),
             self._listen(JointState, ACTUATORS, self._on_actuators),
         ]
-        self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.structure)}")
+        self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.model_structure)}")
 
     def cleanup(self) -> None:
         """Give up what ``configure`` made."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.flight.align import flat
+from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
@@ -47,7 +47,7 @@ class Session:
     @property
     def rejected(self) -> dict[str, int]:
         """Messages left out: ``"<topic>: <reason>"`` -> count."""
-        return flat(self.intake.rejected)
+        return counts_by_reason(self.intake.rejected)
 
     @property
     def silence(self) -> float:

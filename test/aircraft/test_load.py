@@ -54,7 +54,7 @@ def test_every_value_arrives():
     assert aircraft.noise == {**DEFAULT_NOISE, "gyro": 0.002}
     assert aircraft.derivatives["CL_alpha"] == Derivative(2.9, 0.3)
     assert aircraft.derivatives["CD_0"] == Derivative(0.02, None)  # YAML 1.1 would read 2e-2 as text
-    assert aircraft.structure["Cm"] == ("alpha", "df")
+    assert aircraft.model_structure["Cm"] == ("alpha", "df")
 
 
 def test_thrust_in_newton():

@@ -9,7 +9,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv, write_csv
-from sysid_node.flight.logs import load_flight
+from sysid_node.flight.logs import load_flight_record
 from sysid_node.flight.record import FlightRecord
 
 
@@ -31,7 +31,7 @@ def test_the_flight_comes_back(log, tmp_path, capsys, storage, frame):
     assert "2.0 s, 100 samples; joints elevator, aileron, rudder, throttle" in capsys.readouterr().out
     # cdrw's throttle goes from 0 to 1; the log's joint carries newtons
     in_newton = dataclasses.replace(aircraft, throttle=dataclasses.replace(aircraft.throttle, max_thrust=None))
-    back, flight = load_flight(out, in_newton, frame=frame), read_csv(log)
+    back, flight = load_flight_record(out, in_newton, frame=frame), read_csv(log)
     for name, values in flight.columns.items():
         np.testing.assert_allclose(back[name], values, atol=1e-9)
 
@@ -44,7 +44,7 @@ def test_with_an_aircraft_its_joints_are_used(log, tmp_path, capsys):
     joints = read_streams(out).actuators
     throttle = joints.positions[:, joints.names.index(aircraft.throttle.joint)]
     np.testing.assert_allclose(throttle * aircraft.throttle.max_thrust, flight["thrust"])
-    np.testing.assert_allclose(load_flight(out, aircraft)["thrust"], flight["thrust"])
+    np.testing.assert_allclose(load_flight_record(out, aircraft)["thrust"], flight["thrust"])
 
 
 @pytest.mark.parametrize(

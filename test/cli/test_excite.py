@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.excite.spec import parse_manoeuvre
-from sysid_node.flight.logs import load_flight
+from sysid_node.flight.logs import load_flight_record
 
 SPEC = "doublet:elevator:amplitude=0.03:start=1+doublet:rudder:amplitude=0.05:start=4"
 FAST = ["--rate", "50", "--quiet"]
@@ -54,7 +54,7 @@ def test_the_summary_predicts_every_derivative(folder):
 
 
 def test_the_bag_is_the_predicted_flight(folder):
-    flight = load_flight(folder / "flight", load_aircraft("cdfp"))
+    flight = load_flight_record(folder / "flight", load_aircraft("cdfp"))
     assert flight.duration > 7.5
     assert np.ptp(flight["de"]) > 0.05
     assert np.ptp(flight["q"]) > 0.1

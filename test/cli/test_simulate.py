@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.reader import read_streams
-from sysid_node.flight.logs import load_flight
+from sysid_node.flight.logs import load_flight_record
 from sysid_node.flight.truth import read_truth
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +43,7 @@ def test_a_bag_and_its_truth(tmp_path, capsys):
     bag = fly(tmp_path, "flight", *options, "--effect", "derivative_error:Cm_alpha=-0.05")
     assert "s, " in capsys.readouterr().out
     aircraft = load_aircraft("cdrw")
-    record = load_flight(bag, aircraft)
+    record = load_flight_record(bag, aircraft)
     assert record.duration == pytest.approx(8.0, abs=0.5)
     assert np.ptp(record["de"]) > 0.09
     assert np.ptp(record["alpha"]) > 0.02

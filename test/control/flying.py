@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control.axis import level_flight
-from sysid_node.control.types import Belief, Sensed
+from sysid_node.control.types import IdentifiedDerivative, Measurements
 
 AIRCRAFT = load_aircraft("cdrw")
 LEVEL, _ = level_flight(AIRCRAFT, 1.0)
@@ -13,17 +13,19 @@ STEP = 0.005
 NAN = math.nan
 
 
-def level(time: float, **changes: float) -> Sensed:
+def level(time: float, **changes: float) -> Measurements:
     """Level flight at the reference condition, but for ``changes``."""
     airspeed, density = AIRCRAFT.reference.airspeed, AIRCRAFT.reference.air_density
-    return Sensed(time, 0.0, 0.0, 0.0, 0.0, LEVEL, airspeed, LEVEL, 0.0, density)._replace(**changes)
+    return Measurements(time, 0.0, 0.0, 0.0, 0.0, LEVEL, airspeed, LEVEL, 0.0, density)._replace(**changes)
 
 
-def beliefs(factors: Mapping[str, float] | None = None, half: float = 0.05, **changes: object) -> dict[str, Belief]:
+def beliefs(
+    factors: Mapping[str, float] | None = None, half: float = 0.05, **changes: object
+) -> dict[str, IdentifiedDerivative]:
     """The file's derivatives times ``factors``, known to a share ``half``, valid and explained but for ``changes``."""
     found = {}
     for name, d in AIRCRAFT.derivatives.items():
         value = d.value * (factors or {}).get(name, 1.0)
         width = half * abs(d.value)
-        found[name] = Belief(value, value - width, value + width, True, 1.0)._replace(**changes)
+        found[name] = IdentifiedDerivative(value, value - width, value + width, True, 1.0)._replace(**changes)
     return found

@@ -9,30 +9,30 @@ from flying import AIRCRAFT, NAN, STEP, beliefs, level
 from sysid_node.control import adaptation, controller
 from sysid_node.control.axis import axes
 from sysid_node.control.margins import margins
-from sysid_node.control.settings import Settings
+from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import SetPoints
 from sysid_node.errors import InputError
 
 ELEVATOR = {"Cm_de": 0.4, "CL_de": 0.4}
 
 
-def flown(state: controller.State, seconds: float, estimates: object, start: float = 0.0) -> float:
+def flown(state: controller.ControllerState, seconds: float, estimates: object, start: float = 0.0) -> float:
     """Level flight with the same estimates at 20 Hz; returns when it ended, s."""
     count = round(seconds / STEP)
     for k in range(count):
         now = start + k * STEP
         if estimates is not None and k % 10 == 0:
-            controller.hear(state, now, estimates)
+            controller.receive_estimates(state, now, estimates)
         controller.step(state, level(now), SetPoints())
     return start + count * STEP
 
 
 @pytest.fixture
-def state() -> controller.State:
-    return controller.init(AIRCRAFT, Settings())
+def state() -> controller.ControllerState:
+    return controller.init(AIRCRAFT, ControllerSettings())
 
 
-def baseline(state: controller.State) -> bool:
+def baseline(state: controller.ControllerState) -> bool:
     """Whether the baseline's gains are flown."""
     return all(np.allclose(axis.flown.gains, axis.axis.baseline) for axis in state.axes)
 
@@ -43,14 +43,14 @@ def test_the_baseline_has_good_margins() -> None:
         assert bool(found.enough(10.0 ** (12.0 / 20.0), math.radians(60.0)))
 
 
-def test_estimates_equal_to_the_file_change_nothing(state: controller.State) -> None:
+def test_estimates_equal_to_the_file_change_nothing(state: controller.ControllerState) -> None:
     flown(state, 5.0, beliefs(half=0.02))
     assert state.axes[0].verdict == "adapted"
     for axis in state.axes:
         np.testing.assert_allclose(axis.flown.gains, axis.axis.baseline, rtol=1e-6, atol=1e-9)
 
 
-def test_a_surface_of_less_effect_gets_more_gain(state: controller.State) -> None:
+def test_a_surface_of_less_effect_gets_more_gain(state: controller.ControllerState) -> None:
     """Gains in the moments that they make stay what they were: 1 / 0.4 of the baseline's."""
     flown(state, 8.0, beliefs(ELEVATOR, half=0.02))
     pitch = state.axes[0]
@@ -63,18 +63,18 @@ def test_a_surface_of_less_effect_gets_more_gain(state: controller.State) -> Non
     "changes",
     [{"valid": False}, {"explained": 0.5}, {"value": NAN}, {"lower": -math.inf}, {"lower": NAN, "upper": NAN}],
 )
-def test_what_is_not_to_be_trusted_is_not_used(state: controller.State, changes: dict[str, float]) -> None:
+def test_what_is_not_to_be_trusted_is_not_used(state: controller.ControllerState, changes: dict[str, float]) -> None:
     flown(state, 3.0, beliefs(ELEVATOR, **changes))
     assert baseline(state)
     assert all(axis.accepted == 0 for axis in state.axes)
 
 
-def test_wide_intervals_are_not_used(state: controller.State) -> None:
+def test_wide_intervals_are_not_used(state: controller.ControllerState) -> None:
     flown(state, 3.0, beliefs(ELEVATOR, half=2.0 * state.settings.tightness))
     assert baseline(state)
 
 
-def test_what_is_flown_has_margins_at_every_corner(state: controller.State) -> None:
+def test_what_is_flown_has_margins_at_every_corner(state: controller.ControllerState) -> None:
     estimates = beliefs({**ELEVATOR, "Cm_alpha": -0.3}, half=0.1)
     flown(state, 8.0, estimates)
     for axis in state.axes:
@@ -86,13 +86,13 @@ def test_what_is_flown_has_margins_at_every_corner(state: controller.State) -> N
         assert found.enough(2.0, math.pi / 4.0).all()
 
 
-def test_wide_corners_ask_for_caution(state: controller.State) -> None:
+def test_wide_corners_ask_for_caution(state: controller.ControllerState) -> None:
     flown(state, 5.0, beliefs(half=0.35))
     assert "caution" in state.axes[0].verdict or "kept" in state.axes[0].verdict
 
 
 @pytest.mark.parametrize("share", [0.05, 0.0, -0.5])
-def test_surfaces_without_effect_or_reversed_are_not_relied_on(state: controller.State, share: float) -> None:
+def test_surfaces_without_effect_or_reversed_are_not_relied_on(state: controller.ControllerState, share: float) -> None:
     flown(state, 3.0, beliefs({"Cm_de": share}, half=0.02))
     np.testing.assert_allclose(state.axes[0].flown.gains, state.axes[0].axis.baseline)
     assert "hardly any effect" in state.axes[0].verdict
@@ -100,7 +100,7 @@ def test_surfaces_without_effect_or_reversed_are_not_relied_on(state: controller
 
 @pytest.mark.parametrize("share", [0.1, -0.2])
 def test_a_lift_slope_that_would_turn_a_steady_deflection_round_is_not_relied_on(
-    state: controller.State, share: float
+    state: controller.ControllerState, share: float
 ) -> None:
     """Pitch follows the elevator by Cm_de CL_alpha - Cm_alpha CL_de in the end (Cramer): of the other sign here."""
     d = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
@@ -112,19 +112,19 @@ def test_a_lift_slope_that_would_turn_a_steady_deflection_round_is_not_relied_on
 
 
 def test_no_margins_at_the_corners_keeps_what_is_flown() -> None:
-    strict = controller.init(AIRCRAFT, Settings(gain_margin=6.0, phase_margin=1.2))
+    strict = controller.init(AIRCRAFT, ControllerSettings(gain_margin=6.0, phase_margin=1.2))
     flown(strict, 5.0, beliefs(ELEVATOR, half=0.35))
     assert strict.axes[0].refused > 0
     assert "no margins" in strict.axes[0].verdict
     np.testing.assert_allclose(strict.axes[0].flown.gains, strict.axes[0].axis.baseline)
 
 
-def test_gains_move_at_a_bounded_rate(state: controller.State) -> None:
+def test_gains_move_at_a_bounded_rate(state: controller.ControllerState) -> None:
     pitch, last, fastest = state.axes[0], state.axes[0].flown.gains, 0.0
     estimates = beliefs(ELEVATOR, half=0.02)
     for k in range(1200):
         if k % 10 == 0:
-            controller.hear(state, k * STEP, estimates)
+            controller.receive_estimates(state, k * STEP, estimates)
         controller.step(state, level(k * STEP), SetPoints())
         fastest = max(fastest, float(np.abs(pitch.flown.gains - last).max() / np.abs(pitch.axis.baseline).max()))
         last = pitch.flown.gains
@@ -132,7 +132,7 @@ def test_gains_move_at_a_bounded_rate(state: controller.State) -> None:
     assert 0.0 < fastest <= state.settings.gain_rate * STEP * 1.001
 
 
-def test_old_estimates_bring_the_baseline_back(state: controller.State) -> None:
+def test_old_estimates_bring_the_baseline_back(state: controller.ControllerState) -> None:
     end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
     assert not baseline(state)
     flown(state, 0.4, None, end)
@@ -142,7 +142,7 @@ def test_old_estimates_bring_the_baseline_back(state: controller.State) -> None:
     assert baseline(state)
 
 
-def test_after_a_short_lapse_what_was_flown_is_taken_up_again(state: controller.State) -> None:
+def test_after_a_short_lapse_what_was_flown_is_taken_up_again(state: controller.ControllerState) -> None:
     """Also where no estimate is fit for use any more, because nothing excites the aircraft."""
     end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
     adapted = state.axes[0].flown.gains
@@ -152,14 +152,14 @@ def test_after_a_short_lapse_what_was_flown_is_taken_up_again(state: controller.
     np.testing.assert_allclose(state.axes[0].flown.gains, adapted)
 
 
-def test_after_a_long_one_it_is_not(state: controller.State) -> None:
+def test_after_a_long_one_it_is_not(state: controller.ControllerState) -> None:
     end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
     end = flown(state, 8.0, None, end)
     flown(state, 3.0, beliefs(ELEVATOR, explained=0.0), end)
     assert baseline(state)
 
 
-def test_a_silent_sensor_brings_the_baseline_back(state: controller.State) -> None:
+def test_a_silent_sensor_brings_the_baseline_back(state: controller.ControllerState) -> None:
     end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
     for k in range(1200):
         controller.step(state, level(end + k * STEP, alpha=NAN), SetPoints())
@@ -167,7 +167,7 @@ def test_a_silent_sensor_brings_the_baseline_back(state: controller.State) -> No
     assert baseline(state)
 
 
-def test_the_clock_may_step_back(state: controller.State) -> None:
+def test_the_clock_may_step_back(state: controller.ControllerState) -> None:
     flown(state, 1.0, beliefs(half=0.02), 100.0)
     flown(state, 8.0, beliefs(ELEVATOR, half=0.02), 3.0)
     np.testing.assert_allclose(state.axes[0].flown.gains[0, 1], 2.5 * state.axes[0].axis.baseline[0, 1], rtol=0.01)
@@ -176,18 +176,18 @@ def test_the_clock_may_step_back(state: controller.State) -> None:
 
 
 def test_adaptation_can_be_switched_off() -> None:
-    fixed = controller.init(AIRCRAFT, Settings(adapt=False))
+    fixed = controller.init(AIRCRAFT, ControllerSettings(adapt=False))
     flown(fixed, 3.0, beliefs(ELEVATOR, half=0.02))
     assert baseline(fixed)
 
 
 def test_impossible_settings_are_refused() -> None:
     with pytest.raises(InputError, match="gain_margin"):
-        Settings(gain_margin=0.5)
+        ControllerSettings(gain_margin=0.5)
     with pytest.raises(InputError, match="delay"):
-        Settings(delay=NAN)
+        ControllerSettings(delay=NAN)
 
 
 def test_slow_actuators_are_refused() -> None:
     with pytest.raises(InputError, match="too slow"):
-        controller.init(AIRCRAFT, Settings(actuator_lag=1.0, delay=0.5))
+        controller.init(AIRCRAFT, ControllerSettings(actuator_lag=1.0, delay=0.5))

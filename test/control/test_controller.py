@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sysid_node.control import controller
-from sysid_node.control.settings import Settings
-from sysid_node.control.types import Belief, Sensed, SetPoints
+from sysid_node.control.settings import ControllerSettings
+from sysid_node.control.types import IdentifiedDerivative, Measurements, SetPoints
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying import live
 
 ANY = st.floats(allow_nan=True, allow_infinity=True, width=32)
-STATE = controller.init(AIRCRAFT, Settings())
+STATE = controller.init(AIRCRAFT, ControllerSettings())
 LIMITS = [control.limit for control in AIRCRAFT.controls.values()]
 
 
@@ -23,22 +23,22 @@ LIMITS = [control.limit for control in AIRCRAFT.controls.values()]
 @given(
     sensed=st.tuples(*[ANY] * 9),
     points=st.builds(SetPoints, ANY, ANY, ANY, ANY, ANY),
-    estimate=st.builds(Belief, ANY, ANY, ANY, st.booleans(), ANY),
+    estimate=st.builds(IdentifiedDerivative, ANY, ANY, ANY, st.booleans(), ANY),
     step=st.floats(0.0, 1.0),
 )
 def test_whatever_comes_in_a_flyable_command_goes_out(
-    sensed: tuple[float, ...], points: SetPoints, estimate: Belief, step: float
+    sensed: tuple[float, ...], points: SetPoints, estimate: IdentifiedDerivative, step: float
 ) -> None:
     now = (STATE.time if math.isfinite(STATE.time) else 0.0) + step
-    controller.hear(STATE, now, {"Cm_de": estimate})
-    command = controller.step(STATE, Sensed(now, *sensed), points)
+    controller.receive_estimates(STATE, now, {"Cm_de": estimate})
+    command = controller.step(STATE, Measurements(now, *sensed), points)
     assert np.isfinite(command).all()
     assert (np.abs(command[:3]) <= np.array(LIMITS) + 1e-12).all()
     assert 0.0 <= command.thrust <= 30.0
 
 
 def test_level_flight_asks_for_the_trim() -> None:
-    state = controller.init(AIRCRAFT, Settings())
+    state = controller.init(AIRCRAFT, ControllerSettings())
     trim = trim_flight(Simulator(AIRCRAFT, 100.0))
     command = controller.step(state, level(0.0), SetPoints())
     np.testing.assert_allclose(command[:3], trim.command[:3], atol=0.01)
@@ -46,24 +46,24 @@ def test_level_flight_asks_for_the_trim() -> None:
 
 
 def test_commands_move_at_a_bounded_rate() -> None:
-    state = controller.init(AIRCRAFT, Settings(command_rate=1.0))
+    state = controller.init(AIRCRAFT, ControllerSettings(command_rate=1.0))
     before = controller.step(state, level(0.0), SetPoints())
     after = controller.step(state, level(STEP, theta=LEVEL + 0.5, q=2.0), SetPoints(roll=0.8))
     assert np.abs(np.subtract(after[:3], before[:3])).max() <= 1.0 * STEP + 1e-12
 
 
-def fly(points: SetPoints, seconds: float, excitation: float = 0.0) -> tuple[controller.State, live.Reading]:
+def fly(points: SetPoints, seconds: float, excitation: float = 0.0) -> tuple[controller.ControllerState, live.Reading]:
     """The simulator, its actuators lagging, under the controller at 100 Hz."""
     simulator = Simulator(AIRCRAFT, 100.0)
     trim = trim_flight(simulator)
     flight = live.start(
         simulator, trim, live.Air(noise=0.0), live.vector(simulator, ["actuator_lag:time_constant=0.05"])
     )
-    state, command = controller.init(AIRCRAFT, Settings()), trim.command.tolist()
+    state, command = controller.init(AIRCRAFT, ControllerSettings()), trim.command.tolist()
     for _ in range(round(seconds * 100)):
         now = live.step(simulator, flight, command)
         _, _, _, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
-        sensed = Sensed(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
+        sensed = Measurements(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
         command = controller.step(state, sensed, points, (excitation, 0.0, 0.0))
     return state, now
 
@@ -94,9 +94,9 @@ def test_a_disturbance_is_integrated_away() -> None:
 
 
 def test_the_clock_may_step_back() -> None:
-    state = controller.init(AIRCRAFT, Settings())
+    state = controller.init(AIRCRAFT, ControllerSettings())
     controller.step(state, level(100.0), SetPoints())
-    controller.hear(state, 100.0, beliefs())
+    controller.receive_estimates(state, 100.0, beliefs())
     command = controller.step(state, level(3.0), SetPoints())
     assert np.isfinite(command).all()
     assert "no estimates for" in state.stale
@@ -109,7 +109,7 @@ def test_new_gains_do_not_move_the_surfaces() -> None:
     for axis in state.axes:
         axis.flown = axis.flown._replace(gains=0.6 * axis.flown.gains)
     _, _, _, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
-    sensed = Sensed(now.time + 1e-3, p, q, r, phi, theta, V, alpha, beta, now.density)
+    sensed = Measurements(now.time + 1e-3, p, q, r, phi, theta, V, alpha, beta, now.density)
     after = controller.step(state, sensed, SetPoints(roll=0.2), (0.03, 0.0, 0.0))
     assert after.elevator == pytest.approx(before[0], abs=5e-4)
     assert after[1:3] == pytest.approx(before[1:], abs=5e-3)  # one integral for two surfaces

@@ -13,8 +13,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import monitor
 from sysid_node.faults.model.blocks import PERIOD, Block
-from sysid_node.faults.settings import Settings
-from sysid_node.faults.state import State
+from sysid_node.faults.settings import FaultMonitorSettings
+from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import Fault
 from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS
 
@@ -65,14 +65,14 @@ class Maker:
         return Block(PERIOD * self.count, outputs, row, air, 20, self.count > 1)
 
 
-def monitored(seed: int, **settings: float) -> tuple[State, Maker]:
+def monitored(seed: int, **settings: float) -> tuple[MonitorState, Maker]:
     """A monitor that knows the derivatives to 2 %, and a maker of flights."""
-    state = monitor.init(AIRCRAFT, Settings(**settings))
+    state = monitor.init(AIRCRAFT, FaultMonitorSettings(**settings))
     state.held.errors = 0.02 * np.abs(state.held.values) + 1e-5
     return state, Maker(seed, state.blocks.layout.names)
 
 
-def fly(state: State, maker: Maker, seconds: float, truth: Truth = sound, rough: float = 1.0) -> Fault | None:
+def fly(state: MonitorState, maker: Maker, seconds: float, truth: Truth = sound, rough: float = 1.0) -> Fault | None:
     """Fly on for so long; what is wrong at the end."""
     for _ in range(round(seconds / PERIOD)):
         monitor.take(state, maker.block(truth, rough))

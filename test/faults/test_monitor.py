@@ -10,8 +10,8 @@ from sysid_node.errors import InputError
 from sysid_node.faults import monitor
 from sysid_node.faults.model import blocks
 from sysid_node.faults.model.blocks import PERIOD
-from sysid_node.faults.model.reference_model import Known
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, VANE_STUCK
 
 ONSET = 32.0  # s
@@ -200,13 +200,15 @@ def test_the_last_good_derivatives_are_held() -> None:
     state, maker = monitored(seed=9)
     fly(state, maker, ONSET)
     place = state.terms.names.index("Cm_de")
-    monitor.hear(state, ONSET, {"Cm_de": Known(-0.47, 0.004, True), "CL_alpha": Known(9.9, 0.1, False)})
+    monitor.receive_estimates(
+        state, ONSET, {"Cm_de": IdentifierEstimate(-0.47, 0.004, True), "CL_alpha": IdentifierEstimate(9.9, 0.1, False)}
+    )
     fly(state, maker, 12.0)
     assert state.held.values[place] == -0.47
     assert state.held.errors[place] == 0.004
     assert state.held.values[state.terms.names.index("CL_alpha")] == AIRCRAFT.derivatives["CL_alpha"].value
     fly(state, maker, 8.0, lost("de", 0.6))
-    monitor.hear(state, 60.0, {"Cm_de": Known(-0.19, 0.004, True)})
+    monitor.receive_estimates(state, 60.0, {"Cm_de": IdentifierEstimate(-0.19, 0.004, True)})
     fly(state, maker, 20.0, lost("de", 0.6))
     assert state.held.values[place] == -0.47
 
@@ -214,7 +216,11 @@ def test_the_last_good_derivatives_are_held() -> None:
 def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
     """Their values differ from the file's as a sound aircraft's may: nothing is found, early or late."""
     state, maker = monitored(seed=10)
-    monitor.hear(state, 1.0, {"Cm_de": Known(-0.4606 * 1.01, 0.01, True), "CL_alpha": Known(3.02, 0.05, True)})
+    monitor.receive_estimates(
+        state,
+        1.0,
+        {"Cm_de": IdentifierEstimate(-0.4606 * 1.01, 0.01, True), "CL_alpha": IdentifierEstimate(3.02, 0.05, True)},
+    )
     assert fly(state, maker, 60.0) is None
     assert state.held.values[state.terms.names.index("CL_alpha")] == 3.02
 
@@ -222,7 +228,7 @@ def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
 def test_samples_of_another_rate_or_with_holes_are_averaged_alike() -> None:
     """A steady turn: the means are the samples' values, whatever the rate; what lacks a value is left out."""
     for rate in (50, 200):
-        state = monitor.init(AIRCRAFT, Settings())
+        state = monitor.init(AIRCRAFT, FaultMonitorSettings())
         sample = [0.1, 0.0, -9.8, 0.0, 0.02, 0.1, 18.0, 0.07, 0.0, 1.2, 5.0, 0.01, 0.01, 0.0, 0.0]
         heard = []
         for k in range(rate):
@@ -255,4 +261,4 @@ def test_a_record_makes_the_blocks_that_samples_make() -> None:
 
 def test_impossible_settings() -> None:
     with pytest.raises(InputError, match="slack"):
-        Settings(slack=2.0)
+        FaultMonitorSettings(slack=2.0)

@@ -8,8 +8,8 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.faults import watch as watching
-from sysid_node.faults.recorded_flight import Said, Verdict, episodes, judge
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.recorded_flight import FaultReport, FaultVerdict, episodes, judge
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import LOSS, NOT_FOLLOWING, SILENT, STUCK, Fault
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commands import JointMessage
@@ -25,8 +25,8 @@ def flight() -> Streams:
 
 
 @pytest.fixture(scope="module")
-def verdict(flight: Streams) -> Verdict:
-    return judge(AIRCRAFT, Settings(), flight)
+def verdict(flight: Streams) -> FaultVerdict:
+    return judge(AIRCRAFT, FaultMonitorSettings(), flight)
 
 
 def shortened(flight: Streams, begin: float, end: float) -> Streams:
@@ -50,7 +50,7 @@ def shortened(flight: Streams, begin: float, end: float) -> Streams:
     )
 
 
-def test_the_failure_that_was_flown_is_found(verdict: Verdict) -> None:
+def test_the_failure_that_was_flown_is_found(verdict: FaultVerdict) -> None:
     (episode,) = verdict.episodes
     fault = episode.fault
     assert (fault.kind, fault.part, episode.until) == (LOSS, "elevator", None)
@@ -59,9 +59,9 @@ def test_the_failure_that_was_flown_is_found(verdict: Verdict) -> None:
     assert 36.0 < verdict.judged < 40.0
 
 
-def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, verdict: Verdict) -> None:
+def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, verdict: FaultVerdict) -> None:
     """In the order of arrival, with a look every tenth of a second: the same, to the last bit."""
-    watch, speech, said = watching.init(AIRCRAFT, Settings(), 0.5), watching.Speech(), []
+    watch, speech, said = watching.init(AIRCRAFT, FaultMonitorSettings(), 0.5), watching.Announcements(), []
     start = int(flight.imu.arrival.log_ns[0])
     calls = [
         *((s, i, watching.on_imu, ()) for s in [flight.imu] for i in range(len(s.arrival))),
@@ -74,7 +74,7 @@ def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, v
         while 0.1 * tick < now:
             faults = watching.wrong(watch, 0.1 * tick)
             if speech.due(faults, 0.1 * tick):
-                said.append(Said(watch.stamp_ns, watch.now, tuple(faults)))
+                said.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
             tick += 1
         values = stream.positions if names else stream.values
         take(watch, now, int(stream.arrival.stamp_ns[i]), *names, tuple(values[i].tolist()))
@@ -100,7 +100,7 @@ def test_what_is_silent_and_what_does_not_follow(flight: Streams) -> None:
         told = list(row)
         told[place] += 0.2 * (8.0 < (log_ns - int(joints.arrival.log_ns[0])) / 1e9 < 9.0)
         commands.append(JointMessage(log_ns, stamp_ns, joints.names, tuple(told)))
-    found = judge(AIRCRAFT, Settings(), dataclasses.replace(short, air_data=air), commands).episodes
+    found = judge(AIRCRAFT, FaultMonitorSettings(), dataclasses.replace(short, air_data=air), commands).episodes
     assert [(e.fault.kind in {SILENT, STUCK, NOT_FOLLOWING}, e.fault.part) for e in found] == [
         (True, "air_data"),
         (True, "rudder"),
@@ -117,11 +117,11 @@ def test_a_fault_whose_name_changes_is_one_and_two_silences_are_two() -> None:
         return Fault(kind, part, 0.1, 0.0, 0.2, "1", found - 1.0, found, 0.9, source=source)
 
     said = [
-        Said(1, 10.0, (one("stuck surface", "elevator", 10.0),)),
-        Said(2, 10.5, (one(LOSS, "elevator", 10.0), one(SILENT, "air_data", 10.4, "arrival"))),
-        Said(3, 11.0, (one(LOSS, "elevator", 10.0), one(SILENT, "imu/data", 10.4, "arrival"))),
-        Said(4, 12.0, ()),
-        Said(5, 20.0, (one(LOSS, "rudder", 20.0),)),
+        FaultReport(1, 10.0, (one("stuck surface", "elevator", 10.0),)),
+        FaultReport(2, 10.5, (one(LOSS, "elevator", 10.0), one(SILENT, "air_data", 10.4, "arrival"))),
+        FaultReport(3, 11.0, (one(LOSS, "elevator", 10.0), one(SILENT, "imu/data", 10.4, "arrival"))),
+        FaultReport(4, 12.0, ()),
+        FaultReport(5, 20.0, (one(LOSS, "rudder", 20.0),)),
     ]
     assert [(e.fault.kind, e.fault.part, e.until) for e in episodes(said)] == [
         (LOSS, "elevator", 12.0),
@@ -132,6 +132,6 @@ def test_a_fault_whose_name_changes_is_one_and_two_silences_are_two() -> None:
 
 
 def test_a_flight_too_short_to_learn_says_so(flight: Streams) -> None:
-    verdict = judge(AIRCRAFT, Settings(), shortened(flight, 0.0, 6.0))
+    verdict = judge(AIRCRAFT, FaultMonitorSettings(), shortened(flight, 0.0, 6.0))
     assert (verdict.judged, verdict.episodes) == (0.0, [])
     assert "too short to learn" in verdict.sentences[0]

@@ -6,9 +6,9 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.faults import watch as watching
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import ARRIVAL, POSITION, SILENT, STUCK, Fault
-from sysid_node.faults.watch import Speech, Watch
+from sysid_node.faults.watch import Announcements, MessageWatch
 
 AIRCRAFT = load_aircraft("cdrw")
 JOINTS = ("throttle", "elevator", "aileron", "rudder")
@@ -21,7 +21,7 @@ def elevator(time: float) -> float:
 
 
 def flown(
-    watch: Watch, begin: float, end: float, *, silent: str = "", stuck: bool = False, stamped: bool = True
+    watch: MessageWatch, begin: float, end: float, *, silent: str = "", stuck: bool = False, stamped: bool = True
 ) -> None:
     """Level flight from ``begin`` to ``end`` (s) while the elevator moves, its positions behind a servo's lag."""
     for k in range(round(begin / STEP), round(end / STEP)):
@@ -39,8 +39,8 @@ def flown(
 
 
 @pytest.fixture
-def watch() -> Watch:
-    return watching.init(AIRCRAFT, Settings(), watching.STALE_AFTER)
+def watch() -> MessageWatch:
+    return watching.init(AIRCRAFT, FaultMonitorSettings(), watching.STALE_AFTER)
 
 
 def only(faults: list[Fault]) -> Fault:
@@ -49,7 +49,7 @@ def only(faults: list[Fault]) -> Fault:
 
 
 @pytest.mark.parametrize("topic", ["imu/data", "air_data", "actuators"])
-def test_a_silent_topic_is_said_until_it_speaks_again(watch: Watch, topic: str) -> None:
+def test_a_silent_topic_is_said_until_it_speaks_again(watch: MessageWatch, topic: str) -> None:
     flown(watch, 0.0, 2.0)
     assert watching.wrong(watch, 2.0) == []
     flown(watch, 2.0, 3.0, silent=topic)
@@ -62,13 +62,13 @@ def test_a_silent_topic_is_said_until_it_speaks_again(watch: Watch, topic: str) 
     assert watching.wrong(watch, 3.1) == []
 
 
-def test_what_never_spoke_is_not_silent(watch: Watch) -> None:
+def test_what_never_spoke_is_not_silent(watch: MessageWatch) -> None:
     flown(watch, 0.0, 2.0, silent="air_data")
     assert watching.wrong(watch, 2.0) == []
 
 
 @pytest.mark.parametrize("stamped", [True, False])
-def test_a_jammed_servo_by_the_samples_clock(watch: Watch, stamped: bool) -> None:
+def test_a_jammed_servo_by_the_samples_clock(watch: MessageWatch, stamped: bool) -> None:
     """Its times count from the first IMU message, as those of all faults do."""
     flown(watch, 0.0, 2.0, stamped=stamped)
     assert watching.wrong(watch, 2.0) == []
@@ -80,6 +80,6 @@ def test_a_jammed_servo_by_the_samples_clock(watch: Watch, stamped: bool) -> Non
 
 def test_it_says_what_is_news_and_repeats_it_once_a_second() -> None:
     jam = Fault(STUCK, "elevator", 0.1, math.nan, math.nan, "rad", 1.0, 1.5, 1.0)
-    speech = Speech()
+    speech = Announcements()
     said = [k for k in range(40) if speech.due([jam] if k >= 15 else [], 0.1 * k)]
     assert said == [0, 10, 15, 25, 35]

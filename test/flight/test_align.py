@@ -9,7 +9,7 @@ from made_flights import made_aircraft, made_streams
 from sysid_node.errors import InputError
 from sysid_node.flight import align as alignment
 from sysid_node.flight.actuation import Actuation
-from sysid_node.flight.align import AIR_INTERVAL, align, flat, flight_record
+from sysid_node.flight.align import AIR_INTERVAL, align, counts_by_reason, flight_record
 from sysid_node.flight.checks import DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
 from sysid_node.flight.streams import Arrival
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
@@ -122,7 +122,7 @@ def test_record_has_named_columns_attitude_and_counts():
     assert set(record.columns) == {*SAMPLE_COLUMNS, "de", "da", "dr", "phi", "theta", "psi"} - {AIR_INTERVAL}
     np.testing.assert_array_equal(record["da"], aligned.samples[:, 13])
     np.testing.assert_array_equal(record["theta"], streams.imu.attitude[aligned.imu.kept[aligned.used], 1])
-    assert record.rejected == flat(aligned.rejected)
+    assert record.rejected == counts_by_reason(aligned.rejected)
     assert record.rejected["air_data: angle_of_attack over pi/2 rad (degrees?)"] == 1
     assert record.start_ns + round(record.time[0] * 1e9) == aligned.stamps[0]
 

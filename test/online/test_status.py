@@ -15,7 +15,7 @@ from sysid_node.online.state import State
 from sysid_node.online.status import vocabulary
 
 AIRCRAFT = made_aircraft()
-PLAN = least_squares.plan(AIRCRAFT.structure, regression_signals.layout(AIRCRAFT))
+PLAN = least_squares.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
 
 
 def flown(seconds: float, method: str = "iv_rft") -> State:

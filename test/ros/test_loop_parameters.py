@@ -7,9 +7,9 @@ import pytest
 import yaml
 from harness import ROOT
 
-from sysid_node.control.settings import Settings as Control
+from sysid_node.control.settings import ControllerSettings as Control
 from sysid_node.excite.exciter import ExcitationSettings as Excitation
-from sysid_node.faults.settings import Settings as Faults
+from sysid_node.faults.settings import FaultMonitorSettings as Faults
 from sysid_node.parameter import annotated_yaml, check_each
 from sysid_node.ros import adaptive_controller, exciter, fault_monitor, flight_simulator
 from sysid_node.ros.support.loop_node import EFFECT

@@ -25,7 +25,7 @@ from sysid_node.batch.models.model_for_flights import model_for_flights
 from sysid_node.batch.regression.filtering import block_averaged
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
-from sysid_node.flight.logs import load_flight
+from sysid_node.flight.logs import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.truth import read_truth
 from sysid_node.online.settings import Settings as OnlineSettings
@@ -66,7 +66,7 @@ def case(name: str) -> Case:
         key: replace(d, value=d.value + (d.tolerance or 0.0) * float(rng.standard_normal()))
         for key, d in aircraft.derivatives.items()
     }
-    record = replace(load_flight(BAGS / name, aircraft), name=name)
+    record = replace(load_flight_record(BAGS / name, aircraft), name=name)
     return Case(replace(aircraft, derivatives=wrong), record, read_truth(BAGS / name))
 
 

@@ -55,6 +55,6 @@ def section(folder: Path) -> str:
     ]
     rows += [
         [f"R^2 of {c}", *(text for r in columns.values() for text in (f"{r.r_squared[c]:.2f}", ""))]
-        for c in known.structure
+        for c in known.model_structure
     ]
     return f"{delays}\n\n{table(('', *(head for column in columns for head in (column, 'status'))), rows)}"

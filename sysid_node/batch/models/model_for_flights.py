@@ -30,12 +30,12 @@ def model_for_flights(
     remarks = []
     thrust = aircraft.throttle is None or all(record.measured("thrust") for record in records)
     states = settings.states or _possible_states(aircraft, thrust)
-    if not settings.states and "CD" in aircraft.structure and not thrust:
+    if not settings.states and "CD" in aircraft.model_structure and not thrust:
         remarks.append("thrust was not measured: the airspeed is taken as measured, and CD is left out")
     if not states:
         raise InputError(
-            f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.structure)}) make no complete motion; an "
-            "equation-error method estimates each coefficient alone"
+            f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.model_structure)}) make no complete "
+            "motion; an equation-error method estimates each coefficient alone"
         )
     unflown = [record.name for record in records if not record.measured("V")]
     if unflown:
@@ -61,14 +61,14 @@ def require_length(model: StateSpaceModel, aircraft: Aircraft, records: Sequence
 
     Outputs and states tell of the same few motions: they do not make up for a flight that ends before it has begun.
     """
-    for coefficient, regressors in aircraft.structure.items():
+    for coefficient, regressors in aircraft.model_structure.items():
         names = [name for name in (f"{coefficient}_{r}" for r in regressors) if name in model.names]
         if names:
             effective_degrees_of_freedom(names, [record.time for record in records], DEFAULT_LOW_PASS)
 
 
 def _possible_states(aircraft: Aircraft, thrust: bool) -> tuple[str, ...]:
-    structure = set(aircraft.structure)
+    structure = set(aircraft.model_structure)
     possible = {state for needed, states in _AXES.items() if structure.issuperset(needed) for state in states}
     if thrust and {"CL", "CD"} <= structure and "alpha" in possible:
         possible.add("V")

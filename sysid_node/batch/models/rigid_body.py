@@ -107,7 +107,7 @@ def _coefficients_needed(aircraft: Aircraft, states: Sequence[str]) -> tuple[str
         for coefficient in _TOGETHER.get(state, (STATES[state],)):
             if coefficient is None or coefficient in needed:
                 continue
-            if coefficient not in aircraft.structure:
+            if coefficient not in aircraft.model_structure:
                 raise InputError(
                     f"aircraft {aircraft.name}: state {state} needs derivatives of {coefficient}, and the file has "
                     f"none; give some or leave {state} out of the states"

@@ -139,8 +139,8 @@ def _lever(position: Vector3, rates: Array, accelerations: Array) -> Array:
 
 def _needed(aircraft: Aircraft) -> list[str]:
     """Columns without which the model cannot be formed."""
-    regressors = {name for names in aircraft.structure.values() for name in names}
-    longitudinal = {"CL", "CD"} & set(aircraft.structure)
+    regressors = {name for names in aircraft.model_structure.values() for name in names}
+    longitudinal = {"CL", "CD"} & set(aircraft.model_structure)
     angles = [name for name in ("alpha", "beta") if name in regressors or (name == "alpha" and longitudinal)]
     return [*_ALWAYS, *angles, *(symbol for symbol in aircraft.control_symbols if symbol in regressors)]
 
@@ -187,7 +187,7 @@ def _coefficients(aircraft: Aircraft, s: Mapping[str, Array]) -> tuple[dict[str,
     c["CL"] = c["CX"] * np.sin(alpha) - c["CZ"] * np.cos(alpha)
     if throttle is None or "thrust" in s:
         c["CD"] = -c["CX"] * np.cos(alpha) - c["CZ"] * np.sin(alpha)
-    elif "CD" in aircraft.structure:
+    elif "CD" in aircraft.model_structure:
         remarks.append("thrust was not measured: drag cannot be told from it, and CD is left out")
     moments, unknown = _moments(aircraft, s, force, thrust * arm)
     return c | moments, remarks + [f"{name} left out: {reason}" for name, reason in unknown.items()]
@@ -210,7 +210,7 @@ def _moments(
     unknown = {
         name: "its moment of inertia is not in the aircraft file"
         for name, value in own.items()
-        if math.isnan(value) and name in aircraft.structure
+        if math.isnan(value) and name in aircraft.model_structure
     }
     return {name: value for name, value in moments.items() if not math.isnan(own[name])}, unknown
 

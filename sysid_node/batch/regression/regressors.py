@@ -29,9 +29,9 @@ def regressors_by_coefficient(aircraft: Aircraft, flights: list[MeasuredCoeffici
 def _formable_regressors(aircraft: Aircraft, flights: list[MeasuredCoefficients]) -> dict[str, tuple[str, ...]]:
     """The aircraft's model as far as every flight can form it: regressors by coefficient."""
     return {
-        name: aircraft.structure[name]
+        name: aircraft.model_structure[name]
         for name in COEFFICIENTS
-        if name in aircraft.structure and all(name in flight.coefficients for flight in flights)
+        if name in aircraft.model_structure and all(name in flight.coefficients for flight in flights)
     }
 
 

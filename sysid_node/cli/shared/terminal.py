@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from sysid_node.faults.recorded_flight import Verdict
+from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.online.types import Estimates
 
 
@@ -50,7 +50,7 @@ def _true(name: str, truth: Mapping[str, float], since: Mapping[str, float]) -> 
     return f"{truth[name]:.4f}" + (f" since {since[name]:.1f} s" if name in since else "")
 
 
-def show_faults(verdict: Verdict) -> None:
+def show_faults(verdict: FaultVerdict) -> None:
     """What the fault monitor would have said of the flight."""
     style = "bold yellow" if verdict.episodes else "dim"
     for sentence in verdict.sentences:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.hypotheses.catalogue import LIMIT
 from sysid_node.faults.report import AT_LIMIT
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import HARD_OVER, NOT_FOLLOWING, POSITION, STUCK, Fault
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ COMMAND_AGE = 0.15  # s, after which commands no longer count
 
 
 @dataclass
-class Servos:
+class ServoState:
     """What is remembered of the controls, in the aircraft file's order."""
 
     names: tuple[str, ...]
     limits: Array
-    settings: Settings
+    settings: FaultMonitorSettings
     command: Array  # rad, NaN before the first
     off_since: Array  # s, inf = where it should be
     off_at: Array  # s, when it was last not where it should be
@@ -48,21 +48,21 @@ class Servos:
     found: dict[str, Fault] = field(default_factory=dict)
 
 
-def init(aircraft: Aircraft, settings: Settings) -> Servos:
+def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> ServoState:
     """Nothing heard."""
     limits = np.array([control.limit or LIMIT for control in aircraft.controls.values()])
     never = np.full(limits.size, math.inf)
-    return Servos(tuple(aircraft.controls), limits, settings, np.full(limits.size, math.nan), never, -never)
+    return ServoState(tuple(aircraft.controls), limits, settings, np.full(limits.size, math.nan), never, -never)
 
 
-def command(state: Servos, time: float, controls: Sequence[float]) -> None:
+def command(state: ServoState, time: float, controls: Sequence[float]) -> None:
     """What the controls (rad) are told at a time (s, of the positions' clock)."""
     if state.coming and time < state.coming[-1][0]:
         state.coming.clear()  # the clock has stepped back
     state.coming.append((time, np.clip(controls, -state.limits, state.limits)))
 
 
-def position(state: Servos, time: float, controls: Sequence[float]) -> list[Fault]:
+def position(state: ServoState, time: float, controls: Sequence[float]) -> list[Fault]:
     """Where the controls (rad) are at a time (s); returns what is wrong with them at present.
 
     Nothing is, where the commands of that time have not come: they may be on their way.
@@ -94,13 +94,13 @@ def position(state: Servos, time: float, controls: Sequence[float]) -> list[Faul
     return list(state.found.values())
 
 
-def _forget(state: Servos) -> None:
+def _forget(state: ServoState) -> None:
     state.expected, state.off_since = None, np.full(state.limits.size, math.inf)
     state.recent.clear()
     state.found.clear()
 
 
-def _fault(state: Servos, i: int, now: float, before: Fault | None) -> Fault:
+def _fault(state: ServoState, i: int, now: float, before: Fault | None) -> Fault:
     """Of a control that is not where it should be."""
     places = np.array([row[i] for _, row in state.recent])
     if np.ptp(places) > STILL:

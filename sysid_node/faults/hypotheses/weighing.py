@@ -22,9 +22,9 @@ from sysid_node.faults.hypotheses.bayes_factors import (
 )
 from sysid_node.faults.hypotheses.vane_check import stuck_factor
 from sysid_node.faults.model import gust_correlation, residual_whitening
-from sysid_node.faults.model.reference_model import Belief
+from sysid_node.faults.model.reference_model import ModelPrior
 from sysid_node.faults.model.residual_whitening import ORDER
-from sysid_node.faults.state import Piece, State
+from sysid_node.faults.state import MonitorState, WhitenedBlock
 from sysid_node.online.frequency.regression_signals import OFFSET
 
 Array = NDArray[np.float64]
@@ -40,17 +40,17 @@ MARGIN = 1.0  # of a logarithm, for the statistics' rounding
 LAST_RESORT = 0.1  # share by which damage of a whole axis, which can explain all, must explain more than what is simple
 
 
-class Stretch(NamedTuple):
+class FlightInterval(NamedTuple):
     """The last blocks, what is believed, what they sum up to against it, and that without what its errors allow."""
 
-    pieces: Sequence[Piece]
-    belief: Belief
+    pieces: Sequence[WhitenedBlock]
+    belief: ModelPrior
     whole: tuple[Array, Array]
     J: Array
     v: Array
 
 
-def stretch(state: State, count: int, belief: Belief | None = None) -> Stretch:
+def last_interval(state: MonitorState, count: int, belief: ModelPrior | None = None) -> FlightInterval:
     """The last ``count`` blocks, against a belief; None: what is believed by now."""
     belief = belief or state.belief
     assert belief is not None
@@ -59,7 +59,7 @@ def stretch(state: State, count: int, belief: Belief | None = None) -> Stretch:
     return _against(state, pieces, (J, v), belief)
 
 
-def since(state: State, count: int, belief: Belief) -> Stretch:
+def changed_since(state: MonitorState, count: int, belief: ModelPrior) -> FlightInterval:
     """What set in ``count`` blocks ago.
 
     What the first blocks' whitening takes from the blocks before them is of the sound aircraft: the moment of a change
@@ -72,7 +72,7 @@ def since(state: State, count: int, belief: Belief) -> Stretch:
     return _against(state, pieces, (J, v), belief)
 
 
-def onsets(state: State, counts: Sequence[int], sound: int) -> list[Stretch]:
+def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[FlightInterval]:
     """As ``since``, of each count, against what is believed together with what the blocks before it say of it.
 
     They begin ``sound`` blocks ago. What was off before something failed was off by then, too: an offset that the held
@@ -90,7 +90,7 @@ def onsets(state: State, counts: Sequence[int], sound: int) -> list[Stretch]:
             before = (J[n - 1], v[n - 1])
             precision = prior.precision + before[0]
             score = before[1] - before[0] @ prior.shift + _flattened(state, read[:n])
-            belief = Belief(prior.shift + np.linalg.solve(precision, score), precision)
+            belief = ModelPrior(prior.shift + np.linalg.solve(precision, score), precision)
         first = [_begun(piece, late, belief) for late, piece in enumerate(pieces[n : n + ORDER])]
         rest = [total[-1] - total[n + len(first) - 1] for total in (J, v)]
         sums = [sum((getattr(piece, name) for piece in first), start) for name, start in zip("Jv", rest, strict=True)]
@@ -98,31 +98,33 @@ def onsets(state: State, counts: Sequence[int], sound: int) -> list[Stretch]:
     return found
 
 
-def doubted(state: State, over: Stretch) -> Stretch:
+def allowing_for_gusts(state: MonitorState, over: FlightInterval) -> FlightInterval:
     """A stretch against a belief that allows for what gusts may have taught (``gusts``)."""
     J, v = over.whole
-    allowed = np.linalg.inv(over.belief.precision) + gust_correlation.doubt(state.held, J / len(over.pieces))
+    allowed = np.linalg.inv(over.belief.precision) + gust_correlation.gust_covariance(state.held, J / len(over.pieces))
     belief = over.belief._replace(precision=np.asarray(np.linalg.inv(allowed)))
-    return Stretch(over.pieces, belief, over.whole, *marginal(J, v, belief.precision))
+    return FlightInterval(over.pieces, belief, over.whole, *marginal(J, v, belief.precision))
 
 
-def _last(state: State, count: int) -> list[Piece]:
+def _last(state: MonitorState, count: int) -> list[WhitenedBlock]:
     return list(islice(state.pieces, len(state.pieces) - count, None))
 
 
-def _against(state: State, pieces: Sequence[Piece], sums: tuple[Array, Array], belief: Belief) -> Stretch:
+def _against(
+    state: MonitorState, pieces: Sequence[WhitenedBlock], sums: tuple[Array, Array], belief: ModelPrior
+) -> FlightInterval:
     """Pieces whose information (D, D) and score (D,) about the held values are ``sums``."""
     J, v = sums
     v = v - J @ belief.shift + _flattened(state, _readings(pieces))
-    return Stretch(pieces, belief, (J, v), *marginal(J, v, belief.precision))
+    return FlightInterval(pieces, belief, (J, v), *marginal(J, v, belief.precision))
 
 
-def _readings(pieces: Sequence[Piece]) -> Array:
+def _readings(pieces: Sequence[WhitenedBlock]) -> Array:
     """(N, 3) of the air data."""
     return np.array([piece.block.air for piece in pieces])
 
 
-def _flattened(state: State, read: Array) -> Array:
+def _flattened(state: MonitorState, read: Array) -> Array:
     """(D,) what noise of the vanes takes off the score of blocks that ``read`` (N, 3).
 
     Noise on a regressor flattens the slope that least squares find, and over a long stretch in which the angle hardly
@@ -139,14 +141,14 @@ def _flattened(state: State, read: Array) -> Array:
     return total
 
 
-def _begun(piece: Piece, late: int, belief: Belief) -> Piece:
+def _begun(piece: WhitenedBlock, late: int, belief: ModelPrior) -> WhitenedBlock:
     """A piece as of what set in ``late`` blocks before it."""
     A = piece.begun[late]
     b = piece.whitened + (A - piece.design) @ belief.shift
     return piece._replace(design=A, whitened=b, J=A.T @ A, v=A.T @ b)
 
 
-def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
+def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
     """Each hypothesis with what it leaves out (``evidence.weigh_loosely``), by the variance that the best leaves."""
     first = weights(state, over, usual)
     best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
@@ -161,29 +163,29 @@ def explained(state: State, over: Stretch, usual: Array) -> list[Weighed]:
     return found
 
 
-def statistics(state: State, over: Stretch) -> Array:
+def statistics(state: MonitorState, over: FlightInterval) -> Array:
     """(H,) of each hypothesis; see ``evidence.score_squares``."""
     return score_squares(over.J, over.v, _shifts(state))
 
 
-def weights(state: State, over: Stretch, usual: Array) -> list[Weighed]:
+def weights(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
     """Each hypothesis; ``usual`` (H,) is the size of its statistic where nothing has failed."""
     return weigh_each(over.J, over.v, _shifts(state), np.maximum(usual, 1.0))
 
 
-def promising(state: State, over: Stretch, usual: Array, squares: Array, least: float) -> list[Weighed]:
+def promising(state: MonitorState, over: FlightInterval, usual: Array, squares: Array, least: float) -> list[Weighed]:
     """As ``weights``, where only factors beyond ``least`` matter; ``squares`` (H,) are the stretch's statistics."""
     usual = np.maximum(usual, 1.0)
     worth = most(_shifts(state), squares, usual) > least - MARGIN
     return weigh_each(over.J, over.v, _shifts(state), usual, worth)
 
 
-def _shifts(state: State) -> Shifts:
+def _shifts(state: MonitorState) -> Shifts:
     assert state.shifts is not None
     return state.shifts
 
 
-def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
+def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weighed) -> float:
     """The residuals' variance that a hypothesis leaves, over the usual one: air may have become rougher, too.
 
     The largest of the six coefficients'.
@@ -194,7 +196,7 @@ def excess(state: State, over: Stretch, place: int, weighed: Weighed) -> float:
     return float((left**2).mean(axis=0).max())
 
 
-def vane_noise(state: State, samples: float) -> dict[str, float]:
+def vane_noise(state: MonitorState, samples: float) -> dict[str, float]:
     """Variance (rad^2) of each vane's noise in a block of so many ``samples``: the file's, or what residuals allow."""
     found = {}
     for vane, (_, output) in VANES.items():
@@ -207,7 +209,7 @@ def vane_noise(state: State, samples: float) -> dict[str, float]:
     return found
 
 
-def stuck_vanes(state: State, pieces: Sequence[Piece], counts: Sequence[int] = ()) -> Array:
+def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Sequence[int] = ()) -> Array:
     """(N, 2) logarithms of the Bayes factors of jammed vanes over the last ``counts`` (N) pieces, or over all."""
     counts = counts or [len(pieces)]
     found = np.zeros((len(counts), len(VANES)))

@@ -41,7 +41,7 @@ class Block(NamedTuple):
 
 
 @dataclass
-class Blocks:
+class BlockAverager:
     """What the averaging remembers."""
 
     layout: Layout
@@ -55,14 +55,14 @@ class Blocks:
     unbroken: bool = False
 
 
-def init(aircraft: Aircraft) -> Blocks:
+def init(aircraft: Aircraft) -> BlockAverager:
     """Nothing averaged yet."""
     layout = signals.layout(aircraft)
     width = layout.width
-    return Blocks(layout, signals.scalar_signals(aircraft), signals.momentum_gain(aircraft), np.zeros(width))
+    return BlockAverager(layout, signals.scalar_signals(aircraft), signals.momentum_gain(aircraft), np.zeros(width))
 
 
-def add(state: Blocks, time: float, sample: Sequence[float]) -> Block | None:
+def add(state: BlockAverager, time: float, sample: Sequence[float]) -> Block | None:
     """Take in an aligned sample (``SAMPLE_COLUMNS``, then controls) at ``time`` (s); a block where one is complete.
 
     Samples without a value that is needed, or not after the last, are left out.
@@ -114,7 +114,7 @@ def of_record(aircraft: Aircraft, time: Array, samples: Array) -> list[Block]:
     return found
 
 
-def _complete(state: Blocks, time: float) -> Block:
+def _complete(state: BlockAverager, time: float) -> Block:
     duration = time - state.begin
     means = state.area / duration
     block = Block(time, means[:OUTPUTS], means, state.air / duration, state.samples, state.unbroken)
@@ -122,6 +122,6 @@ def _complete(state: Blocks, time: float) -> Block:
     return block
 
 
-def _begin(state: Blocks, time: float, unbroken: bool) -> None:
+def _begin(state: BlockAverager, time: float, unbroken: bool) -> None:
     state.begin, state.samples, state.unbroken = time, 0, unbroken
     state.area, state.air = np.zeros_like(state.area), np.zeros(3)

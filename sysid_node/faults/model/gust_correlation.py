@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.faults.model.reference_model import Held
+from sysid_node.faults.model.reference_model import ReferenceModel
 from sysid_node.faults.model.terms import Terms
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ LEAST = 20.0  # blocks, of which something is learned
 _RIDGE = 1e-6
 
 
-def doubt(held: Held, information: Array) -> Array:
+def gust_covariance(held: ReferenceModel, information: Array) -> Array:
     """(D, D) by how much more the held terms may be off, seen from a stretch.
 
     ``information`` (D, D) is what a block of the stretch says of them, in the mean.
@@ -55,7 +55,7 @@ def doubt(held: Held, information: Array) -> Array:
     return np.asarray(moved @ moved.T)
 
 
-def surprise(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:
+def usual_size_in_gusts(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:
     """(H,) how large each shift's mean square score may be in a stretch of so many blocks where nothing has failed.
 
     ``usual`` (H,) is what it was of late. Damage of a ``whole`` axis (H,) takes up what a few gusts in a row do to any

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.faults.model.residual_whitening import Colour
+from sysid_node.faults.model.residual_whitening import WhiteningFilter
 from sysid_node.faults.model.terms import Terms
 from sysid_node.online.types import Estimates
 
@@ -29,7 +29,7 @@ REAL = 0.5  # share of a direction's information that must be motion's
 KEPT = 0.9995  # share of what a block has shown that the next one leaves: 200 s
 
 
-class Known(NamedTuple):
+class IdentifierEstimate(NamedTuple):
     """A derivative as the identifier has it."""
 
     value: float
@@ -37,13 +37,13 @@ class Known(NamedTuple):
     valid: bool
 
 
-def known_of(estimates: Estimates) -> dict[str, Known]:
+def identifier_estimates(estimates: Estimates) -> dict[str, IdentifierEstimate]:
     """What the identifier says, as the monitor hears it."""
-    return {d.name: Known(d.value, d.standard_error, d.valid) for d in estimates.derivatives.values()}
+    return {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in estimates.derivatives.values()}
 
 
 @dataclass
-class Held:
+class ReferenceModel:
     """Values (D,) and standard errors (D,), what flight has shown on top, and the offsets that go with them."""
 
     terms: Terms
@@ -54,25 +54,27 @@ class Held:
     v: Array  # (D,) its score about the values
     blocks: Array  # (D, D) how many it is made of
     offsets: Array = field(default_factory=lambda: np.zeros(6))  # k times these belong to the model, too
-    coming: deque[tuple[float, Mapping[str, Known]]] = field(default_factory=deque)
+    coming: deque[tuple[float, Mapping[str, IdentifierEstimate]]] = field(default_factory=deque)
 
 
-class Belief(NamedTuple):
+class ModelPrior(NamedTuple):
     """What the blocks are weighed against: the mean's distance from the held values (D,), and its precision (D, D)."""
 
     shift: Array
     precision: Array
 
 
-def init(terms: Terms) -> Held:
+def init(terms: Terms) -> ReferenceModel:
     """The aircraft file's."""
     count = len(terms.names)
     nothing = np.zeros(count)
     none = np.zeros((count, count))
-    return Held(terms, terms.values.copy(), terms.tolerance.copy(), nothing, none, nothing.copy(), none.copy())
+    return ReferenceModel(
+        terms, terms.values.copy(), terms.tolerance.copy(), nothing, none, nothing.copy(), none.copy()
+    )
 
 
-def hear(held: Held, time: float, known: Mapping[str, Known]) -> None:
+def receive_estimates(held: ReferenceModel, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
     """Estimates of a time (s); some of them are kept until they are ripe."""
     if held.coming and time < held.coming[-1][0]:
         held.coming.clear()  # the clock has stepped back
@@ -80,7 +82,7 @@ def hear(held: Held, time: float, known: Mapping[str, Known]) -> None:
         held.coming.append((time, known))
 
 
-def ripen(held: Held, now: float) -> bool:
+def adopt_estimates(held: ReferenceModel, now: float) -> bool:
     """Take up what is old enough, where nothing has failed by a time (s); whether anything was."""
     taken = False
     while held.coming and now - held.coming[0][0] >= RIPE:
@@ -96,7 +98,7 @@ def ripen(held: Held, now: float) -> bool:
     return taken
 
 
-def learn(held: Held, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
+def learn(held: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
     """From a block of sound flight, about the ``chosen`` terms (D,)."""
     both = np.outer(chosen, chosen)
     held.blocks = KEPT * held.blocks + both
@@ -104,7 +106,7 @@ def learn(held: Held, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
     held.v = KEPT * held.v + chosen * v
 
 
-def noise_of(terms: Terms, colour: Colour, regressor: str, variance: float) -> Array:
+def noise_of(terms: Terms, colour: WhiteningFilter, regressor: str, variance: float) -> Array:
     """(D, D) what noise of a ``variance`` on a regressor adds to the information of a block."""
     noisy = np.flatnonzero(terms.of(regressor))
     design = np.zeros((6, len(terms.names)))
@@ -113,7 +115,7 @@ def noise_of(terms: Terms, colour: Colour, regressor: str, variance: float) -> A
     return np.asarray(sum(part.T @ part for part in parts))
 
 
-def belief(held: Held, noise: Array, slack: float) -> Belief:
+def model_prior(held: ReferenceModel, noise: Array, slack: float) -> ModelPrior:
     """What is held, with what sound flight has shown; a share ``slack`` of each derivative counts as no change.
 
     ``noise`` (D, D) is the part of the information that is the regressors' noise.
@@ -137,10 +139,10 @@ def belief(held: Held, noise: Array, slack: float) -> Belief:
         shift[d] = -float(shift[mine] @ held.regressors[mine])
         # and they are off by what the other terms' slack makes of the motion
         loose[d] = float(((slack * values * terms.signal)[mine] ** 2).sum()) + (slack * values[d]) ** 2 + 1e-12
-    return Belief(shift, np.asarray(np.linalg.inv(covariance + np.diag(loose)), dtype=np.float64))
+    return ModelPrior(shift, np.asarray(np.linalg.inv(covariance + np.diag(loose)), dtype=np.float64))
 
 
-def _covariance(held: Held) -> Array:
+def _covariance(held: ReferenceModel) -> Array:
     """(D, D) of the held values: each by itself, and as much again for what is common to a coefficient's.
 
     A wrong area, inertia or airspeed calibration scales all of a coefficient's derivatives alike.
@@ -155,7 +157,7 @@ def _covariance(held: Held) -> Array:
     return found
 
 
-def whole(held: Held, shift: Array) -> Array:
+def whole(held: ReferenceModel, shift: Array) -> Array:
     """(D,) the values with a ``shift``, and with what the offsets have been found to be."""
     values = np.asarray(held.values + shift)
     for output in set(held.terms.output.tolist()):

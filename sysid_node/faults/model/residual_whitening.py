@@ -24,7 +24,7 @@ GROUPS = ((0, 1, 4), (2, 3, 5))  # longitudinal, lateral coefficients
 
 
 @dataclass
-class Colour:
+class WhiteningFilter:
     """Sums over the past, faded: of residuals (6,), their products by lag (3, 6), those of the innovations (6, 6)."""
 
     keep: float  # share of the sums that a block later is left
@@ -37,12 +37,12 @@ class Colour:
     unmix: Array = field(default_factory=lambda: np.eye(6))  # innovations to uncorrelated ones of variance 1
 
 
-def init(memory: float, period: float) -> Colour:
+def init(memory: float, period: float) -> WhiteningFilter:
     """Nothing known; ``memory`` and ``period`` of the residuals in s."""
-    return Colour(math.exp(-period / memory))
+    return WhiteningFilter(math.exp(-period / memory))
 
 
-def learn(colour: Colour, residual: Array, follows: bool) -> None:
+def learn(colour: WhiteningFilter, residual: Array, follows: bool) -> None:
     """Take in a residual (6,) of sound flight; ``follows``: nothing is missing since the last."""
     if not follows:
         colour.past.clear()
@@ -57,7 +57,7 @@ def learn(colour: Colour, residual: Array, follows: bool) -> None:
     colour.past.append(off)
 
 
-def settle(colour: Colour) -> None:
+def settle(colour: WhiteningFilter) -> None:
     """Make filter and whitening from what has been learned."""
     r0, r1, r2 = colour.products / max(colour.weight, 1.0)
     r0 = r0 * (1.0 + _RIDGE) + _LEAST
@@ -70,6 +70,6 @@ def settle(colour: Colour) -> None:
         colour.unmix[block] = np.linalg.inv(np.linalg.cholesky(covariance[block]))
 
 
-def scale(colour: Colour) -> Array:
+def scale(colour: WhiteningFilter) -> Array:
     """(6,) standard deviation of the innovations."""
     return np.asarray(np.sqrt(np.diag(colour.innovations) / max(colour.weight, 1.0)))

@@ -53,7 +53,7 @@ class Terms:
 def terms(aircraft: Aircraft, layout: Layout) -> Terms:
     """Of the coefficients whose equations can be formed."""
     unformed = regression_signals.unformed(aircraft)
-    known = {c: regressors for c, regressors in aircraft.structure.items() if c not in unformed}
+    known = {c: regressors for c, regressors in aircraft.model_structure.items() if c not in unformed}
     names = [f"{c}_{r}" for c, regressors in known.items() for r in dict.fromkeys((*regressors, "0"))]
     rows = []
     for name in names:

@@ -41,16 +41,16 @@ def other_axes(attitude: Attitude) -> Attitude:
 
 def attitude_of(quaternion: Any) -> Attitude | None:
     """Of a geometry_msgs/Quaternion; None where it is not of unit length, as zeros are that mean nothing."""
-    return unit(Attitude(*(float(getattr(quaternion, axis)) for axis in "wxyz")))
+    return normalised(Attitude(*(float(getattr(quaternion, axis)) for axis in "wxyz")))
 
 
-def unit(attitude: Attitude) -> Attitude | None:
+def normalised(attitude: Attitude) -> Attitude | None:
     """Made one long; None where it is not within 1 % of that."""
     length = math.sqrt(sum(part * part for part in attitude))
     return Attitude(*(part / length for part in attitude)) if abs(length - 1.0) < 0.01 else None
 
 
-def carried(attitude: Attitude, rates: tuple[float, float, float], seconds: float) -> Attitude:
+def propagated(attitude: Attitude, rates: tuple[float, float, float], seconds: float) -> Attitude:
     """The attitude ``seconds`` later, turning at constant body rates (rad/s)."""
     speed = math.sqrt(sum(rate * rate for rate in rates))
     half = 0.5 * speed * seconds
@@ -74,4 +74,4 @@ class LastAttitude:
         seconds = (stamp_ns - self._stamp_ns) / 1e9
         if self._attitude is None or not abs(seconds) <= OLDEST:
             return None
-        return carried(self._attitude, rates, seconds)
+        return propagated(self._attitude, rates, seconds)

@@ -57,7 +57,7 @@ RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class Settings:
+class AdapterSettings:
     """What no message says. Raises InputError on a value outside ``RANGES``."""
 
     joints: str = ""  # which output moves which joint; see ``joints_of``
@@ -83,7 +83,7 @@ class Adapter(ABC):
     package: ClassVar[str]  # of its messages
     remedy: ClassVar[str]  # where to get that package
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: AdapterSettings) -> None:
         self.settings = settings
         self.joints = joints_of(settings.joints, self.outputs, self.example)
         self.attitude = LastAttitude()
@@ -112,7 +112,7 @@ class Adapter(ABC):
         return pressure / (GAS_CONSTANT * kelvin) if pressure > 1000.0 else math.nan
 
 
-def adapter_for(autopilot: str, adapters: Mapping[str, type[Adapter]], settings: Settings) -> Adapter:
+def adapter_for(autopilot: str, adapters: Mapping[str, type[Adapter]], settings: AdapterSettings) -> Adapter:
     """The adapter of an autopilot. Raises InputError where there is none of that name."""
     if autopilot not in adapters:
         raise InputError(f"parameter autopilot = {autopilot!r}: expected one of {', '.join(adapters)}")

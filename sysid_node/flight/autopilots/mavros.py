@@ -9,10 +9,10 @@ from typing import Any
 from sysid_node.flight.autopilots.attitude import attitude_of, other_axes
 from sysid_node.flight.autopilots.base import (
     SEA_LEVEL_DENSITY,
+    AdapterSettings,
     AirSample,
     ImuSample,
     JointSample,
-    Settings,
     header_ns,
     numbered,
 )
@@ -49,7 +49,7 @@ class Mavros(FiveTopics):
     package = "mavros_msgs"
     remedy = "apt install ros-$ROS_DISTRO-mavros-msgs, or build github.com/mavlink/mavros"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: AdapterSettings) -> None:
         super().__init__(settings)
         self._last_imu_ns = 0
 

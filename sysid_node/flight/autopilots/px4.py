@@ -7,8 +7,16 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sysid_node.flight.autopilots.attitude import Attitude, unit
-from sysid_node.flight.autopilots.base import Adapter, AirSample, ImuSample, JointSample, Sample, Settings, numbered
+from sysid_node.flight.autopilots.attitude import Attitude, normalised
+from sysid_node.flight.autopilots.base import (
+    Adapter,
+    AdapterSettings,
+    AirSample,
+    ImuSample,
+    JointSample,
+    Sample,
+    numbered,
+)
 
 IMU = "/fmu/out/sensor_combined"
 ATTITUDE = "/fmu/out/vehicle_attitude"
@@ -36,7 +44,7 @@ class Px4(Adapter):
     package = "px4_msgs"
     remedy = "build github.com/PX4/px4_msgs at your firmware's release, and source that workspace"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: AdapterSettings) -> None:
         super().__init__(settings)
         self._last_motors: dict[str, float] = {}
 
@@ -63,7 +71,7 @@ class Px4(Adapter):
 
     def _attitude(self, message: Any) -> None:
         attitude = Attitude(*(float(part) for part in message.q))
-        self.attitude.heard(1000 * int(message.timestamp_sample), unit(attitude))
+        self.attitude.heard(1000 * int(message.timestamp_sample), normalised(attitude))
 
     def _density(self, message: Any) -> None:
         self.air_density = float(message.rho)

@@ -21,7 +21,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Streams
 
 
-class Logged(NamedTuple):
+class LoggedSample(NamedTuple):
     """A sample, and when the message that gave it was recorded."""
 
     order: int
@@ -45,7 +45,7 @@ def read_recorded(path: str | Path, adapter: Adapter) -> Streams:
         raise InputError(f"{said}: cannot be read: {words}; give a rosbag2 folder, .mcap or .db3 file") from error
 
 
-def _read(path: Path, adapter: Adapter, said: str) -> list[Logged]:
+def _read(path: Path, adapter: Adapter, said: str) -> list[LoggedSample]:
     with Reader(path) as reader:
         chosen = [connection for connection in reader.connections if connection.topic in adapter.topics]
         if not chosen:
@@ -71,15 +71,17 @@ def _types(connections: list[Connection], adapter: Adapter, said: str) -> Typest
     return store
 
 
-def _samples(reader: Reader, connections: list[Connection], store: Typestore, adapter: Adapter) -> Iterator[Logged]:
+def _samples(
+    reader: Reader, connections: list[Connection], store: Typestore, adapter: Adapter
+) -> Iterator[LoggedSample]:
     for order, (connection, log_ns, data) in enumerate(reader.messages(connections)):
         message: Any = store.deserialize_cdr(data, connection.msgtype)
         sample = adapter.hear(connection.topic, message)
         if sample is not None:
-            yield Logged(order, log_ns, sample)
+            yield LoggedSample(order, log_ns, sample)
 
 
-def streams_of_samples(logged: list[Logged], name: str) -> Streams:
+def streams_of_samples(logged: list[LoggedSample], name: str) -> Streams:
     """The samples by kind, one array each. Raises InputError where there is none of a kind."""
     imu = [(one, one.sample) for one in logged if isinstance(one.sample, ImuSample)]
     air = [(one, one.sample) for one in logged if isinstance(one.sample, AirSample)]
@@ -96,7 +98,7 @@ def streams_of_samples(logged: list[Logged], name: str) -> Streams:
     )
 
 
-def _arrival(logged: list[Logged]) -> Arrival:
+def _arrival(logged: list[LoggedSample]) -> Arrival:
     stamps, logs, orders = (
         [one.sample.stamp_ns for one in logged],
         [one.log_ns for one in logged],

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.flight.align import Alignment, Rejected, Screened, align, buffer_ns
+from sysid_node.flight.align import Alignment, Rejected, ScreenedMessages, align, buffer_ns
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.online.alignment.streaming import (
@@ -62,7 +62,7 @@ def _is_regular(bulk: Alignment, streams: Streams, max_gap: float) -> bool:
     return bool(in_time.all())
 
 
-def _order_after(topic: Screened, stamps: Stamps) -> Stamps:
+def _order_after(topic: ScreenedMessages, stamps: Stamps) -> Stamps:
     """When the first message stamped later than each of ``stamps`` came; far in the future where none did."""
     after = np.searchsorted(topic.stamps, stamps, side="right")
     return np.append(topic.order, np.iinfo(np.int64).max)[after]

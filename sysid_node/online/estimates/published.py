@@ -72,7 +72,7 @@ def _named(state: State, time: float, numbers: Array, codes: Codes, fits: Array)
 
 def _nothing_known(state: State) -> dict[str, DerivativeEstimate]:
     """All derivatives before there is anything to solve."""
-    every = (f"{c}_{r}" for c, regressors in state.model.aircraft.structure.items() for r in regressors)
+    every = (f"{c}_{r}" for c, regressors in state.model.aircraft.model_structure.items() for r in regressors)
     return {name: _unknown(state, name) for name in every}
 
 

@@ -72,7 +72,7 @@ def _against(state: State, renewed: Renewed) -> Codes:
     if not state.thrust_known:
         against[table.needs_thrust] = status.THRUST
     if state.flow.active:
-        structure, at = state.model.aircraft.structure, state.piece_start
+        structure, at = state.model.aircraft.model_structure, state.piece_start
         for i, name in enumerate(table.names):
             flaw = flow_angle_filter.flaw(state.flow, at, name, structure[name.partition("_")[0]])
             against[i] = words.code(flaw) if flaw else against[i]

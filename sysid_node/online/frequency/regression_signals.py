@@ -87,7 +87,7 @@ class Layout:
 
 def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> Layout:
     """The union of the regressors in the aircraft's model, each once, in the order of the file but controls last."""
-    wanted = dict.fromkeys(r for regressors in aircraft.structure.values() for r in regressors if r != "0")
+    wanted = dict.fromkeys(r for regressors in aircraft.model_structure.values() for r in regressors if r != "0")
     timed = tuple(r for r in wanted if r in aircraft.control_symbols)
     states = tuple(r for r in wanted if r not in timed)
     return Layout(states + timed, timed, tuple(r for r in states if r in instrumented))

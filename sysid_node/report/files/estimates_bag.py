@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sysid_node.faults.recorded_flight import Said
+from sysid_node.faults.recorded_flight import FaultReport
 from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.writer import add_topic, new_bag
 from sysid_node.flight.streams import Stamps
@@ -23,7 +23,7 @@ def write_estimates(
     aircraft: str,
     method: str,
     frame_id: str,
-    faults: Sequence[Said] = (),
+    faults: Sequence[FaultReport] = (),
 ) -> None:
     """DerivativeEstimates on /identifier/derivatives, each stamped and logged at the sample that it includes last.
 

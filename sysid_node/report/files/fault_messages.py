@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysid_node.faults.recorded_flight import Said
+from sysid_node.faults.recorded_flight import FaultReport
 from sysid_node.faults.types import Fault
 from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.cdr.template import Templates, Values
@@ -13,7 +13,7 @@ FAULTS, FAULTS_TYPE = "/fault_monitor/faults", "diagnostic_msgs/msg/DiagnosticAr
 ERROR = 2  # diagnostic_msgs/DiagnosticStatus
 
 
-def fault_messages(said: Sequence[Said], aircraft: str) -> Iterator[tuple[int, bytes]]:
+def fault_messages(said: Sequence[FaultReport], aircraft: str) -> Iterator[tuple[int, bytes]]:
     """Each with the time (ns) at which it is logged: the header stamp of the sample that it includes last."""
     templates = Templates(definitions_of(type_store()))
     for moment in said:

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from sysid_node.faults.recorded_flight import Episode, Verdict
+from sysid_node.faults.recorded_flight import Episode, FaultVerdict
 from sysid_node.faults.types import Change, Fault
 
 
-def as_summary(verdict: Verdict | None) -> dict[str, Any] | None:
+def as_summary(verdict: FaultVerdict | None) -> dict[str, Any] | None:
     """``{judged_seconds, found: [{kind, part, size, ..., until}, ...]}``; null where nothing was judged."""
     if verdict is None:
         return None
@@ -19,11 +19,11 @@ def as_summary(verdict: Verdict | None) -> dict[str, Any] | None:
     return {"judged_seconds": verdict.judged, "found": found}
 
 
-def from_summary(found: Mapping[str, Any] | None) -> Verdict | None:
+def from_summary(found: Mapping[str, Any] | None) -> FaultVerdict | None:
     """The way back; what was said from moment to moment is in the bag."""
     if not found:
         return None
-    return Verdict(found["judged_seconds"], episodes=[_episode(row) for row in found["found"]])
+    return FaultVerdict(found["judged_seconds"], episodes=[_episode(row) for row in found["found"]])
 
 
 def _row(fault: Fault) -> dict[str, Any]:

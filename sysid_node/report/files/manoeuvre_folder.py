@@ -12,7 +12,7 @@ import numpy as np
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.flight.logs import streams_of
+from sysid_node.flight.logs import streams_from_record
 from sysid_node.report.files.bag_folder import remove_earlier_bag
 from sysid_node.report.pages.manoeuvre_page import write_manoeuvre_report
 from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
@@ -34,7 +34,7 @@ def write_manoeuvre(folder: Path, result: ManoeuvreResult) -> None:
         write_manoeuvre_report(folder / "report.html", result)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error}; give another folder as --out") from error
-    write_streams(folder / FLIGHT_BAG, streams_of(result.prediction.flight, result.aircraft))
+    write_streams(folder / FLIGHT_BAG, streams_from_record(result.prediction.flight, result.aircraft))
 
 
 def summary(result: ManoeuvreResult) -> dict[str, Any]:

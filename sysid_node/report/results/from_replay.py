@@ -13,7 +13,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
-from sysid_node.faults.recorded_flight import Verdict
+from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.frequency.regression_signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.settings import Settings
@@ -56,7 +56,7 @@ def replay_result(
     truth: Mapping[str, float] | None = None,
     truth_since: Mapping[str, float] | None = None,
     title: str = "",
-    faults: Verdict | None = None,
+    faults: FaultVerdict | None = None,
     remarks: Sequence[str] = (),
 ) -> RunResult:
     """All that a report needs, from the aligned ``time`` (N,) s, ``samples`` (N, M) and the estimates over time.
@@ -94,7 +94,7 @@ def _change_remark(noticed: Sequence[float]) -> list[str]:
     return [f"An abrupt change was noticed at {when}: estimates and spectra rest on what was flown since."]
 
 
-def _fault_remarks(faults: Verdict | None) -> list[str]:
+def _fault_remarks(faults: FaultVerdict | None) -> list[str]:
     """One remark for each fault."""
     return [f"Something seems to have failed: {one.text}." for one in faults.episodes] if faults else []
 
@@ -131,7 +131,7 @@ def _motion(aircraft: Aircraft, time: Array, samples: Array, history: Sequence[E
 def _modelled(aircraft: Aircraft, regressors: Mapping[str, Array], final: Estimates) -> dict[str, Array]:
     """Each coefficient (N,) from the final estimates; left out where one of its derivatives is unknown."""
     modelled = {}
-    for coefficient, names in aircraft.structure.items():
+    for coefficient, names in aircraft.model_structure.items():
         values = [final.derivatives[f"{coefficient}_{r}"].value for r in names]
         if np.isfinite(values).all():
             pairs = zip(values, names, strict=True)

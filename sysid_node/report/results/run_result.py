@@ -13,7 +13,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.faults.recorded_flight import Verdict
+from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.types import Estimates
 
@@ -95,7 +95,7 @@ class RunResult:
     response_note: str = ""  # a sentence: how the responses were made, e.g. averaged
     rejected: Mapping[str, int] = field(default_factory=dict)  # "<topic>: <reason>" -> messages left out
     holdout: Holdout = field(default_factory=dict)
-    faults: Verdict | None = None  # None: nothing was judged
+    faults: FaultVerdict | None = None  # None: nothing was judged
     remarks: Sequence[str] = ()  # sentences: convergence, parameters that cannot be told apart, warnings
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.faults.hypotheses import servo_check
-from sysid_node.faults.settings import Settings
+from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import HARD_OVER, NOT_FOLLOWING, STUCK, Fault
 
 AIRCRAFT = load_aircraft("cdrw")
@@ -20,7 +20,7 @@ def commanded(time: float) -> list[float]:
 
 def flown(seconds: float, place: float | None = None, echoed: bool = False, drift: float = 0.0) -> list[Fault]:
     """What is found when the elevator, from 2 s on, stands at ``place`` (moving by ``drift`` rad/s) or follows."""
-    state = servo_check.init(AIRCRAFT, Settings())
+    state = servo_check.init(AIRCRAFT, FaultMonitorSettings())
     lagged, found = commanded(0.0), []
     for k in range(round(seconds / STEP)):
         now = k * STEP
@@ -58,7 +58,7 @@ def test_a_surface_that_moves_but_not_where_it_should() -> None:
 
 def test_commands_that_come_late_are_waited_for() -> None:
     """A busy machine hands over positions in bursts, and their commands after them."""
-    state = servo_check.init(AIRCRAFT, Settings())
+    state = servo_check.init(AIRCRAFT, FaultMonitorSettings())
     told, lagged, found = 0, commanded(0.0), []
     for k in range(1000):
         if k % 100 == 0:
@@ -72,7 +72,7 @@ def test_commands_that_come_late_are_waited_for() -> None:
 
 
 def test_old_commands_do_not_count() -> None:
-    state = servo_check.init(AIRCRAFT, Settings())
+    state = servo_check.init(AIRCRAFT, FaultMonitorSettings())
     servo_check.command(state, 0.0, [0.3, 0.0, 0.0])
     for k in range(1000):
         found = servo_check.position(state, 2.0 + k * STEP, [0.0, 0.0, 0.0])

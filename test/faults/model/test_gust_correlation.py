@@ -7,16 +7,16 @@ from scipy.stats import chi2
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.hypotheses.bayes_factors import Shift, Shifts, marginal, score_squares
-from sysid_node.faults.hypotheses.weighing import doubted, stretch
+from sysid_node.faults.hypotheses.weighing import allowing_for_gusts, last_interval
 from sysid_node.faults.model import gust_correlation
 from sysid_node.faults.model.gust_correlation import ALIKE, BY_CHANCE, CORRELATION
-from sysid_node.faults.state import State
+from sysid_node.faults.state import MonitorState
 
 BLOCKS = 500.0
 RARE = float(chi2.ppf(0.999, 3))  # sum of three squares
 
 
-def taught(seed: int = 1) -> tuple[State, np.ndarray, np.ndarray]:
+def taught(seed: int = 1) -> tuple[MonitorState, np.ndarray, np.ndarray]:
     """A monitor that has learned Cm's slopes, which ones, and what a block said of all terms, in the mean."""
     state, _ = monitored(seed)
     held = state.held
@@ -32,23 +32,23 @@ def taught(seed: int = 1) -> tuple[State, np.ndarray, np.ndarray]:
 def test_a_stretch_that_is_moved_alike_is_shifted_alike() -> None:
     state, _, said = taught()
     for times in (0.01, 1.0, 0.99 * ALIKE):
-        np.testing.assert_allclose(gust_correlation.doubt(state.held, times * said), 0.0, atol=1e-12)
+        np.testing.assert_allclose(gust_correlation.gust_covariance(state.held, times * said), 0.0, atol=1e-12)
 
 
 def test_the_shift_is_the_correlation_s_however_long_was_learned() -> None:
     """With e = rho y for a y that the regressors explain, least squares are off by rho standard errors of one block."""
     state, slopes, said = taught()
-    allowed = gust_correlation.doubt(state.held, 1e6 * said)[np.ix_(slopes, slopes)]
+    allowed = gust_correlation.gust_covariance(state.held, 1e6 * said)[np.ix_(slopes, slopes)]
     block = np.linalg.inv(said[np.ix_(slopes, slopes)])
     np.testing.assert_allclose(allowed, CORRELATION**2 * block, rtol=1e-4)
     state.held.J, state.held.blocks = 10.0 * state.held.J, 10.0 * state.held.blocks
-    doubt = gust_correlation.doubt(state.held, 1e6 * said)[np.ix_(slopes, slopes)]
+    doubt = gust_correlation.gust_covariance(state.held, 1e6 * said)[np.ix_(slopes, slopes)]
     np.testing.assert_allclose(doubt, allowed, rtol=1e-9)
 
 
 def test_the_shift_leaves_the_mean_as_it_is() -> None:
     state, slopes, said = taught()
-    allowed = gust_correlation.doubt(state.held, 1e3 * said)
+    allowed = gust_correlation.gust_covariance(state.held, 1e3 * said)
     mean = np.zeros(len(allowed))
     mean[slopes] = state.held.regressors[slopes]
     mean[state.terms.offset_of(COEFFICIENTS.index("Cm"))] = 1.0
@@ -58,7 +58,7 @@ def test_the_shift_leaves_the_mean_as_it_is() -> None:
 
 def test_what_was_never_learned_is_not_doubted() -> None:
     state, _ = monitored(2)
-    assert not gust_correlation.doubt(state.held, np.eye(len(state.terms.names))).any()
+    assert not gust_correlation.gust_covariance(state.held, np.eye(len(state.terms.names))).any()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -72,12 +72,12 @@ def test_a_burst_against_what_gusts_have_taught_proves_nothing(seed: int) -> Non
     root = np.linalg.cholesky(np.linalg.inv(said)[np.ix_(slopes, slopes)])
     off = np.zeros(len(said))
     off[slopes] = 0.8 * root @ (np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0))
-    over = stretch(state, 10)
+    over = last_interval(state, 10)
     for times, excused in ((1.0, False), (30.0, True)):
         J = 100.0 * times * said  # of many blocks, so that only what is believed leaves anything open
         burst = over._replace(whole=(J, J @ off))
         before = marginal(*burst.whole, over.belief.precision)
-        after = doubted(state, burst._replace(pieces=100 * over.pieces[:1]))
+        after = allowing_for_gusts(state, burst._replace(pieces=100 * over.pieces[:1]))
         surprise = [float(v @ np.linalg.pinv(J) @ v) for J, v in (before, (after.J, after.v))]
         assert surprise[0] > RARE
         assert surprise[1] < RARE if excused else surprise[1] == pytest.approx(surprise[0]), surprise
@@ -94,7 +94,7 @@ def test_what_gusts_in_a_row_do_to_many_directions() -> None:
         y = BY_CHANCE * X.sum(axis=1) + random.standard_normal(blocks)
         squares.append(score_squares(X.T @ X, X.T @ y, shifts)[1])
     whole = np.array([False, True])
-    allowed = gust_correlation.surprise(whole, np.array([0.5, 0.5]), blocks)
+    allowed = gust_correlation.usual_size_in_gusts(whole, np.array([0.5, 0.5]), blocks)
     assert allowed[0] == 1.0  # a single direction: no more than chance makes
     assert allowed[1] == pytest.approx(np.mean(squares), rel=0.05)
-    np.testing.assert_array_equal(gust_correlation.surprise(whole, np.array([3.0, 4.0]), blocks), [3.0, 4.0])
+    np.testing.assert_array_equal(gust_correlation.usual_size_in_gusts(whole, np.array([3.0, 4.0]), blocks), [3.0, 4.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sysid_node.flight.autopilots.attitude import Attitude, LastAttitude, carried, other_axes, unit
+from sysid_node.flight.autopilots.attitude import Attitude, LastAttitude, normalised, other_axes, propagated
 from sysid_node.flight.frames import euler_from_quaternion
 
 
@@ -26,15 +26,15 @@ def test_carried_by_body_rates(seconds: float) -> None:
     rates = (0.7, -1.1, 2.0)
     for w, x, y, z in random_attitudes(5):
         expected = (Rotation.from_quat([x, y, z, w]) * Rotation.from_rotvec(np.multiply(rates, seconds))).as_matrix()
-        got = np.roll(carried(Attitude(w, x, y, z), rates, seconds), -1)
+        got = np.roll(propagated(Attitude(w, x, y, z), rates, seconds), -1)
         np.testing.assert_allclose(Rotation.from_quat(got).as_matrix(), expected, atol=1e-12)
-    assert carried(Attitude(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), seconds) == (1.0, 0.0, 0.0, 0.0)
+    assert propagated(Attitude(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), seconds) == (1.0, 0.0, 0.0, 0.0)
 
 
 def test_what_is_no_attitude_is_none() -> None:
-    assert unit(Attitude(0.0, 0.0, 0.0, 0.0)) is None
-    assert unit(Attitude(float("nan"), 0.0, 0.0, 0.0)) is None
-    assert unit(Attitude(1.005, 0.0, 0.0, 0.0)) == (1.0, 0.0, 0.0, 0.0)
+    assert normalised(Attitude(0.0, 0.0, 0.0, 0.0)) is None
+    assert normalised(Attitude(float("nan"), 0.0, 0.0, 0.0)) is None
+    assert normalised(Attitude(1.005, 0.0, 0.0, 0.0)) == (1.0, 0.0, 0.0, 0.0)
     last = LastAttitude()
     assert last.at(0, (0.0, 0.0, 0.0)) is None
     last.heard(0, Attitude(1.0, 0.0, 0.0, 0.0))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from sysid_node.errors import InputError
-from sysid_node.flight.autopilots.base import Settings, adapter_for
+from sysid_node.flight.autopilots.base import AdapterSettings, adapter_for
 from sysid_node.flight.autopilots.joints import Joint, joints_of
 from sysid_node.flight.autopilots.known import ADAPTERS
 
@@ -43,7 +43,7 @@ def test_what_is_wrong_is_said_in_a_line(text: str, words: str) -> None:
 
 @pytest.mark.parametrize("autopilot", ADAPTERS)
 def test_every_example_is_one(autopilot: str) -> None:
-    adapter = adapter_for(autopilot, ADAPTERS, Settings(joints=ADAPTERS[autopilot].example))
+    adapter = adapter_for(autopilot, ADAPTERS, AdapterSettings(joints=ADAPTERS[autopilot].example))
     assert {joint.name for joint in adapter.joints} == {"aileron", "elevator", "rudder", "throttle"}
 
 
@@ -53,9 +53,9 @@ def test_the_page_shows_maps_that_are_accepted() -> None:
     assert len(shown) == 3
     for text in shown:
         autopilot = "px4" if "servo" in text else "mavros"
-        assert adapter_for(autopilot, ADAPTERS, Settings(joints=text.removesuffix(" ..."))).joints
+        assert adapter_for(autopilot, ADAPTERS, AdapterSettings(joints=text.removesuffix(" ..."))).joints
 
 
 def test_an_unknown_autopilot_is_named() -> None:
     with pytest.raises(InputError, match="'paparazzi': expected one of px4, mavros, rosflight"):
-        adapter_for("paparazzi", ADAPTERS, Settings())
+        adapter_for("paparazzi", ADAPTERS, AdapterSettings())

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sysid_node.flight.autopilots.base import Settings
+from sysid_node.flight.autopilots.base import AdapterSettings
 from sysid_node.flight.autopilots.mavros import AIRSPEED, ATTITUDE, IMU, OUTPUTS, PRESSURE, Mavros
 from sysid_node.flight.frames import quaternion_from_euler
 
@@ -14,7 +14,7 @@ JOINTS = "elevator=out2:1500:0.001 throttle=out3:1000:0.001 rudder=out4:1500:-0.
 
 
 def adapter(**settings) -> Mavros:
-    return Mavros(Settings(joints=JOINTS, **settings))
+    return Mavros(AdapterSettings(joints=JOINTS, **settings))
 
 
 def imu(make, stamp: int = STAMP, euler=(0.0, 0.0, 0.0)):

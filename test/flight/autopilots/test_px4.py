@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg
 
-from sysid_node.flight.autopilots.base import Settings
+from sysid_node.flight.autopilots.base import AdapterSettings
 from sysid_node.flight.autopilots.px4 import AIR, AIRSPEED, ATTITUDE, IMU, MOTORS, SERVOS, Px4
 from sysid_node.flight.frames import quaternion_from_euler
 
@@ -16,7 +16,7 @@ FORCE, RATES = np.array([0.5, -0.25, -9.75], np.float32), np.array([0.5, 0.25, -
 
 @pytest.fixture
 def px4() -> Px4:
-    return Px4(Settings(joints=JOINTS, air_data_delay=0.02))
+    return Px4(AdapterSettings(joints=JOINTS, air_data_delay=0.02))
 
 
 def imu(make, stamp_us: int = 5_000_000, relative: int = 0):

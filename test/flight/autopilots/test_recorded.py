@@ -10,9 +10,9 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.api import load, replay
 from sysid_node.cli.main import main
 from sysid_node.errors import InputError
-from sysid_node.flight.autopilots.base import AirSample, ImuSample, Settings
+from sysid_node.flight.autopilots.base import AdapterSettings, AirSample, ImuSample
 from sysid_node.flight.autopilots.px4 import AIRSPEED, IMU, MOTORS, SERVOS, Px4
-from sysid_node.flight.autopilots.recorded import Logged, read_recorded, streams_of_samples
+from sysid_node.flight.autopilots.recorded import LoggedSample, read_recorded, streams_of_samples
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.online.settings import Settings as Estimator
@@ -71,14 +71,14 @@ def messages(make) -> list:
 
 
 @pytest.fixture(scope="module")
-def said(messages) -> list[Logged]:
+def said(messages) -> list[LoggedSample]:
     """What the adapter makes of them."""
-    adapter = Px4(Settings(joints=JOINTS))
+    adapter = Px4(AdapterSettings(joints=JOINTS))
     heard = [(order, log_ns, adapter.hear(topic, message)) for order, (log_ns, topic, message) in enumerate(messages)]
-    return [Logged(order, log_ns, sample) for order, log_ns, sample in heard if sample is not None]
+    return [LoggedSample(order, log_ns, sample) for order, log_ns, sample in heard if sample is not None]
 
 
-def estimated(logged: list[Logged]) -> list:
+def estimated(logged: list[LoggedSample]) -> list:
     """The estimates at 5 Hz that the identifier makes of samples as they come."""
     session = Session(load_aircraft("cdrw"), Estimator(), 5.0)
     estimates = []
@@ -93,7 +93,7 @@ def estimated(logged: list[Logged]) -> list:
     return [due.estimates for due in estimates]
 
 
-def with_vanes(logged: list[Logged]) -> list[Logged]:
+def with_vanes(logged: list[LoggedSample]) -> list[LoggedSample]:
     """Flow angles from vanes that the autopilot knows nothing of: here those of the bundled flight."""
     flow = iter(read_streams(BAG).air_data.values[:, 1:3].tolist())
     angles = ("angle_of_attack", "sideslip")
@@ -133,7 +133,7 @@ def test_a_bag_of_the_autopilots_own_topics_converts_to_the_same(messages, said,
 
 
 def test_what_is_wrong_is_said_in_a_line(messages, store, tmp_path, capsys) -> None:
-    adapter = Px4(Settings(joints=JOINTS))
+    adapter = Px4(AdapterSettings(joints=JOINTS))
     imu_alone = write(tmp_path / "imu", store, [m for m in messages[:200] if m[1] == IMU])
     for bag, words in (
         (BAG, "none of the autopilot's topics in it; expected /fmu/out/sensor_combined"),

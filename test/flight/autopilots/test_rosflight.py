@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sysid_node.flight.autopilots.base import Settings
+from sysid_node.flight.autopilots.base import AdapterSettings
 from sysid_node.flight.autopilots.rosflight import AIRSPEED, ATTITUDE, IMU, OUTPUTS, PRESSURE, Rosflight
 from sysid_node.flight.frames import quaternion_from_euler
 
@@ -14,7 +14,7 @@ STAMP = 1_700_000_000_250_000_000
 
 @pytest.fixture
 def rosflight() -> Rosflight:
-    return Rosflight(Settings(joints="elevator=out2:0:0.35 throttle=out5:0:1"))
+    return Rosflight(AdapterSettings(joints="elevator=out2:0:0.35 throttle=out5:0:1"))
 
 
 def test_axes_stay_and_the_stamped_attitude_is_taken(rosflight, make) -> None:

@@ -14,7 +14,7 @@ from sysid_node.online.settings import Settings
 from sysid_node.online.whole_record import run
 
 AIRCRAFT = made_aircraft()
-PLAN = least_squares.plan(AIRCRAFT.structure, regression_signals.layout(AIRCRAFT))
+PLAN = least_squares.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
 
 
 def test_beliefs_are_the_file_s() -> None:
