@@ -4,14 +4,12 @@ import json
 import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from gap_flights import fly
 
 from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.verdict.localisation import _regime
 from sysid_node.report.pages.gap_page import write_gap_report
 from sysid_node.report.sections.gap.panels import candidates
 
@@ -85,12 +83,3 @@ def test_a_held_out_flight_must_be_another(aircraft, plain) -> None:
 def test_a_flight_in_which_nothing_moves_is_said(aircraft) -> None:
     with pytest.raises(InputError, match="moves"):
         diagnose(aircraft, [fly(aircraft, {}, seed=8, manoeuvre=[])], [])
-
-
-def test_a_gap_lies_where_the_signal_departs_that_goes_with_it(plain_model) -> None:
-    """Truth: power in proportion to how far the aileron, and nothing else as closely, departs in each window."""
-    aileron = plain_model.record["da"]
-    away = np.array([np.abs(aileron[w] - aileron.mean()).max() for w in plain_model.windows.slices])
-    ((name, (low, high)),) = _regime(plain_model, away**2).items()
-    piece = aileron[plain_model.windows.slices[int(away.argmax())]]
-    assert (name, low, high) == ("da", piece.min(), piece.max())

@@ -1,11 +1,14 @@
-"""What flight not fitted says of an explanation."""
+"""Validation of an explanation on flight that was not fitted: flights held out, or parts of the same flights.
+
+``validation.standing`` decides from the errors there what of the explanation stands.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -19,16 +22,20 @@ from sysid_node.gap.validation import spectral_error
 from sysid_node.gap.validation.kfold import kfold_evidence
 from sysid_node.gap.validation.simulation_error import simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
+from sysid_node.gap.validation.standing import causes_stand, file_derivatives_suit_causes, file_predicts_better
+
+#: The validation of one explanation. Raises numpy.linalg.LinAlgError where its predictions are not finite.
+Validator = Callable[[Attribution], "Check"]
 
 
 @dataclass(frozen=True)
 class Check:
-    """Evidence of the derivatives alone and of the whole explanation, and the gap, on the same flights."""
+    """Evidence of the derivatives alone and of the whole explanation, and the gap, on flight not fitted."""
 
     base: Evidence
     final: Evidence
     gap: Gap  # of forces, moments and kinematics by frequency
-    weather_suffices: bool = False  # whether weather and sensors' noise are all of it
+    weather_suffices: bool = False  # whether weather and the sensors' noise account for the whole gap
 
     @property
     def models(self) -> tuple[ResidualModel, ...]:
@@ -37,23 +44,23 @@ class Check:
 
     @cached_property
     def simulation_gap(self) -> Gap | None:
-        """The gap of short flights."""
+        """The gap of short simulated flights; none where none can be simulated."""
         return simulation_gap(self.base, self.final)
 
     @property
     def gaps(self) -> list[Gap]:
-        """By either measure."""
+        """The gap by each measure: by frequency, then of short simulated flights where there are any."""
         return [self.gap, *([self.simulation_gap] if self.simulation_gap else [])]
 
     def as_in_file(self, left: OveridentificationTest) -> Check:
-        """The same of the aircraft file as it is."""
+        """The validation of the aircraft file as it is, on the same flights."""
         filed = (FlightEvidence.throughout(model, model.simulator.neutral()) for model in self.models)
         base = replace(self.base, flights=tuple(filed))
         return replace(self, base=base, final=base, gap=spectral_error.gap_of(base, base, left))
 
 
 def check(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> Check:
-    """On flights held out; without these, on parts of the flights fitted, each by a fit to the others."""
+    """The validation of an explanation on flights held out; without these, by k-fold on the flights fitted."""
     if held_out:
         fits = liml_estimate(attribution.base.fit), attribution.corrected
         base, final = (held_out_evidence(fit, held_out) for fit in fits)
@@ -68,49 +75,47 @@ def check(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> Check:
 def validate(
     attribution: Attribution, models: Sequence[ResidualModel], held_out: Sequence[HeldOutFlight]
 ) -> tuple[Attribution, Check]:
-    """What flight not fitted leaves of an explanation.
+    """What of an explanation stands on flight not fitted, and its validation there.
 
-    Nothing is blamed where weather and noise are all of the gap, nor what by neither measure predicts flight better
-    than the derivatives within their tolerances, or by one of them no better than the file; and derivatives that do
-    worse than the file leave the file as it is. (In gusts derivatives that these have biased seem the better by
-    frequency.)
+    No cause stands where weather and the sensors' noise account for the whole gap. Without causes the file's own
+    derivatives are kept where the fitted ones predict worse. ``models`` are the flights that were fitted.
     """
+    validator = partial(check, held_out=held_out)
     with ThreadPoolExecutor(1) as pool:
         weather = pool.submit(weather_suffices, [*models, *(flight.model for flight in held_out)])
-        attribution, checked = _standing(attribution, held_out)
+        attribution, checked = standing_explanation(attribution, validator)
     if weather.result():
         attribution = attribution.without_causes().as_in_file()
-        return attribution, replace(
-            check(attribution, held_out).as_in_file(attribution.structure_left), weather_suffices=True
-        )
-    if not attribution.causes and any(g.tolerances > g.before for g in checked.gaps):
+        of_file = validator(attribution).as_in_file(attribution.structure_left)
+        return attribution, replace(of_file, weather_suffices=True)
+    if not attribution.causes and file_predicts_better(checked.gaps):
         attribution = attribution.as_in_file()
         checked = checked.as_in_file(attribution.structure_left)
     return attribution, checked
 
 
-def _standing(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> tuple[Attribution, Check]:
-    """What of an explanation stands, and what flight not fitted says of it.
+def standing_explanation(attribution: Attribution, validator: Validator) -> tuple[Attribution, Check]:
+    """The first explanation that stands, and its validation.
 
-    The first that predicts better: all causes; the same with sizes as least squares has them; without the least
-    probable one; none. Each is also held beside the file's own derivatives, and passed over where its predictions of
-    flight not fitted are no numbers.
+    In this order: all causes; the same with the sizes of least squares; without the least probable cause; no cause.
+    Each is also tried with the file's own derivatives, where these predict better than the fitted ones. An explanation
+    whose predictions are not finite is passed over.
     """
     for explanation in _explanations(attribution):
         try:
-            found = explanation, check(explanation, held_out)
+            found = explanation, validator(explanation)
         except np.linalg.LinAlgError:
             continue
-        if any(g.tolerances > g.before for g in found[1].gaps):
-            found = _beside_the_file(*found, held_out)
-        if _better(found[1]):
+        if file_predicts_better(found[1].gaps):
+            found = _with_better_derivatives(*found, validator)
+        if causes_stand(found[1].gaps):
             return found
     bare = attribution.without_causes()
-    return bare, check(bare, held_out)
+    return bare, validator(bare)
 
 
 def _explanations(attribution: Attribution) -> Iterator[Attribution]:
-    """An explanation, then what could stand in its stead."""
+    """An explanation, then those that may stand in its place."""
     if attribution.causes:
         yield attribution
         if attribution.corrected is not attribution.chosen.fit:
@@ -119,21 +124,16 @@ def _explanations(attribution: Attribution) -> Iterator[Attribution]:
         yield attribution.without_least_probable()
 
 
-def _better(checked: Check) -> bool:
-    """Whether causes predict better than the derivatives by one of the measures, and than the file by both."""
-    return any(g.after < g.tolerances for g in checked.gaps) and all(g.after < g.before for g in checked.gaps)
-
-
-def _beside_the_file(
-    attribution: Attribution, checked: Check, held_out: Sequence[HeldOutFlight]
+def _with_better_derivatives(
+    attribution: Attribution, checked: Check, validator: Validator
 ) -> tuple[Attribution, Check]:
-    """The causes beside the file's own derivatives, where these do better than the derivatives that were fitted."""
+    """The causes with the file's own derivatives, where these predict better than with the fitted ones."""
     explanation = attribution.with_file_derivatives()
     try:
-        found = check(explanation, held_out)
+        found = validator(explanation)
     except np.linalg.LinAlgError:
         return attribution, checked
-    if not found.gaps[-1].after < checked.gaps[-1].after:
+    if not file_derivatives_suit_causes(found.gaps, checked.gaps):
         return attribution, checked
     filed = found.as_in_file(attribution.structure_left)
     gap = spectral_error.gap_of(filed.base, found.final, attribution.structure_left)

@@ -1,9 +1,8 @@
-"""Parts of flights, each by a simulator that was fitted to the others: the check where no flight was held out.
+"""k-fold validation: groups of windows, each predicted by a fit to the others, where no flight was held out.
 
-A part may hold the only manoeuvre of its kind. What the others then say little of stays near the aircraft file, and
-within its limits: unknowns that would go beyond are put there and the others are solved for anew, for cut off one by
-one they would no longer agree with what the others' windows show (an angle of attack's lift that another term had made
-up for).
+A group may hold the only manoeuvre of its kind. Unknowns of which the others say little then stay near the aircraft
+file, within their limits. The limits enter as bounds of the least-squares problem: cut off one by one, the unknowns
+would no longer agree with what the other windows show.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ from sysid_node.gap.instruments.moment_equations import prior_terms
 
 
 def kfold_evidence(evidence: Evidence, fit: CandidateFit, *, filed: bool = False) -> Evidence:
-    """Evidence with the residuals and parameters of each part as the others have it, about a fit that is ``unbiased``.
+    """The evidence with each group's residuals and parameters by the other groups, from a fit of ``liml_estimate``.
 
-    ``filed``: nuisances stay where they are. The scores stay: they compare explanations of the same flights.
+    ``filed`` holds the nuisances where they are. The scores stay: they compare explanations of the same flights.
     """
     flights = []
-    for number, (flight, steps) in enumerate(zip(fit.flights, _steps(fit, filed=filed), strict=True)):
+    for number, (flight, steps) in enumerate(zip(fit.flights, steps_without_groups(fit, filed=filed), strict=True)):
         residual = amplitudes(flight.rows, flight.weights)
         for group, step in zip(window_groups(flight.model), steps, strict=True):
             residual[group] = amplitudes(flight.rows[group] - flight.slopes[group] @ step, flight.weights)
@@ -43,8 +42,8 @@ def kfold_evidence(evidence: Evidence, fit: CandidateFit, *, filed: bool = False
     return replace(evidence, flights=tuple(flights))
 
 
-def _steps(fit: CandidateFit, *, filed: bool) -> Iterator[list[Array]]:
-    """By flight: the steps (unknowns,) that the unknowns take without each group of windows and its neighbours."""
+def steps_without_groups(fit: CandidateFit, *, filed: bool = False) -> Iterator[list[Array]]:
+    """By flight: the steps (unknowns,) from the fit to that without each group of windows and its neighbours."""
     known, _ = moment_weights(fit)
     precision, far = prior_terms(fit)
     pairs = list(zip(known, fit.flights, strict=True))

@@ -23,6 +23,7 @@ from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.validation.multiple_shooting import Course, course_of, simulate_beside, simulation_error
 from sysid_node.gap.validation.noise_floor import noise_floor_errors
 from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
+from sysid_node.gap.validation.standing import weather_accounts_for
 from sysid_node.sim.model.layout import OUTPUTS
 
 #: Length of a short flight, s: a short period or two of a small aircraft, over before drift counts.
@@ -82,7 +83,7 @@ def weather_suffices(models: Sequence[ResidualModel]) -> bool:
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
     _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
-    return bool((before <= THRESHOLDS.validation.chance**2 * np.mean(floors, axis=0)).all())
+    return weather_accounts_for(before, np.array(floors))
 
 
 def can_be_simulated(model: ResidualModel) -> bool:

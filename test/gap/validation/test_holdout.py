@@ -1,4 +1,4 @@
-"""What flight not fitted says of an explanation. Truth: an explanation of which no numbers come explains nothing."""
+"""Validation on flight not fitted. Truth: an explanation whose predictions are not finite explains nothing."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ import pytest
 from gap_flights import fly
 
 from sysid_node.gap.diagnose import diagnose
-from sysid_node.gap.validation import holdout
+from sysid_node.gap.validation.holdout import standing_explanation
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 
@@ -21,12 +21,13 @@ class Explanation:
     corrected: Any
     chosen: Any = None
     causes: tuple[str, ...] = ("a cause",)
+    smaller: float = 2.0  # without the least probable cause
 
     def by_least_squares(self) -> "Explanation":
         return Explanation(self.chosen.fit)
 
     def without_least_probable(self) -> "Explanation":
-        return Explanation(2.0 * np.eye(2))
+        return Explanation(self.smaller * np.eye(2))
 
     def without_causes(self) -> "Explanation":
         return Explanation(np.eye(2), causes=())
@@ -49,20 +50,17 @@ def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
     ],
 )
 def test_the_first_explanation_that_predicts_better_stands(
-    monkeypatch: pytest.MonkeyPatch, unbiased: float, least_squares: float, stands: float
+    unbiased: float, least_squares: float, stands: float
 ) -> None:
-    monkeypatch.setattr(holdout, "check", by_cholesky)
     chosen = SimpleNamespace(fit=least_squares * np.eye(2))
-    _, checked = holdout._standing(Explanation(unbiased * np.eye(2), chosen), ())
+    _, checked = standing_explanation(Explanation(unbiased * np.eye(2), chosen), by_cholesky)
     assert checked.size == pytest.approx(stands)
 
 
-def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(holdout, "check", by_cholesky)
+def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it() -> None:
     wild = -np.eye(2)
-    explanation = Explanation(wild, SimpleNamespace(fit=wild), ("sound", "wild"))
-    monkeypatch.setattr(Explanation, "without_least_probable", lambda self: Explanation(4.0 * np.eye(2)))
-    _, checked = holdout._standing(explanation, (), ())
+    explanation = Explanation(wild, SimpleNamespace(fit=wild), ("sound", "wild"), smaller=4.0)
+    _, checked = standing_explanation(explanation, by_cholesky)
     assert checked.size == pytest.approx(4.0)
 
 

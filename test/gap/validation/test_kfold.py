@@ -10,13 +10,13 @@ from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, window_groups, with_neighbours
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.validation.kfold import _steps, kfold_evidence
+from sysid_node.gap.validation.kfold import kfold_evidence, steps_without_groups
 from sysid_node.sim import Simulator
 
 
 def test_each_part_is_left_out_of_what_predicts_it(aircraft, plain_model) -> None:
     fit = converged(unfitted([plain_model], nuisances_of(aircraft, plain_model)))
-    (steps,) = _steps(fit, filed=False)
+    (steps,) = steps_without_groups(fit)
     _, sigma, _ = fit.stacked
     for group, step in zip(window_groups(plain_model), steps, strict=True):
         kept = np.setdiff1d(np.arange(plain_model.windows.count), with_neighbours(group, plain_model.windows.count))
