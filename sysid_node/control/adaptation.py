@@ -121,7 +121,7 @@ def consider(
     if not _same_sense(state.axis, gains):
         state.verdict = "kept: a steady deflection would do the opposite"
         return
-    state.check, state.checked_at = MarginCheck(values, _corners(state.axis, values, half), gains), now
+    state.check, state.checked_at = MarginCheck(values, interval_corners(state.axis, values, half), gains), now
     state.used = tuple(used)
 
 
@@ -142,7 +142,7 @@ def _usable(belief: IdentifiedDerivative, half: float, explained: float) -> bool
     return belief.valid and tight and belief.explained >= explained
 
 
-def _corners(axis: Axis, values: Array, half: Array) -> Array:
+def interval_corners(axis: Axis, values: Array, half: Array) -> Array:
     """(N, D) the corners of the intervals that matter most, each other derivative at its value."""
     widest = np.argsort(-half * axis.signals)[:CORNERED]
     chosen = widest[half[widest] > 0.0]

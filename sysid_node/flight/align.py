@@ -228,7 +228,7 @@ def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> Fligh
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
-    columns = dict(zip(_columns(aircraft), np.ascontiguousarray(aligned.samples.T), strict=True))
+    columns = dict(zip(sample_columns(aircraft), np.ascontiguousarray(aligned.samples.T), strict=True))
     del columns[AIR_INTERVAL]
     attitude = streams.imu.attitude[aligned.imu.kept[aligned.used]]
     columns |= dict(zip(("phi", "theta", "psi"), np.ascontiguousarray(attitude.T), strict=True))
@@ -236,8 +236,8 @@ def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> Fligh
     return FlightRecord(aligned.time, columns, streams.name, start, counts_by_reason(aligned.rejected))
 
 
-def _columns(aircraft: Aircraft) -> tuple[str, ...]:
-    """Names of the samples' columns."""
+def sample_columns(aircraft: Aircraft) -> tuple[str, ...]:
+    """The names of the columns of an aligned sample."""
     measured = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", AIR_INTERVAL)
     return (*measured, *aircraft.control_symbols)
 

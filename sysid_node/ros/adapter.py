@@ -1,4 +1,4 @@
-"""The node `adapter`: an autopilot's own topics as those that the identifier listens to."""
+"""The node `adapter`: republishes an autopilot's own topics as the topics that the identifier listens to."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.diagnostics import Source
 from sysid_node.ros.support.spin import run_program, serve
 
-#: Autopilots' bridges publish best effort; a burst after a pause of the process is not to be lost.
-HEARD_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+#: Autopilots' bridges publish best effort. The queue is deep enough for a burst after a pause of the process.
+INPUT_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 _DEFAULT = AdapterSettings()
 
@@ -82,10 +82,10 @@ PARAMETERS = (
 
 
 class AdapterNode(Node):
-    """``config/adapter.yaml`` says what its parameters mean.
+    """``config/adapter.yaml`` explains its parameters.
 
-    Raises InputError on wrong ones, where the autopilot's message package is not installed, and where it would hear
-    itself. ``options`` are rclpy's.
+    Raises InputError on wrong parameters, where the autopilot's message package is not installed, and where the node
+    would receive its own messages. ``options`` are rclpy's.
     """
 
     def __init__(self, adapters: Mapping[str, type[Adapter]] = ADAPTERS, **options: Any) -> None:
@@ -107,7 +107,7 @@ class AdapterNode(Node):
 
     def _listen(self, kind: Any, topic: str) -> TopicMonitor:
         monitor = TopicMonitor(topic)
-        subscription = self.create_subscription(kind, topic, self._on(topic, monitor), HEARD_QOS)
+        subscription = self.create_subscription(kind, topic, self._on(topic, monitor), INPUT_QOS)
         monitor.name = subscription.topic_name
         if subscription.topic_name in {publisher.topic_name for publisher, _ in self._out.values()}:
             raise InputError(
@@ -117,17 +117,17 @@ class AdapterNode(Node):
         return monitor
 
     def _on(self, topic: str, monitor: TopicMonitor) -> Callable[[Any], None]:
-        def hear(message: Any) -> None:
+        def receive(message: Any) -> None:
             monitor.arrived()
             try:
                 sample = self._adapter.hear(topic, message)
-            except AttributeError as error:  # of another release than the adapter knows
+            except AttributeError as error:  # the messages are of another release than the adapter knows
                 raise InputError(f"topic {topic}: {error}; {self._adapter.remedy}") from error
             if sample is not None:
                 publisher, as_message = self._out[type(sample)]
                 publisher.publish(as_message(sample))
 
-        return hear
+        return receive
 
     def _on_tick(self) -> None:
         status = Source(self.get_name(), self._name).input(self._monitors, {}, self._stale_after)
@@ -137,7 +137,7 @@ class AdapterNode(Node):
 
 
 def message_class(kind: str, adapter: Adapter | type[Adapter]) -> Any:
-    """The class of a message type. Raises InputError where its package is not installed or lacks it."""
+    """The class of a message type. Raises InputError where its package is missing, or lacks the type."""
     package, _, name = kind.split("/")
     try:
         return getattr(import_module(f"{package}.msg"), name)
@@ -147,7 +147,7 @@ def message_class(kind: str, adapter: Adapter | type[Adapter]) -> Any:
 
 
 def imu_message(sample: ImuSample) -> Imu:
-    """Axes forward-left-up, orientation against east-north-up; covariances not known."""
+    """The IMU message: axes forward-left-up, orientation relative to east-north-up, covariances unknown."""
     message = Imu(
         header=conversion.header(sample.stamp_ns, "base_link"),
         linear_acceleration=_flu(sample.force),
@@ -162,7 +162,7 @@ def imu_message(sample: ImuSample) -> Imu:
 
 
 def air_message(sample: AirSample) -> AirData:
-    """Flow angles are NaN: no autopilot publishes them."""
+    """The air data message. Its flow angles are NaN, as no autopilot publishes them."""
     return AirData(
         header=conversion.header(sample.stamp_ns, "air_data"),
         true_airspeed=sample.true_airspeed,
@@ -173,7 +173,7 @@ def air_message(sample: AirSample) -> AirData:
 
 
 def joint_message(sample: JointSample) -> JointState:
-    """Positions by joint."""
+    """The joint state message."""
     return JointState(
         header=conversion.header(sample.stamp_ns, ""), name=list(sample.names), position=list(sample.positions)
     )
@@ -189,9 +189,9 @@ def _settings(values: Mapping[str, Any]) -> AdapterSettings:
 
 
 def _refuse(changes: Iterable[Any]) -> SetParametersResult:
-    ours = [change.name for change in changes if any(change.name == parameter.name for parameter in PARAMETERS)]
-    reason = f"{ours[0]} takes effect when the node starts: start it again" if ours else ""
-    return SetParametersResult(successful=not ours, reason=reason)
+    named = [change.name for change in changes if any(change.name == parameter.name for parameter in PARAMETERS)]
+    reason = f"{named[0]} takes effect when the node starts: start it again" if named else ""
+    return SetParametersResult(successful=not named, reason=reason)
 
 
 def parameter_file() -> str:

@@ -1,4 +1,4 @@
-"""The node `adaptive_controller`: flies set-points with gains for the aircraft as it is identified to be."""
+"""The node `adaptive_controller`: flies set-points, with gains that follow the identified derivatives."""
 
 from __future__ import annotations
 
@@ -85,14 +85,14 @@ PARAMETERS = (
     _setting("largest_pitch", "rad", "Largest pitch set-point.", "Up for aerobatics."),
     _setting("largest_sideslip", "rad", "Largest sideslip set-point.", "Up for crosswind landings."),
 )
-SENSOR_AGE = 0.5  # s, of air data beyond which they are taken as not measured
-IMU_AGE = 0.1  # s of silence, after which the surfaces go back to level flight's
-EXCITATION_AGE = 0.1  # s, after which excitation is taken to have ended
-AGES = {AIR_DATA: SENSOR_AGE, DERIVATIVES: 1.0, EXCITATION: 0.5}  # s of silence that are told
+SENSOR_AGE = 0.5  # s: older air data count as not measured
+IMU_AGE = 0.1  # s without an IMU message, after which the surfaces return to their positions in level flight
+EXCITATION_AGE = 0.1  # s without an excitation message, after which excitation is taken to have ended
+AGES = {AIR_DATA: SENSOR_AGE, DERIVATIVES: 1.0, EXCITATION: 0.5}  # s of silence that are reported
 
 
 class AdaptiveController(LoopNode):
-    """``config/adaptive_controller.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+    """``config/adaptive_controller.yaml`` explains its parameters. Raises InputError on wrong ones."""
 
     def __init__(self) -> None:
         super().__init__("adaptive_controller", PARAMETERS)
@@ -101,7 +101,7 @@ class AdaptiveController(LoopNode):
         self._points = SetPoints()
         self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
         self._extra: tuple[float, list[float]] = (-math.inf, [0.0] * len(CONTROLS))
-        self._now, self._imu_count, self._blind = math.nan, 0, 0
+        self._now, self._imu_count, self._steps_without_imu = math.nan, 0, 0
         self._imu = Arrivals(IMU, IMU_AGE)
         self._others = {topic: Arrivals(topic, age) for topic, age in AGES.items()}
         self._start_ns = 0
@@ -116,10 +116,10 @@ class AdaptiveController(LoopNode):
         self.every(0.02, self._watch)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """What is flown, and why."""
+        """Which gains each axis flies and why, and problems with the topics."""
         p50, p99 = self._work.percentiles()
         values: dict[str, object] = {"step p50 (us)": 1e6 * p50, "step p99 (us)": 1e6 * p99}
-        values |= {"commands without an IMU": self._blind, "IMU messages": self._imu_count}
+        values |= {"commands without an IMU": self._steps_without_imu, "IMU messages": self._imu_count}
         arrivals = (self._imu, *self._others.values())
         values |= {f"{one.topic}: troubles so far": one.count for one in arrivals}
         troubles = [words for one in arrivals for words in one.troubles()]
@@ -167,10 +167,10 @@ class AdaptiveController(LoopNode):
         self._points = SetPoints(**{name: values.get(name, math.nan) for name in SetPoints._fields})
 
     def _watch(self) -> None:
-        """Without an IMU: no feedback, the surfaces back to level flight's."""
+        """Without an IMU: no feedback, and the surfaces return to their positions in level flight."""
         if self._imu.silent():
             silence = time.monotonic() - self._imu.heard
-            self._blind += 1
+            self._steps_without_imu += 1
             self._fly(Measurements(self._now + silence, *(math.nan,) * (len(Measurements._fields) - 1)))
 
     def _fly(self, sensed: Measurements) -> None:
@@ -184,7 +184,7 @@ class AdaptiveController(LoopNode):
         self._work.add(time.perf_counter() - start)
 
     def _errors(self, sensed: Measurements) -> dict[str, float]:
-        """What the set-points' reference asks for, and how far off the aircraft is, rad."""
+        """The reference motion, and how far the aircraft is from it, rad."""
         wanted = self._state.law.wanted
         if wanted is None:
             return {}

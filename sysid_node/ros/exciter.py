@@ -1,4 +1,4 @@
-"""The node `exciter`: small deflections on top of the commands, on request, until enough is known."""
+"""The node `exciter`: adds small deflections to the commands, on request, until the derivatives are known."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ PARAMETERS = (
     _setting("most_load_factor", "", "Load factor above which it aborts.", "For every aircraft."),
 )
 PERIOD = 0.01  # s between its messages
-STALE = 0.2  # s of a sensor's silence, after which it aborts
+STALE = 0.2  # s without a sensor's message, after which the manoeuvre is aborted
 
 
 class Exciter(LoopNode):
-    """``config/exciter.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+    """``config/exciter.yaml`` explains its parameters. Raises InputError on wrong ones."""
 
     def __init__(self) -> None:
         super().__init__("exciter", PARAMETERS)
@@ -75,7 +75,7 @@ class Exciter(LoopNode):
         asked |= {name: tuple(self.values[name].split()) for name in ("derivatives", "manoeuvre")}
         self._state = exciter.init(self.aircraft, ExcitationSettings(**asked))
         self._inertial, self._air = (-math.inf, (math.nan,) * 3), (-math.inf, math.nan)
-        self._said = 0
+        self._logged = 0
         self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first
         self._excitation = self.create_publisher(JointState, EXCITATION, 10)
         self._reset = self.create_client(Trigger, "identifier/reset")
@@ -87,7 +87,7 @@ class Exciter(LoopNode):
         self.every(PERIOD, self._on_time)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """What it does, and what it did last."""
+        """Whether it excites, and its last event."""
         state = self._state
         last = state.events[-1].text if state.events else "nothing flown yet"
         doing = f"exciting for {self._now - state.begun:.1f} s" if state.active else last
@@ -109,19 +109,19 @@ class Exciter(LoopNode):
         precision = relative_precision(known.values(), self.aircraft)
         if exciter.receive_estimates(self._state, self._now, precision) and self._reset.service_is_ready():
             self._reset.call_async(Trigger.Request())
-        self._tell()
+        self._log_events()
 
     def _on_time(self) -> None:
         now = time.monotonic()
-        (felt, (roll, pitch, load)), (measured, airspeed) = self._inertial, self._air
-        if now - felt > STALE:
+        (imu_time, (roll, pitch, load)), (air_time, airspeed) = self._inertial, self._air
+        if now - imu_time > STALE:
             roll = pitch = load = math.nan
-        if now - measured > STALE:
+        if now - air_time > STALE:
             airspeed = math.nan
         moved = exciter.step(self._state, self._now, FlightCondition(roll, pitch, airspeed, load))
         stamp = self.get_clock().now().nanoseconds
         self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
-        self._tell()
+        self._log_events()
 
     def _on_start(self, _: Any, response: Any) -> Any:
         try:
@@ -136,11 +136,11 @@ class Exciter(LoopNode):
         response.success, response.message = True, "surfaces are in the middle"
         return response
 
-    def _tell(self) -> None:
-        """Log what has been done since the last time."""
-        for event in self._state.events[self._said :]:
+    def _log_events(self) -> None:
+        """Log the events since the last call."""
+        for event in self._state.events[self._logged :]:
             self.get_logger().info(event.text)
-        self._said = len(self._state.events)
+        self._logged = len(self._state.events)
 
 
 def main() -> None:

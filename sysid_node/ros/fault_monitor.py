@@ -1,4 +1,4 @@
-"""The node `fault_monitor`: says which surface, sensor or part of the airframe has failed, how much and since when."""
+"""The node `fault_monitor`: reports which surface, sensor or part of the airframe failed, how much and since when."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ PARAMETERS = (
 
 
 class FaultMonitor(LoopNode):
-    """``config/fault_monitor.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+    """``config/fault_monitor.yaml`` explains its parameters. Raises InputError on wrong ones."""
 
     def __init__(self) -> None:
         super().__init__("fault_monitor", PARAMETERS)
@@ -76,7 +76,7 @@ class FaultMonitor(LoopNode):
         self.every(PERIOD, self._on_time)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """What is wrong."""
+        """The present faults."""
         faults, judged = watching.wrong(self._watch, time.monotonic()), self._watch.judged
         p50, p99 = self._work.percentiles()
         values: dict[str, object] = {"update p50 (us)": 1e6 * p50, "update p99 (us)": 1e6 * p99}
@@ -98,7 +98,7 @@ class FaultMonitor(LoopNode):
         self._take(watching.on_actuators, *messages.actuators(numbers, texts))
 
     def _take(self, take: Callable[..., None], *message: Any) -> None:
-        """Have a sensor's message taken."""
+        """Pass a sensor's message on, and measure how long that takes."""
         start = time.monotonic()
         take(self._watch, start, *message)
         self._work.add(time.monotonic() - start)
@@ -110,10 +110,10 @@ class FaultMonitor(LoopNode):
         known = {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in message.derivatives}
         watching.on_estimates(self._watch, known)
 
-    # What is said
+    # Reports
 
     def _on_time(self) -> None:
-        """Say what is wrong, at once where it is news."""
+        """Publish the faults: at once where they changed, else once a second."""
         now, before = time.monotonic(), self._speech.news
         faults = watching.wrong(self._watch, now)
         if not self._speech.due(faults, now):

@@ -1,4 +1,4 @@
-"""The node `flight_simulator`: an aircraft that flies in real time, or faster, over topics."""
+"""The node `flight_simulator`: an aircraft that flies in real time, or faster, and is flown over topics."""
 
 from __future__ import annotations
 
@@ -70,14 +70,14 @@ PARAMETERS = (
     Parameter("noise", 1.0, "", "Sensor noise, in that of the aircraft file.", "0 for ideal sensors.", 0.0, 20.0),
     Parameter("seed", 0.0, "", "Of noise and turbulence.", "For another flight.", 0.0, 1e9),
 )
-COMMAND_AGE = 0.2  # s without a command that are told
+COMMAND_AGE = 0.2  # s without a command, beyond which diagnostics warn
 LIVE = frozenset({"effects"})
 POSE_EVERY = 10  # samples
 ENU_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
 class FlightSimulator(LoopNode):
-    """``config/flight_simulator.yaml`` says what its parameters mean. Raises InputError on wrong ones."""
+    """``config/flight_simulator.yaml`` explains its parameters. Raises InputError on wrong ones."""
 
     def __init__(self) -> None:
         super().__init__("flight_simulator", PARAMETERS, LIVE)
@@ -90,10 +90,10 @@ class FlightSimulator(LoopNode):
         self._command: list[float] = self._trim.command.tolist()
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
         self._steps, self._commands, self._refused = Durations(), 0, 0
-        self._told = 0.0  # s not flown that were told
-        self._commanded = -math.inf  # s, monotonic, when the last command came
+        self._reported_skip = 0.0  # s that were not flown and have been reported
+        self._commanded = -math.inf  # s, time.monotonic of the last command
         self._open_topics()
-        live.step(self._simulator, self._flight, self._command)  # compiles
+        live.step(self._simulator, self._flight, self._command)  # the first step compiles the program
         self._start_ns = self.get_clock().now().nanoseconds if values["speed"] == 1.0 else time.time_ns()
         self._pace = Pace(time.monotonic(), self._simulator.step, values["speed"])
         self.every(0.5 / (values["rate"] * values["speed"]), self._on_time)
@@ -108,7 +108,7 @@ class FlightSimulator(LoopNode):
         self.create_subscription(JointState, COMMAND, self._on_command, LATEST)
 
     def changed(self, values: Mapping[str, Any]) -> None:
-        """Let other effects be there from the next sample on."""
+        """Take new effects; they act from the next sample on."""
         if "effects" in values:
             if not isinstance(values["effects"], str):
                 raise InputError(f"effects {values['effects']!r}: expected a string")
@@ -116,7 +116,7 @@ class FlightSimulator(LoopNode):
             self.get_logger().info(f"effects: {values['effects'] or 'none'}")
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """How it flies, and what a step costs."""
+        """Whether the simulation keeps up with the clock, and the duration of a step."""
         p50, p99 = self._steps.percentiles()
         flown = self._flight.samples * self._simulator.step
         behind = self._pace.tell()
@@ -129,7 +129,7 @@ class FlightSimulator(LoopNode):
             "behind the clock at most (ms)": 1e3 * behind,
             "not flown (s)": self._pace.skipped,
         }
-        skipped, self._told = self._pace.skipped - self._told, self._pace.skipped
+        skipped, self._reported_skip = self._pace.skipped - self._reported_skip, self._pace.skipped
         troubles = [f"{skipped:.1f} s were not flown, the machine is too slow"] if skipped else []
         if behind > LATE:
             troubles.append(f"up to {1e3 * behind:.0f} ms behind the clock")
@@ -149,7 +149,7 @@ class FlightSimulator(LoopNode):
         self._commands, self._commanded = self._commands + 1, time.monotonic()
 
     def _on_time(self) -> None:
-        """Fly what is due."""
+        """Simulate and publish the samples that are due."""
         for _ in range(self._pace.due(time.monotonic(), self._flight.samples)):
             start = time.perf_counter()
             self._publish(live.step(self._simulator, self._flight, self._command))

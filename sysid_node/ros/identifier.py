@@ -1,4 +1,4 @@
-"""The node `identifier`: stability and control derivatives from the aircraft's own topics, while it flies."""
+"""The node `identifier`: estimates stability and control derivatives in flight, from the aircraft's topics."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
@@ -30,6 +31,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.online.estimates.saving import save_estimates
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.parameters import LIVE, PARAMETERS, check, estimation_settings
+from sysid_node.online.settings import Settings
 from sysid_node.ros.session import Due, Session
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, refusal, values_of
@@ -40,23 +42,25 @@ from sysid_node.ros.support.message_types import fields_of
 from sysid_node.ros.support.spin import run_program, serve
 
 DIAGNOSTICS = 1.0  # s between diagnostics
-TICK = 0.2  # s, by which they come later where nothing is published
+TICK = 0.2  # s between checks of whether diagnostics are overdue because no estimate was published
 
 
 class Identifier(CarefulNode):
-    """``config/identifier.yaml`` says what its parameters mean; where ``autostart`` is true it starts by itself.
+    """``config/identifier.yaml`` explains its parameters; it starts by itself where ``autostart`` is true.
 
-    Raises InputError on parameters of a wrong type or value, and SystemExit(2) where it should start and cannot.
+    Raises InputError on parameters of a wrong type or value, and SystemExit(2) where it cannot start by itself.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, make_session: Callable[[Aircraft, Settings, float], Session] = Session) -> None:
+        """``make_session`` makes a session of the aircraft, the estimator's settings and the publication rate (Hz)."""
         super().__init__("identifier")
+        self._make_session = make_session
         self._session: Session | None = None
         declare(self, PARAMETERS, check)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._told = -math.inf  # s, time.monotonic of the last diagnostics
-        # A steady clock: diagnostics go on where simulated time stands still.
+        self._reported = -math.inf  # s, time.monotonic of the last diagnostics
+        # A steady clock: diagnostics continue while simulated time stands still.
         self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, "~/reset", self.answered(self.reset))
         self.create_service(Trigger, "~/save", self.answered(self.save))
@@ -71,12 +75,12 @@ class Identifier(CarefulNode):
     # Lifecycle
 
     def configure(self) -> None:
-        """Load the aircraft file; make the estimator, its inputs and its outputs."""
+        """Load the aircraft file; make the estimator, the subscriptions and the publishers."""
         values = values_of(self, PARAMETERS)
         if not values["aircraft"]:
             raise InputError("parameter aircraft is empty: give a name or a file, e.g. -p aircraft:=cdrw")
         aircraft = load_aircraft(values["aircraft"])
-        self._session = Session(aircraft, estimation_settings(values), values["publish_rate"])
+        self._session = self._make_session(aircraft, estimation_settings(values), values["publish_rate"])
         self._sign = conversion.axes_sign(values["body_frame"])
         self._frame_id = ""
         self._lag = math.nan  # s, from the stamp of the last published sample to its publication
@@ -93,7 +97,7 @@ class Identifier(CarefulNode):
         self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.model_structure)}")
 
     def cleanup(self) -> None:
-        """Give up what ``configure`` made."""
+        """Destroy what ``configure`` made."""
         if self._session is None:
             return
         self._session = None
@@ -105,9 +109,9 @@ class Identifier(CarefulNode):
     # Messages
 
     def _listen(self, kind: Any, topic: str, take: Callable[[Session, Numbers, Texts], list[Due]]) -> Any:
-        """Subscribe to an input; what falls due after a message is published.
+        """Subscribe to an input topic, and publish the estimates that fall due after each message.
 
-        Messages come serialised: making objects of all their parts would take longer than the estimator does.
+        Messages stay serialised: to make objects of all their parts would take longer than the estimator does.
         """
         monitor, reader = self._monitors[topic], MessageReader(fields_of, INPUT_TOPICS[topic], *messages.PATHS[topic])
 
@@ -146,9 +150,9 @@ class Identifier(CarefulNode):
         header = conversion.header(due.stamp_ns, self._frame_id)
         self._model_gap.publish(conversion.gap_message(session.gap(due), header, session.aircraft.name))
         self._publish_times.add(time.perf_counter() - start)
-        # right after an estimate, when no other one can be waiting for it
-        if time.monotonic() - self._told >= DIAGNOSTICS:
-            self._tell(due)
+        # Diagnostics follow an estimate at once, as no other estimate can be waiting then.
+        if time.monotonic() - self._reported >= DIAGNOSTICS:
+            self._report(due)
 
     # Requests
 
@@ -163,14 +167,14 @@ class Identifier(CarefulNode):
         return SetParametersResult(successful=not reason, reason=reason)
 
     def reset(self) -> str:
-        """Forget all estimates. Raises InputError where there is nothing to forget."""
+        """Forget all estimates. Raises InputError where the node is not configured."""
         if self._session is None:
             raise InputError(f"nothing to reset: the node is {self.state_label}")
         self._session.reset()
         return "all estimates forgotten"
 
     def save(self) -> str:
-        """Write the estimates to a file and name it. Raises InputError where there are none or the file cannot be."""
+        """Write the estimates to a file and return its path. Raises InputError where there are none, or it fails."""
         if self._session is None or not self._session.samples:
             raise InputError(f"nothing to save: the node is {self.state_label} and no aligned sample has come")
         session, (stamp_ns, estimates, _) = self._session, self._session.now()
@@ -189,19 +193,19 @@ class Identifier(CarefulNode):
 
     def _on_tick(self) -> None:
         self.settle()
-        if time.monotonic() - self._told >= DIAGNOSTICS + TICK:
-            self._tell()
+        if time.monotonic() - self._reported >= DIAGNOSTICS + TICK:
+            self._report()
 
-    def _tell(self, due: Due | None = None) -> None:
-        """Say how it goes; ``due``: the estimates of this moment, where they were just made."""
-        self._told = time.monotonic()
+    def _report(self, due: Due | None = None) -> None:
+        """Publish diagnostics; ``due`` are the estimates of this moment, where they were just made."""
+        self._reported = time.monotonic()
         source = Source(self.get_name(), self._session.aircraft.name if self._session else "")
         message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
         message.header.stamp = self.get_clock().now().to_msg()
-        self.guarded(self._tell_of_flight)(message, due)
+        self.guarded(self._report_flight)(message, due)
         self._diagnostics.publish(message)
 
-    def _tell_of_flight(self, message: DiagnosticArray, due: Due | None) -> None:
+    def _report_flight(self, message: DiagnosticArray, due: Due | None) -> None:
         session = self._session
         if session is None:
             return
@@ -210,7 +214,7 @@ class Identifier(CarefulNode):
         if session.samples:
             due = due or session.now(session.silence)
             if session.silence > stale_after:
-                self._publish(session, due)  # nothing falls due without data; say that what is known grows old
+                self._publish(session, due)  # without data no estimate falls due, but users must see that they are old
             message.status.append(source.estimate(due.estimates, session.samples))
             work = {"update": session.update_times, "publication": self._publish_times}
             message.status.append(source.computation(work, self._lag))

@@ -1,4 +1,4 @@
-"""The program `player`: a bag's messages on real topics, at the pace at which they were recorded."""
+"""The program `player`: publishes a bag's messages at the pace at which they were recorded."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from sysid_node.ros.support.conversion import NANOSECONDS, stamp_message
 from sysid_node.ros.support.spin import run_program
 
 CLOCK_PERIOD = NANOSECONDS // 100
-ACKNOWLEDGED = Duration(seconds=5)  # longest wait for listeners that have yet to take the last messages
-SETTLE = 0.3  # s from the moment when a listener is found until it surely hears
+ACKNOWLEDGED = Duration(seconds=5)  # the longest wait for subscribers to acknowledge the last messages
+SETTLE = 0.3  # s after a subscriber is found, until it receives messages for certain
 
 
 class Player(Node):
@@ -46,14 +46,14 @@ class Player(Node):
         self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
 
     def await_listeners(self, patience: float) -> None:
-        """Wait up to ``patience`` s until every topic is heard; go on without, saying which are not."""
+        """Wait up to ``patience`` s until every topic has a subscriber; log the topics that then have none."""
         end = time.monotonic() + patience
-        deaf = self._deaf()
-        while deaf and time.monotonic() < end and rclpy.ok():
+        unheard = self._unheard()
+        while unheard and time.monotonic() < end and rclpy.ok():
             time.sleep(0.02)
-            deaf = self._deaf()
-        if deaf:
-            self.get_logger().warning(f"nobody listens to {', '.join(deaf)}")
+            unheard = self._unheard()
+        if unheard:
+            self.get_logger().warning(f"nobody listens to {', '.join(unheard)}")
         else:
             time.sleep(SETTLE)
 
@@ -76,12 +76,12 @@ class Player(Node):
                 publisher, headed = self._topics[topic]
                 publisher.publish(shift_stamp(raw, shift) if headed and shift else raw)
                 count += 1
-        if rclpy.ok():  # what is still on its way would end with this process
+        if rclpy.ok():  # messages that are not delivered yet would be lost with this process
             for publisher, _ in self._topics.values():
                 publisher.wait_for_all_acked(ACKNOWLEDGED)
         return count
 
-    def _deaf(self) -> list[str]:
+    def _unheard(self) -> list[str]:
         return [name for name, (publisher, _) in self._topics.items() if not publisher.get_subscription_count()]
 
 

@@ -1,6 +1,6 @@
-"""The program `recorder`: what a flight says, into a bag, where no `ros2 bag` is at hand; ended by Ctrl-C.
+"""The program `recorder`: records a flight's topics into a bag where `ros2 bag` is not installed; Ctrl-C ends it.
 
-Messages are written as they came, byte for byte, with the time at which they came.
+Messages are written byte for byte, with the time at which they arrived.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from sysid_node.ros.support.spin import run_program, serve
 
 JOINTS = "sensor_msgs/msg/JointState"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-#: What is recorded: all that is needed to identify again, and what was made of it in flight.
+#: What is recorded: all that is needed to identify again, and the results in flight.
 TOPICS: Mapping[str, str] = {
     **INPUT_TOPICS,
     "actuators/command": JOINTS,
@@ -39,7 +39,7 @@ TOPICS: Mapping[str, str] = {
     "fault_monitor/faults": DIAGNOSTICS,
     "/diagnostics": DIAGNOSTICS,
 }
-#: Nothing is asked for again, so that no publisher waits for the recorder; deep, for a disk that stalls.
+#: Best effort, so that no publisher waits for the recorder. The queue is deep enough for a disk that stalls.
 QOS = QoSProfile(depth=5000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 

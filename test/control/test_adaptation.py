@@ -81,7 +81,7 @@ def test_what_is_flown_has_margins_at_every_corner(state: controller.ControllerS
         assert axis.accepted > 0
         values = np.array([estimates[name].value for name in axis.axis.derivatives])
         half = np.array([0.5 * (estimates[n].upper - estimates[n].lower) for n in axis.axis.derivatives])
-        corners = adaptation._corners(axis.axis, values, half)
+        corners = adaptation.interval_corners(axis.axis, values, half)
         found = margins(axis.axis.model(corners), axis.target.gains, axis.axis.delay)
         assert found.enough(2.0, math.pi / 4.0).all()
 

@@ -31,7 +31,7 @@ def keep(stream, rows, names=("values",)):
 
 
 def test_columns_are_the_estimators():
-    assert alignment._columns(AIRCRAFT) == (*SAMPLE_COLUMNS, "de", "da", "dr")
+    assert alignment.sample_columns(AIRCRAFT) == (*SAMPLE_COLUMNS, "de", "da", "dr")
 
 
 def test_interpolates_linearly_in_stamp_time():

@@ -198,7 +198,7 @@ def test_the_exciter_needs_sensors(watch: LoopWatch) -> None:
     with flying(exciter=begin(EXCITER)):
         watch.excite()
         until(watch, lambda: "aborted: roll not measured" in watch.value(EXCITER, "last event"), "did not abort")
-        answer = watch._call(Trigger, "exciter/stop", Trigger.Request())
+        answer = watch.call(Trigger, "exciter/stop", Trigger.Request())
         assert answer.success
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 
@@ -12,23 +13,27 @@ class TopicMonitor:
     """Counts the messages of one topic, by a clock that never jumps."""
 
     name: str
+    clock: Callable[[], float] = time.monotonic  # s
     received: int = 0
-    last: float = float("nan")  # s, time.monotonic of the last message
-    _counted: int = 0
-    _since: float = field(default_factory=time.monotonic)
+    last: float = float("nan")  # s, by ``clock``, of the last message
+    _counted: int = 0  # messages at the last call of ``rate``
+    _since: float = float("nan")  # s, of that call
+
+    def __post_init__(self) -> None:
+        self._since = self.clock()
 
     def arrived(self) -> None:
         """Count one more message."""
         self.received += 1
-        self.last = time.monotonic()
+        self.last = self.clock()
 
     def silence(self) -> float:
         """Seconds since the last message, NaN where there was none."""
-        return time.monotonic() - self.last
+        return self.clock() - self.last
 
     def rate(self) -> float:
         """Messages per second since the last call of this method."""
-        now = time.monotonic()
+        now = self.clock()
         rate = (self.received - self._counted) / max(now - self._since, 1e-9)
         self._counted, self._since = self.received, now
         return rate

@@ -1,4 +1,4 @@
-"""Between ROS messages and what the layers below speak: tuples in SI, radians, body axes forward-right-down."""
+"""Conversion between ROS messages and the values of the layers below: SI, radians, body axes forward-right-down."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ NANOSECONDS = 1_000_000_000
 
 
 def stamp_ns(stamp: Time) -> int:
-    """A stamp in nanoseconds."""
+    """Nanoseconds of a stamp."""
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
 def stamp_message(nanoseconds: int) -> Time:
-    """Nanoseconds as a stamp."""
+    """The stamp of nanoseconds."""
     seconds, rest = divmod(nanoseconds, NANOSECONDS)
     return Time(sec=seconds, nanosec=rest)
 
 
 def header(nanoseconds: int, frame_id: str) -> Header:
-    """A header."""
+    """A header with a stamp (ns)."""
     return Header(stamp=stamp_message(nanoseconds), frame_id=frame_id)
 
 
 def axes_sign(body_frame: str) -> float:
-    """What y and z are multiplied by on the way from ``body_frame`` to FRD."""
+    """The factor of y and z in the conversion from ``body_frame`` (flu or frd) to FRD."""
     return 1.0 if body_frame == "frd" else -1.0
 
 
 def gap_message(gaps: Sequence[CoefficientGap], header: Header, aircraft: str) -> ModelGap:
-    """The gaps as a message."""
+    """The message of the gaps of all coefficients."""
     return ModelGap(
         header=header,
         aircraft=aircraft,
@@ -52,7 +52,7 @@ def gap_message(gaps: Sequence[CoefficientGap], header: Header, aircraft: str) -
 
 
 def estimates_from_message(message: Any, start_ns: int) -> Estimates:
-    """The way back; ``time`` in s from ``start_ns``."""
+    """The estimates in a sysid_msgs/DerivativeEstimates; ``time`` is in s from ``start_ns``."""
     return Estimates(
         time=(stamp_ns(message.header.stamp) - start_ns) / NANOSECONDS,
         derivatives={

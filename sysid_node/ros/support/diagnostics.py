@@ -1,4 +1,4 @@
-"""The identifier's words on /diagnostics: what comes in, what is known, what it costs."""
+"""The identifier's statuses on /diagnostics: state, input, estimate, computation."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from sysid_node.online.types import Estimates
 
 OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 
-FOREIGN_CLOCK = 60.0  # s of lag beyond which stamps are taken to be of another clock, as in a replay
+FOREIGN_CLOCK = 60.0  # s of lag, beyond which the stamps are taken to be of another clock, as in a replay
 
 
 @dataclass(frozen=True)
 class Source:
-    """Who speaks: a node, identifying an aircraft."""
+    """The node that reports, and the aircraft that it identifies."""
 
     node: str
     aircraft: str
 
     def state(self, label: str, fault: str, faults: int) -> DiagnosticStatus:
-        """The lifecycle state, and what last went wrong."""
+        """The lifecycle state, and the last fault."""
         message = f"{label}: {fault}" if fault else label
         values = {"state": label, "last fault": fault, "exceptions in callbacks": faults}
         return self._status("state", ERROR if fault else OK, message, values)
@@ -49,7 +49,7 @@ class Source:
         return self._status("input", level, "; ".join(faults) or "all topics arrive", values)
 
     def estimate(self, estimates: Estimates, samples: int) -> DiagnosticStatus:
-        """How many derivatives are valid, and which are not for what reason."""
+        """How many derivatives are valid, and why the others are not."""
         by_status: defaultdict[str, list[str]] = defaultdict(list)
         for derivative in estimates.derivatives.values():
             by_status[derivative.status].append(derivative.name)
@@ -61,7 +61,7 @@ class Source:
         return self._status("estimate", OK if valid else WARN, message, values)
 
     def computation(self, work: Mapping[str, Durations], lag: float) -> DiagnosticStatus:
-        """Times taken (p50, p99), and how long after its stamp (s) a sample was in a published estimate."""
+        """Durations (p50, p99), and the lag (s) from a sample's stamp to the publication of its estimate."""
         values: dict[str, object] = {"lag (s)": lag}
         for kind, durations in work.items():
             p50, p99 = durations.percentiles()

@@ -1,4 +1,4 @@
-"""Listens to an identifier: its estimates over time, and its diagnostics."""
+"""Follows an identifier: collects its estimates over time, and its diagnostics."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sysid_node.ros.support.conversion import estimates_from_message
 
 
 class Follower:
-    """The history of ``/identifier/derivatives`` (times in s from ``start_ns``) and the last words of /diagnostics."""
+    """The history of ``/identifier/derivatives`` (times in s from ``start_ns``), and the last diagnostics by part."""
 
     def __init__(self, start_ns: int) -> None:
         self.history: list[Estimates] = []
-        self.words: dict[str, DiagnosticStatus] = {}  # by the part of the node that speaks: "input", "estimate", ...
+        self.words: dict[str, DiagnosticStatus] = {}  # by part: "input", "estimate", ...
         self._start_ns = start_ns
         self._node: Node = rclpy.create_node("follower")
         self._node.create_subscription(DerivativeEstimates, "/identifier/derivatives", self._on_estimates, 1000)
@@ -28,13 +28,13 @@ class Follower:
         self._executor.add_node(self._node)
 
     def listen(self, seconds: float) -> None:
-        """Hear what comes within so many seconds."""
+        """Receive messages for so many seconds."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=left)
 
     def word(self, part: str, key: str) -> str:
-        """The last value of a key of /diagnostics; empty where nothing was said."""
+        """The last value of a key of /diagnostics; empty where there is none."""
         values = self.words[part].values if part in self.words else ()
         return next((str(pair.value) for pair in values if pair.key == key), "")
 

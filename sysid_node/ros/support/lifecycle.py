@@ -1,4 +1,4 @@
-"""A lifecycle node that says what went wrong: rclpy's swallows it, and some requests kill it."""
+"""A lifecycle node that reports its errors. rclpy's own swallows exceptions, and some requests end its process."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from sysid_node.errors import InputError
 
 
 class CarefulNode(LifecycleNode):
-    """Transitions by plain methods that may raise, and callbacks that may raise.
+    """A lifecycle node whose transitions are plain methods; transitions and callbacks may raise exceptions.
 
-    A subclass overrides ``configure`` and ``cleanup``. An InputError in one of them is one line in the log and a failed
-    transition; any other exception is logged with its traceback and sends the node through error processing to
-    `unconfigured`. So does an exception in a callback wrapped by ``guarded``, as soon as
-    ``settle`` runs. ``fault`` says in one line what happened last, until the node is configured again.
+    A subclass overrides ``configure`` and ``cleanup``. An InputError in one of them is logged in one line, and the
+    transition fails. Any other exception is logged with its traceback and takes the node through error processing to
+    `unconfigured`. So does an exception in a callback that is wrapped by ``guarded``, as soon as ``settle`` runs.
+    ``fault`` is one line about the last error, until the node is configured again.
     """
 
     def __init__(self, name: str) -> None:
@@ -28,18 +28,18 @@ class CarefulNode(LifecycleNode):
         super().__init__(name)
 
     def configure(self) -> None:
-        """Make what the node needs, from its parameters."""
+        """Make what the node needs, by its parameters."""
 
     def cleanup(self) -> None:
-        """Give up what ``configure`` made; whatever state that left behind."""
+        """Destroy what ``configure`` made, even where it did not finish."""
 
     @property
     def state_label(self) -> str:
-        """The lifecycle state: unconfigured, inactive, active or finalized; or a transition's name meanwhile."""
+        """The lifecycle state: unconfigured, inactive, active or finalized, or the name of a transition under way."""
         return str(self._state_machine.current_state[1])
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
-        """The callback, heard while the node is active; its first exception stops all guarded ones."""
+        """The callback, called only while the node is active. The first exception stops all guarded callbacks."""
 
         def call(*arguments: Any) -> None:
             if not self.active:
@@ -47,13 +47,13 @@ class CarefulNode(LifecycleNode):
             try:
                 callback(*arguments)
             except Exception as error:
-                if self.context.ok():  # otherwise something was asked of ROS while it shuts down
+                if self.context.ok():  # otherwise ROS is shutting down, and its calls may fail
                     self._record(callback.__name__, error)
 
         return call
 
     def answered(self, request: Callable[[], str]) -> Callable[[Any, Any], Any]:
-        """A service callback of type std_srvs/Trigger: what ``request`` returns, or raises, is the answer."""
+        """A callback for a std_srvs/Trigger service, which answers with what ``request`` returns or raises."""
 
         def call(_: Any, response: Any) -> Any:
             try:
@@ -68,7 +68,7 @@ class CarefulNode(LifecycleNode):
         return call
 
     def settle(self) -> None:
-        """Leave `active` after a fault. Call it from a timer: a subscription cannot be destroyed in its callback."""
+        """Leave the state active after a fault. Called by a timer: a callback cannot destroy its own subscription."""
         if self.fault and self.state_label == "active":
             self.trigger_deactivate()
 
@@ -78,13 +78,13 @@ class CarefulNode(LifecycleNode):
         return self._transition(self.configure, super().on_configure, state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start hearing."""
+        """Start to take messages."""
         result = super().on_activate(state)
         self.active = result == TransitionCallbackReturn.SUCCESS
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop hearing. ERROR where a fault is the reason."""
+        """Stop taking messages. Returns ERROR where a fault is the reason."""
         self.active = False
         result = super().on_deactivate(state)
         return TransitionCallbackReturn.ERROR if self.fault else result
@@ -94,7 +94,7 @@ class CarefulNode(LifecycleNode):
         return self._transition(self.cleanup, super().on_cleanup, state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """See ``cleanup``; the last transition."""
+        """See ``cleanup``. This is the last transition."""
         self.active = False
         return self._transition(self.cleanup, super().on_shutdown, state)
 
@@ -126,7 +126,7 @@ class CarefulNode(LifecycleNode):
         self.get_logger().error(f"{self.fault}\n{''.join(traceback.format_exception(error))}")
 
     def _LifecycleNodeMixin__on_change_state(self, request: Any, response: Any) -> Any:
-        """Answer a request that the present state does not allow; rclpy lets it end the process (its issue 1209)."""
+        """Answer a request that the present state does not allow, which would end the process (issue 1209 of rclpy)."""
         try:
             return super()._LifecycleNodeMixin__on_change_state(request, response)
         except rclpy_implementation.RCLError:

@@ -1,4 +1,4 @@
-"""What the nodes of the closed loop share: a table of parameters, numbers by name, words of how it goes."""
+"""What the nodes of the closed loop share: a table of parameters, raw subscriptions, diagnostics once a second."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ EXCITATION = "actuators/excitation"
 SET_POINTS = "set_points"
 DERIVATIVES = "identifier/derivatives"
 
-#: The newest counts: what is late is of no use to a controller.
+#: A short queue: old messages are of no use to a controller.
 LATEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-#: As sensor data are published, but deep enough that a burst after a pause of the process is not lost.
+#: Best effort, as sensor data are published; deep enough for a burst after a pause of the process.
 SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-#: The parameter that all of them have.
+#: The parameter that all nodes of the loop have.
 AIRCRAFT = Parameter(
     "aircraft",
     "",
@@ -43,13 +43,13 @@ AIRCRAFT = Parameter(
     "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
     "For every aircraft.",
 )
-#: What those that know of the surfaces are told of them.
+#: The parameter of the nodes that model the surfaces.
 LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
 class LoopNode(Node, ABC):
-    """A node with a table of parameters, of which those in ``live`` may change; says how it goes once a second."""
+    """A node with a table of parameters, of which those in ``live`` may change in flight."""
 
     def __init__(self, name: str, table: Sequence[Parameter], live: frozenset[str] = frozenset()) -> None:
         super().__init__(name)
@@ -64,11 +64,11 @@ class LoopNode(Node, ABC):
         self.every(1.0, self._on_tick)
 
     def changed(self, values: Mapping[str, Any]) -> None:
-        """Take new values of live parameters. Raises InputError where they are impossible."""
+        """Take new values of live parameters. Raises InputError where they are wrong."""
 
     @abstractmethod
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """Level, one line, and values for /diagnostics."""
+        """Level, message and values for /diagnostics."""
 
     def listen(
         self, kind: Any, topic: str, paths: Paths, take: Callable[[Numbers, Texts], None], profile: QoSProfile | int
@@ -90,16 +90,16 @@ class LoopNode(Node, ABC):
         self.create_subscription(kind, topic, on_message, profile, raw=True)
 
     def every(self, period: float, callback: Any) -> None:
-        """Call back every so many seconds of a clock that never jumps."""
+        """Call back every ``period`` s of a clock that never jumps."""
         self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
-        ours = {c.name: c.value for c in changes if any(c.name == p.name for p in self._table)}
+        changed = {c.name: c.value for c in changes if any(c.name == p.name for p in self._table)}
         try:
-            fixed = sorted(ours.keys() - self._live)
+            fixed = sorted(changed.keys() - self._live)
             if fixed:
                 raise InputError(f"{fixed[0]} takes effect when the node starts: start it again")
-            self.changed(ours)
+            self.changed(changed)
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -116,13 +116,13 @@ class LoopNode(Node, ABC):
 
 
 def named(stamp_ns: int, values: Mapping[str, float]) -> JointState:
-    """Numbers by name."""
+    """The message of numbers by name."""
     return JointState(
         header=conversion.header(stamp_ns, ""), name=list(values), position=[float(v) for v in values.values()]
     )
 
 
 def by_name(numbers: Numbers, texts: Texts) -> tuple[int, dict[str, float]]:
-    """The way back, with the stamp (ns); of a message with fewer positions than names, what there is."""
+    """The stamp (ns) and the numbers by name of such a message; names without a position are left out."""
     stamp, names, positions = messages.actuators(numbers, texts)
     return stamp, dict(zip(names, positions, strict=False))

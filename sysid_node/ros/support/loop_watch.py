@@ -1,4 +1,4 @@
-"""Watches a closed loop: its tracking, what its nodes say of themselves, what is identified; asks it for things."""
+"""Watches a closed loop: tracking errors, diagnostics and estimates; sends set-points, effects and requests."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from sysid_node.ros.support.loop_node import DERIVATIVES, SET_POINTS, named
 TRACKING = "adaptive_controller/tracking"
 CONTROLLER, MONITOR = "adaptive_controller", "fault_monitor"
 TROUBLES = ": troubles so far"
-RUNNING = re.compile(r" for [\d.]+ s")  # in words of what is silent
+RUNNING = re.compile(r" for [\d.]+ s")  # the duration of a silence, which changes all the time
 PATIENCE = 20.0  # s to wait for a service
 
 
 class LoopWatch:
-    """``tracking``: (time in s of the flight, errors by name); ``estimates`` the newest; ``words`` by node.
+    """``tracking``: (time in s of the flight, errors by name); ``estimates``: the newest; ``words``: by node.
 
-    It may share an ``executor`` with other nodes, and is then heard whenever that spins. At 200 messages a second only
-    the events executor keeps up on a busy machine: what waits in queues would be taken for what is now.
+    It may share an ``executor`` with other nodes. At 200 messages a second only the events executor keeps up on a busy
+    machine: with others, messages wait in queues and are taken as present when they are old.
     """
 
     def __init__(self, executor: Any = None) -> None:
@@ -54,7 +54,7 @@ class LoopWatch:
         return self.tracking[-1][0] if self.tracking else 0.0
 
     def listen(self, seconds: float) -> None:
-        """Hear what comes within so many seconds."""
+        """Receive messages for so many seconds."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=left)
@@ -64,18 +64,18 @@ class LoopWatch:
         self._points.publish(named(time.time_ns(), points))
 
     def set_effects(self, effects: str) -> str:
-        """Let the simulated aircraft differ so; returns why it cannot, empty where it does."""
+        """Set the simulated aircraft's effects; returns why they are refused, empty where they are not."""
         value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=effects)
         request = SetParameters.Request(parameters=[Parameter(name="effects", value=value)])
-        answer = self._call(SetParameters, "flight_simulator/set_parameters", request)
+        answer = self.call(SetParameters, "flight_simulator/set_parameters", request)
         return str(answer.results[0].reason)
 
     def excite(self) -> str:
-        """Begin excitation; returns the exciter's words."""
-        return str(self._call(Trigger, "exciter/start", Trigger.Request()).message)
+        """Begin the excitation; returns the exciter's answer."""
+        return str(self.call(Trigger, "exciter/start", Trigger.Request()).message)
 
     def said(self, node: str) -> str:
-        """The last line of a node of the loop on /diagnostics."""
+        """The last message of a node on /diagnostics."""
         return str(self.words[node].message) if node in self.words else ""
 
     def value(self, node: str, key: str) -> str:
@@ -84,7 +84,7 @@ class LoopWatch:
         return next((str(pair.value) for pair in pairs if pair.key == key), "")
 
     def news(self) -> dict[str, str]:
-        """By node, what changes only when something happens: gains, excitation, faults; without numbers that run."""
+        """By node, gains, excitation and faults in words, without the numbers that change all the time."""
         gains = "; ".join(f"{axis}: {self.value(CONTROLLER, f'{axis}: gains')}" for axis in ("pitch", "lateral"))
         known = CONTROLLER in self.words
         faults = "; ".join(fault.partition(",")[0] for fault in self.said(MONITOR).split("; "))
@@ -95,7 +95,7 @@ class LoopWatch:
         }
 
     def troubles(self) -> dict[str, int]:
-        """By topic, how often the controller told of its messages."""
+        """By topic, the number of problems that the controller has counted."""
         pairs = self.words[CONTROLLER].values if CONTROLLER in self.words else ()
         counts = {pair.key.partition(": ")[0]: int(pair.value) for pair in pairs if pair.key.endswith(TROUBLES)}
         return {topic: count for topic, count in counts.items() if count}
@@ -105,7 +105,8 @@ class LoopWatch:
         self._executor.shutdown()
         self._node.destroy_node()
 
-    def _call(self, kind: Any, name: str, request: Any) -> Any:
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        """The answer of the service ``name`` of type ``kind``. Raises RuntimeError where none comes in time."""
         client = self._node.create_client(kind, name)
         try:
             end = time.monotonic() + PATIENCE

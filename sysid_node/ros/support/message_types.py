@@ -1,4 +1,4 @@
-"""The fields of ROS's message classes: what ``flight.cdr.definitions_of`` is to bags."""
+"""The fields of ROS's message classes, as ``flight.bag.message_types.definitions_of`` gives them for bags."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rosidl_parser.definition import Array as FixedArray
 
 from sysid_node.flight.cdr.layout import NUMBERS, Array, Kind, Part, String
 
-#: IDL's names of what message definitions call otherwise.
+#: IDL's names of numbers -> those of message definitions, where they differ.
 _IDL = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
 
 
 @cache
 def fields_of(msgtype: str) -> Sequence[tuple[str, Kind]]:
-    """A type's fields, as ``cdr_layout.Definitions``."""
+    """The fields of a message type; a ``flight.cdr.layout.Definitions``."""
     kind = _class_of(msgtype)
     return [(name, _kind(slot)) for name, slot in zip(kind.get_fields_and_field_types(), kind.SLOT_TYPES, strict=True)]
 

@@ -1,4 +1,4 @@
-"""Runs a ROS program until it is done or told to stop."""
+"""Runs a ROS program until it is done or stopped."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from sysid_node.errors import InputError
 def run_program(program: Callable[[], None]) -> int:
     """Run ``program`` with ROS initialised; returns the exit code.
 
-    0 when it is done or stopped by Ctrl-C, SIGTERM or a shutdown of its context; 2 where it raises InputError, or ROS
-    cannot make sense of its arguments, which becomes one line of the log.
-    Ctrl-C shuts ROS down, as SIGTERM does, and ``program`` is to end when ``rclpy.ok()`` is false. It raises no
-    KeyboardInterrupt: one in the middle of rclpy's conversion of a message becomes a RuntimeError.
+    The code is 0 where it is done, or was stopped by Ctrl-C, SIGTERM or a shutdown of its context. It is 2 where it
+    raises InputError, or ROS refuses its arguments; the log then holds one line. Ctrl-C shuts ROS down, as SIGTERM
+    does, and ``program`` must end when ``rclpy.ok()`` is false. There is no KeyboardInterrupt, because in the middle
+    of rclpy's conversion of a message one becomes a RuntimeError.
     """
-    signal.signal(signal.SIGINT, lambda *_: None)  # before ROS adds its own handler, which calls this one
+    signal.signal(signal.SIGINT, lambda *_: None)  # ROS's own handler, added next, calls this one
     try:
         rclpy.init()
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
@@ -39,7 +39,7 @@ def run_program(program: Callable[[], None]) -> int:
         pass
     except (rclpy_implementation.RCLError, rclpy_implementation.InvalidHandle, NotInitializedException):
         if rclpy.ok():
-            raise  # otherwise something was asked of ROS while it shut down
+            raise  # otherwise ROS was shutting down
     finally:
         rclpy.try_shutdown()
     return 0
@@ -53,7 +53,7 @@ def serve(node: Node) -> None:
     """
     executor = EventsExecutor()
     executor.add_node(node)
-    gc.freeze()  # modules stay: the collector need not go through them while messages wait
+    gc.freeze()  # modules stay, so that the collector need not scan them while messages wait
     try:
         while rclpy.ok():
             executor.spin_once(timeout_sec=0.1)
