@@ -21,8 +21,9 @@ from sysid_node.gap.flightdata.gap_flight import load_gap_flight
 from sysid_node.report.drawing.plotly_figure import plotly_figure
 from sysid_node.report.files.gap_folder import corrected_aircraft, write_gap
 from sysid_node.report.files.run_folder import REPORT
-from sysid_node.report.sections.gap import panels
+from sysid_node.report.sections.gap.flight import flight_figures
 from sysid_node.report.sections.gap.paragraph import paragraph
+from sysid_node.report.sections.gap.waterfall import waterfall
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -65,9 +66,9 @@ class GapDiagnosis:
         Raises InputError for any other word.
         """
         if what == "where":
-            return plotly_figure([("Where the gap lies", panels.waterfall(self.diagnosis))], columns=1)
+            return plotly_figure([("Where the gap lies", waterfall(self.diagnosis))], columns=1)
         if what == "flight":
-            return plotly_figure(panels.flight_figures(self.diagnosis), columns=2)
+            return plotly_figure(flight_figures(self.diagnosis), columns=2)
         raise InputError(f"plot {what!r}: expected 'where' or 'flight'")
 
     def to_pandas(self) -> Any:

@@ -184,6 +184,6 @@ def _summary(flight: Flight, final: Estimates, out: Path) -> str:
     what = "true value" if flight.truth else "aircraft file's value"
     return (
         f"{len(valid)} of {len(final.derivatives)} derivatives valid after {final.time:.0f} s of flight\n"
-        f"{inside} of these {len(valid)} intervals hold the {what}\n"
+        f"{inside} of these {len(valid)} intervals contain the {what}\n"
         f"report: {out / 'report.html'}"
     )

@@ -91,7 +91,7 @@ def test_optimising_lowers_the_error(tmp_path, capsys):
     found = json.loads((tmp_path / "best" / "summary.json").read_text())["optimisation"]
     assert found["left_best"] < found["left_start"]
     page = (tmp_path / "best" / "report.html").read_text()
-    assert "Start’s" in page
+    assert "Initial manoeuvre" in page
     assert found["start"] in page
     assert str(tmp_path / "best" / "report.html") in capsys.readouterr().out
 

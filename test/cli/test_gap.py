@@ -105,4 +105,4 @@ def test_the_corrected_model_can_be_exported(found: Path) -> None:
 
 def test_the_page_begins_with_words(found: Path) -> None:
     page = (found / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Begun anew every 2 s" in page and "imu bias" in page and "What is confused with what" in page
+    assert "restarted every 2 s" in page and "imu bias" in page and "Which effects this flight can distinguish" in page

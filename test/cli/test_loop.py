@@ -32,7 +32,7 @@ def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
     learning = {"node": "fault_monitor", "what": "learns what sound flight is like"}
     assert any(event | learning == event for event in summary["events"])
     assert all(count > 0 for count in summary["message_troubles"].values())
-    assert "What happened" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<h3>Events</h3>" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.report.pages.gap_page import write_gap_report
-from sysid_node.report.sections.gap.panels import candidates
+from sysid_node.report.sections.gap.candidates import candidates
 
 WRONG = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 

@@ -109,7 +109,10 @@ def write_loop(folder: Path, episode: Episode) -> None:
 
 def _context(episode: Episode) -> dict[str, Any]:
     flown = [_flown(episode, axis) for axis in episode.asked]
-    errors = [_figure(episode, f"{axis} error, deg", [(axis, values, BLUE)]) for axis, values in episode.errors.items()]
+    errors = [
+        _figure(episode, f"{axis}: tracking error, deg", [(axis, values, BLUE)])
+        for axis, values in episode.errors.items()
+    ]
     rows = [
         (name, [math.degrees(episode.rms(axis, start, stop)) for axis in episode.errors])
         for name, start, stop in episode.spans(10.0)
@@ -122,7 +125,9 @@ def _flown(episode: Episode, axis: str) -> Figure:
     asked = np.asarray(episode.asked[axis], dtype=float)
     flown = asked + np.asarray(episode.errors[axis], dtype=float)
     return _figure(
-        episode, f"{axis} flown, and asked for in grey, deg", [("flown", flown, BLUE), ("asked", asked, MUTED)]
+        episode,
+        f"{axis}: flown (blue) and commanded (grey), deg",
+        [("flown", flown, BLUE), ("commanded", asked, MUTED)],
     )
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.report.pages.render import render_page
-from sysid_node.report.sections.gap import panels as gap
-from sysid_node.report.sections.gap.paragraph import paragraph
+from sysid_node.report.sections.gap import candidates, flight, opening, shape, waterfall
 from sysid_node.report.sections.section import Section
 
 
@@ -17,16 +16,11 @@ def write_gap_report(path: Path, found: Diagnosis) -> None:
     path.write_text(render_page(title, SECTIONS, found), encoding="utf-8")
 
 
-def opening_text(found: Diagnosis) -> str:
-    """The paragraph that a pilot reads first."""
-    return paragraph(found)
-
-
 SECTIONS: tuple[Section[Diagnosis], ...] = (
-    Section("opening", "", "gap_opening.html.j2", gap.opening),
-    Section("channels", "How far off, before and after", "gap_channels.html.j2", gap.channels),
-    Section("where", "Where the gap lies", "gap_where.html.j2", gap.where),
-    Section("flight", "Measured and simulated", "gap_flight.html.j2", gap.flight),
-    Section("candidates", "What could cause it", "gap_candidates.html.j2", gap.candidates),
-    Section("shape", "The shape of what is missing", "gap_shape.html.j2", gap.shape),
+    Section("opening", "", "gap_opening.html.j2", opening.opening),
+    Section("channels", "Error before and after the correction", "gap_channels.html.j2", opening.channels),
+    Section("where", "Where the gap lies", "gap_where.html.j2", waterfall.where),
+    Section("flight", "Measured and simulated", "gap_flight.html.j2", flight.flight),
+    Section("candidates", "Possible causes", "gap_candidates.html.j2", candidates.candidates),
+    Section("shape", "Shape of the missing force or moment", "gap_shape.html.j2", shape.shape),
 )

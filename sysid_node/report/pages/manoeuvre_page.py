@@ -35,9 +35,7 @@ def _run(result: ManoeuvreResult) -> RunResult:
 SECTIONS: tuple[Section[ManoeuvreResult], ...] = (
     Section("opening", "", "manoeuvre_opening.html.j2", plan.opening),
     Section("manoeuvre", "The manoeuvre", "manoeuvre.html.j2", plan.context),
-    Section("prediction", "What it would tell", "prediction.html.j2", prediction.context),
-    Section("correlations", "What it would not tell apart", "correlations.html.j2", correlations.context),
-    Section(
-        "excitation", "The flight that it gives", "excitation.html.j2", lambda result: excitation.context(_run(result))
-    ),
+    Section("prediction", "Predicted standard errors", "prediction.html.j2", prediction.context),
+    Section("correlations", "Correlated derivatives", "correlations.html.j2", correlations.context),
+    Section("excitation", "Predicted flight", "excitation.html.j2", lambda result: excitation.context(_run(result))),
 )

@@ -19,11 +19,11 @@ from sysid_node.report.wording.numbers import listing, number, plural, seconds
 HANDLING = (
     (
         "Cm_alpha",
-        "disturbed in pitch, the aircraft tends back to trim",
-        "disturbed in pitch, the aircraft tends further away from trim",
+        "after a disturbance in pitch the aircraft tends back to trim",
+        "after a disturbance in pitch the aircraft tends further away from trim",
     ),
-    ("Cn_beta", "in a sideslip its nose turns away from the wind", "in a sideslip its nose turns into the wind"),
-    ("Cl_p", "a roll dies out once the ailerons are centred", "a roll speeds up even with the ailerons centred"),
+    ("Cn_beta", "in a sideslip the nose turns away from the wind", "in a sideslip the nose turns into the wind"),
+    ("Cl_p", "a roll decays once the ailerons are centred", "a roll speeds up even with the ailerons centred"),
 )
 
 
@@ -47,8 +47,8 @@ def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
     length = f"{seconds(run.data_seconds)} of flight" if math.isfinite(run.data_seconds) else "this flight"
     if not derivatives:
         return Markup(
-            "<strong>No derivative was estimated</strong> from {} of {}. The tables below say what arrived and "
-            "what was rejected."
+            "<strong>No derivative was estimated</strong> from {} of {}. The tables below list what was "
+            "received and what was rejected."
         ).format(length, run.aircraft)
     valid = sum(d.valid for d in derivatives)
     if not valid:
@@ -57,8 +57,8 @@ def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
         )
     share = f"all {len(derivatives)}" if valid == len(derivatives) else f"{valid} of {len(derivatives)}"
     return Markup(
-        "From {} of {}, <strong>{} derivatives are known well enough to use</strong>, each with an interval "
-        "meant to hold its true value 95 times in 100."
+        "From {} of {}, <strong>{} derivatives are known well enough to use</strong>. Each has "
+        "an interval that contains its true value with 95 % confidence."
     ).format(length, run.aircraft, share)
 
 
@@ -73,7 +73,7 @@ def _handling(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | N
     if not clauses:
         return None
     text = Markup("; ").join(clauses)
-    return Markup("They say: {}.").format(text)
+    return Markup("In the air this means: {}.").format(text)
 
 
 def _best(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
@@ -81,7 +81,7 @@ def _best(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
     if not ranked:
         return None
     relative, best = ranked[0]
-    return Markup("Best known is {} ({}), to ±{}\u202f%.").format(
+    return Markup("The most accurate is {} ({}), within ±{}\u202f%.").format(
         symbol(best.name), short_meaning(best.name), number(100 * relative, 2)
     )
 
@@ -94,7 +94,7 @@ def _unknown(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | No
     if not by_status:
         return None
     reasons = [Markup("{} ({})").format(listing(names), words) for words, names in by_status.items()]
-    return Markup("<strong>Not to be used</strong>: {}.").format(Markup("; ").join(reasons))
+    return Markup("<strong>Do not use</strong> {}.").format(Markup("; ").join(reasons))
 
 
 def _against_truth(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
@@ -102,7 +102,9 @@ def _against_truth(run: RunResult, derivatives: list[DerivativeEstimate]) -> Mar
     if not checked:
         return None
     held = sum(covers(d, run.truth[d.name]) for d in checked)
-    return Markup("The true values are known here: {} of {} usable intervals hold theirs.").format(held, len(checked))
+    return Markup("The true values are known for this flight: {} of {} valid intervals contain theirs.").format(
+        held, len(checked)
+    )
 
 
 def _against_prior(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
@@ -111,11 +113,13 @@ def _against_prior(run: RunResult, derivatives: list[DerivativeEstimate]) -> Mar
         return None
     differing = [d for d in checked if not agrees(d, run.prior[d.name])]
     if not differing:
-        return Markup("None differs from the aircraft file by more than the uncertainties allow.")
+        return Markup("No estimate differs from the aircraft file by more than the two uncertainties explain.")
     clauses = [
         Markup("{} is {}").format(symbol(d.name), _difference(d.value, run.prior[d.name].value)) for d in differing
     ]
-    return Markup("Against the aircraft file, by more than the uncertainties allow: {}.").format(listing(clauses))
+    return Markup("These differ from the aircraft file by more than the two uncertainties explain: {}.").format(
+        listing(clauses)
+    )
 
 
 def _difference(value: float, prior: float) -> str:

@@ -20,4 +20,4 @@ def _split(key: str) -> tuple[str, str]:
     return (topic, reason) if separator else ("", key)
 
 
-SECTION: Section[RunResult] = Section("rejected", "What was rejected", "rejected.html.j2", context)
+SECTION: Section[RunResult] = Section("rejected", "Rejected messages", "rejected.html.j2", context)

@@ -1,4 +1,4 @@
-"""What the model leaves unexplained, by frequency."""
+"""The spectra of the residuals: what the model does not explain, by frequency."""
 
 from __future__ import annotations
 
@@ -41,4 +41,4 @@ def _figure(spectra: Spectra, name: str) -> Figure:
     return Figure(f"Amplitude spectrum of the residual of {name}", traces, layout, height=200)
 
 
-SECTION: Section[RunResult] = Section("residuals", "What the model leaves", "residuals.html.j2", context)
+SECTION: Section[RunResult] = Section("residuals", "Residuals", "residuals.html.j2", context)

@@ -28,7 +28,7 @@ REGRESSOR_WORDS = {
     "dr": "rudder",
 }
 
-#: What the field calls the derivatives that have a name of their own.
+#: Common names of derivatives.
 NICKNAMES = {
     "CL_alpha": "lift slope",
     "CD_k": "induced drag",
@@ -44,15 +44,15 @@ NICKNAMES = {
     "Cn_dr": "rudder power",
 }
 
-#: What a status means to who flies: start of the status -> words.
+#: What a status means: start of the status -> words for a pilot.
 STATUS_WORDS = {
-    "not excited": "not moved enough in this flight",
-    "collinear": "moved together with another, so they cannot be told apart",
-    "converging": "not settled yet: more flying needed",
-    "stale input": "a sensor was silent",
+    "not excited": "not excited enough in this flight",
+    "collinear": "collinear with another, so that the two cannot be distinguished",
+    "converging": "not settled yet; more flying is needed",
+    "stale input": "a sensor sent no data",
     "outside model": "flown where the model does not hold",
-    "contradicted": "contradicted by the last seconds",
-    "changed": "changed in flight, being learned anew",
+    "contradicted": "contradicted by the last seconds of the flight",
+    "changed": "changed in flight and being estimated anew",
 }
 
 METHOD_WORDS = {

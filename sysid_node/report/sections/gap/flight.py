@@ -1,0 +1,106 @@
+"""The flight as measured, as simulated with the aircraft file, and as simulated with the correction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.estimation.predictive_density import transferred_parameters
+from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, can_be_simulated, side_by_side
+from sysid_node.report.drawing import figures
+from sysid_node.report.drawing.figures import BLUE, PALE, VERMILION, Figure
+from sysid_node.report.drawing.thinning import thin_curve
+from sysid_node.report.sections.gap.names import WORDS
+from sysid_node.report.wording.names import symbol
+from sysid_node.sim.model.layout import OUTPUTS
+from sysid_node.sim.model.prediction import COEFFICIENTS
+
+#: Flight that is drawn at most, s: where the simulator of the file is furthest off.
+_DRAWN = 24.0
+
+#: How much smaller the error of a reading must have become for it to be drawn beside forces and moments.
+_MENDED = 1.3
+
+_UNITS = {**dict.fromkeys(("ax", "ay", "az"), "m/s²"), **dict.fromkeys("pqr", "rad/s"), "V": "m/s"}
+
+_UNITS |= dict.fromkeys(("phi", "theta", "alpha", "beta"), "rad")
+
+_GREEK = {"phi": "φ", "theta": "θ", "psi": "ψ", "alpha": "α", "beta": "β"}
+
+Panel = tuple[Any, str, Figure]
+
+
+def flight(found: Diagnosis) -> Mapping[str, Any]:
+    """Measured, as the file has it, and as corrected: short flights where there are any, else forces and moments."""
+    panels = _short_flights(found) if found.simulation_gap else _coefficients(found)
+    return {
+        "panels": panels,
+        "held_out": found.held_out,
+        "short": bool(found.simulation_gap),
+        "window": f"{WINDOW:g} s",
+    }
+
+
+def flight_figures(found: Diagnosis) -> list[tuple[str, Figure]]:
+    """The flight's figures, each under its symbol and meaning."""
+    return [(f"{sign}, {words}", figure) for sign, words, figure in flight(found)["panels"]]
+
+
+def _short_flights(found: Diagnosis) -> list[Panel]:
+    """The readings that moved, each short flight a line of its own."""
+    place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
+    record = side_by_side(found.models[place], found.check.final.flights[place].points)
+    span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
+    begins = record.begins[span].copy()
+    panels = []
+    for name in found.size.per_channel:
+        k = OUTPUTS.index(name)
+        before, after = (series[span, k].copy() for series in (record.before, record.after))
+        before[begins], after[begins] = np.nan, np.nan  # a line ends where the simulator begins anew
+        panels.append(_panel(name, record.time[span], record.measured[span, k], before, after, _UNITS.get(name, "")))
+    return panels
+
+
+def _worst(time: Array, error: Array) -> slice:
+    """The part of the flight that is drawn: where errors (N, R), over their size in the whole flight, are largest."""
+    size = int(np.searchsorted(time - time[0], _DRAWN))
+    if size >= time.size:
+        return slice(None)
+    power = np.cumsum((error**2 / np.maximum((error**2).mean(axis=0), 1e-300)).sum(axis=1))
+    first = int(np.argmax(power[size:] - power[:-size]))
+    return slice(first, first + size)
+
+
+def _coefficients(found: Diagnosis) -> list[Panel]:
+    """Coefficients, constant offsets removed, and readings that the causes mend."""
+    model, gaps = found.models[0], found.gap.per_channel
+    point = transferred_parameters(found.attribution.corrected, model)
+    before, after = model.predicted_series(model.simulator.neutral()), model.predicted_series(point)
+    mended = [name in gaps and gaps[name]["before"] > _MENDED * gaps[name]["after"] for name in CHANNELS]
+    force = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
+    panels = []
+    for k in np.flatnonzero(model.axes & (force | mended)):
+        shown = [x[:, k] - force[k] * (x[:, k].mean() - model.series[:, k].mean()) for x in (before, after)]
+        panels.append(_panel(CHANNELS[k], model.record.time, model.series[:, k], *shown))
+    return panels
+
+
+def _panel(name: str, time: Array, measured: Array, before: Array, after: Array, unit: str = "") -> Panel:
+    time, *curves = thin_curve(time, measured, before, after)
+    styles = (("measured", PALE, "solid", 4.5), ("file", VERMILION, "solid", 1.2), ("corrected", BLUE, "solid", 1.4))
+    traces = [
+        figures.line(time, c, n, colour=colour, dash=dash, width=width)
+        for c, (n, colour, dash, width) in zip(curves, styles, strict=True)
+    ]
+    sign = _GREEK.get(name, name)
+    layout = {"xaxis": figures.axis("time, s"), "yaxis": figures.axis(f"{sign}, {unit}" if unit else sign)}
+    return (
+        symbol(name) if name in COEFFICIENTS else sign,
+        WORDS[name],
+        Figure(f"{WORDS[name]}: measured and simulated", traces, layout),
+    )

@@ -1,0 +1,55 @@
+"""The opening of a gap's report: the paragraph, the size of the gap, and its table by channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.gap.validation.spectral_error import STAGES
+from sysid_node.report.sections.gap.names import WORDS, percent
+from sysid_node.report.sections.gap.paragraph import paragraph
+from sysid_node.report.wording.names import words_of
+from sysid_node.report.wording.numbers import number
+
+#: Of a gap's errors.
+_STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
+
+
+def opening(found: Diagnosis) -> Mapping[str, Any]:
+    """The paragraph and the figures beside it."""
+    gap = found.size
+    low, high = gap.ci95
+    facts = [
+        ("Verdict", words_of(found.verdict)),
+        *((words, percent(getattr(gap, stage))) for words, stage in zip(_STAGE_WORDS, STAGES, strict=True)),
+        ("Closed", f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)})"),
+    ]
+    return {
+        "text": paragraph(found),
+        "facts": facts,
+        "next_flight": found.next_flight,
+        "short": bool(found.simulation_gap),
+        "window": f"{WINDOW:g} s" if found.simulation_gap else f"{found.models[0].windows.length:.2g} s",
+    }
+
+
+def channels(found: Diagnosis) -> Mapping[str, Any]:
+    """The gap of each channel before and after, beside its noise floor, and of all together with its intervals."""
+    gap = found.size
+    rows = [(WORDS[name], *(percent(c[stage]) for stage in STAGES)) for name, c in gap.per_channel.items()]
+    whole = ("all together", *(percent(getattr(gap, stage)) for stage in STAGES))
+    ends = ("95 % interval", *(_between(gap.intervals[stage]) for stage in STAGES))
+    return {
+        "rows": rows,
+        "whole": [whole, ends],
+        "held_out": found.held_out,
+        "short": bool(found.simulation_gap),
+        "window": f"{WINDOW:g} s",
+    }
+
+
+def _between(ends: tuple[float, float]) -> str:
+    """``12 to 15 %``."""
+    return f"{number(100.0 * ends[0], 2)} to {percent(ends[1])}"

@@ -1,0 +1,73 @@
+"""Where the gap lies: by station and axis, from the whole down to the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.verdict.localisation import REGIMES
+from sysid_node.report.drawing import figures
+from sysid_node.report.drawing.figures import BLUE, GREEN, INK, MUTED, PURPLE, VERMILION, Figure
+from sysid_node.report.sections.gap.names import WORDS, percent, signal_words
+from sysid_node.report.wording.numbers import number
+
+#: Steps of the waterfall before the rest.
+_STEPS = 7
+
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, "#E69F00", "#56B4E9", "#CC79A7", "#999999")
+
+
+def where(found: Diagnosis) -> Mapping[str, Any]:
+    """The waterfall by station and axis, and a table of the largest steps."""
+    rows = [
+        (w["station"], WORDS[w["axis"]], percent(w["share"]),
+         "{} to {} Hz".format(*(number(x, 2) for x in w["band_hz"])),
+         "{} to {} s".format(*(number(x, 3) for x in w["window_s"])),
+         ", ".join(_span(name, *ends) for name, ends in w["regime"].items()))
+        for w in found.where[:8]
+    ]  # fmt: skip
+    return {"figure": waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect"}
+
+
+def _span(name: str, low: float, high: float) -> str:
+    """``roll rate −1.1 to 1.8 rad/s``."""
+    return f"{signal_words(name)} {number(low, 2)} to {number(high, 2)} {REGIMES.get(name, 'rad')}"
+
+
+def waterfall(found: Diagnosis) -> Figure:
+    """From all of the gap down to what noise leaves."""
+    steps = _steps_down(found)
+    stations = list(dict.fromkeys(station for station, _, _ in steps))
+    colours = dict(zip(stations, _COLOURS, strict=False)) | {"noise": MUTED, "unexplained": INK}
+    traces, left = [], 100.0
+    for station, words, share in steps:
+        left -= share
+        traces.append(
+            {
+                "type": "bar",
+                "x": [words],
+                "y": [share],
+                "base": [max(left, 0.0)],
+                "text": [percent(share / 100.0)],
+                "textposition": "outside",
+                "cliponaxis": False,
+                "marker": {"color": colours.get(station, MUTED)},
+                "hovertemplate": f"{station}, %{{x}}: %{{y:.1f}} %<extra></extra>",
+            }
+        )
+    layout = {
+        "barmode": "overlay",
+        "xaxis": figures.axis("", type="category", tickangle=0, nticks=0),
+        "yaxis": figures.axis("of the gap's power, %", range=[0, 112]),
+    }
+    return Figure("The gap by station and axis, down to what noise leaves", traces, layout, 340)
+
+
+def _steps_down(found: Diagnosis) -> list[tuple[str, str, float]]:
+    """Station, label and percentage of each step: the largest by axis, the rest of all, then noise."""
+    caused = [w for w in found.where if w["station"] != "noise"]
+    steps = [(w["station"], f"{w['station']}<br>{WORDS[w['axis']]}", 100.0 * w["share"]) for w in caused[:_STEPS]]
+    rest = 100.0 * sum(w["share"] for w in caused[_STEPS:])
+    noise = 100.0 * sum(w["share"] for w in found.where if w["station"] == "noise")
+    return [*steps, *([("the rest", "the rest", rest)] if rest > 0.0 else []), ("noise", "noise", noise)]
