@@ -13,7 +13,7 @@ from rich.live import Live
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.live.live_table import Moment, Reference, live_table
+from sysid_node.cli.live.live_table import LiveStatus, ReferenceValues, live_table
 from sysid_node.cli.live.processes import node_process
 from sysid_node.cli.live.ros_domain import make_folder, own_domain
 from sysid_node.errors import InputError
@@ -45,7 +45,7 @@ RELIABLE = [
 
 
 @dataclass(frozen=True)
-class Flight:
+class DemoFlight:
     """What is played, and what is believed and true of the aircraft."""
 
     bag: Path
@@ -60,11 +60,11 @@ class Flight:
         return int(self.aligned.stamps[0]) - round(1e9 * float(self.aligned.time[0]))
 
     @property
-    def reference(self) -> Reference:
+    def reference(self) -> ReferenceValues:
         """The truth where it is known, else the aircraft file."""
         if self.truth:
-            return Reference("true", self.truth)
-        return Reference("file", {name: d.value for name, d in self.aircraft.derivatives.items()})
+            return ReferenceValues("true", self.truth)
+        return ReferenceValues("file", {name: d.value for name, d in self.aircraft.derivatives.items()})
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -102,15 +102,15 @@ def run(args: argparse.Namespace) -> None:
         print(f"{lost} messages were lost on the way; a lower --rate loses fewer")
 
 
-def _read(bag: Path, aircraft: Aircraft) -> Flight:
+def _read(bag: Path, aircraft: Aircraft) -> DemoFlight:
     streams = read_streams(bag)
     aligned = align_streams(aircraft, streams, Settings().max_gap)
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
-    return Flight(bag, aircraft, streams, aligned, read_truth(bag))
+    return DemoFlight(bag, aircraft, streams, aligned, read_truth(bag))
 
 
-def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[Follower, list[Estimates]]:
+def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Follower, list[Estimates]]:
     """Run player and identifier in processes of their own, and show what comes until the flight is over.
 
     Returns who listened, and the estimates over time.
@@ -138,7 +138,7 @@ def _fly(flight: Flight, aircraft: str, rate: float, out: Path) -> tuple[Followe
 
 
 def _watch(
-    flight: Flight, follower: Follower, identifying: subprocess.Popen[bytes], playing: subprocess.Popen[bytes]
+    flight: DemoFlight, follower: Follower, identifying: subprocess.Popen[bytes], playing: subprocess.Popen[bytes]
 ) -> None:
     """Show the live table until the flight is over, or one of the nodes is."""
     console = Console()
@@ -151,9 +151,9 @@ def _watch(
     console.print()
 
 
-def _picture(flight: Flight, follower: Follower, width: int, height: int | None = None) -> RenderableType:
+def _picture(flight: DemoFlight, follower: Follower, width: int, height: int | None = None) -> RenderableType:
     rates = [(topic, follower.word("input", f"{topic}: rate (Hz)")) for topic in INPUT_TOPICS]
-    moment = Moment(
+    moment = LiveStatus(
         title=f"{flight.aircraft.name}, {flight.bag.name}",
         seconds=follower.history[-1].time if follower.history else 0.0,
         duration=float(flight.aligned.time[-1]),
@@ -170,13 +170,13 @@ def _rejected(follower: Follower) -> dict[str, int]:
     return {pair.key.removeprefix(prefix): int(pair.value) for pair in values if pair.key.startswith(prefix)}
 
 
-def _lost(flight: Flight, follower: Follower) -> int:
+def _lost(flight: DemoFlight, follower: Follower) -> int:
     """Messages that the player sent and the identifier did not receive."""
     sent = sum(len(stream.arrival) for stream in flight.streams.by_topic.values())
     return sent - sum(int(follower.word("input", f"{topic}: received") or 0) for topic in INPUT_TOPICS)
 
 
-def _summary(flight: Flight, final: Estimates, out: Path) -> str:
+def _summary(flight: DemoFlight, final: Estimates, out: Path) -> str:
     """How it went, in three lines."""
     valid = [d for d in final.derivatives.values() if d.valid]
     expected = flight.reference.values

@@ -44,5 +44,5 @@ def run(args: argparse.Namespace) -> None:
         found = identify(flights, args.method, settings, holdout=holdout, progress=progress)
         report = found.save(args.out)
     if not args.quiet:
-        show_estimates(found.run.history[-1], found.run.truth)
+        show_estimates(found.run.history[-1], found.run.references.truth)
         print(report)

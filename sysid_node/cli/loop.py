@@ -26,7 +26,7 @@ from sysid_node.cli.live.processes import node_process
 from sysid_node.cli.live.ros_domain import make_folder, own_domain
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
-from sysid_node.report.pages.closed_loop_page import Episode, Event, write_loop
+from sysid_node.report.pages.closed_loop_page import ClosedLoopFlight, Event, write_loop
 
 if TYPE_CHECKING:
     from sysid_node.ros.support.loop_watch import LoopWatch
@@ -48,7 +48,7 @@ NODES: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Plan:
+class LoopScenario:
     """What is flown."""
 
     aircraft: Aircraft
@@ -82,13 +82,15 @@ def run(args: argparse.Namespace) -> None:
     aircraft = load_aircraft(args.aircraft)
     make_folder(args.out)
     own_domain()
-    plan = Plan(aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.method, args.out)
+    plan = LoopScenario(
+        aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.method, args.out
+    )
     episode = _fly(plan)
     write_loop(args.out, episode)
     print(_summary(plan, episode))
 
 
-def _fly(plan: Plan) -> Episode:
+def _fly(plan: LoopScenario) -> ClosedLoopFlight:
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
 
     from sysid_node.ros.support.loop_watch import LoopWatch  # noqa: PLC0415
@@ -107,12 +109,12 @@ def _fly(plan: Plan) -> Episode:
     errors = {axis: [row[f"{axis} error"] for _, row in watch.tracking] for axis in ("pitch", "roll", "sideslip")}
     asked = {axis: [row[axis] for _, row in watch.tracking] for axis in ("pitch", "roll")}
     estimates = dict(watch.estimates.derivatives) if watch.estimates else {}
-    return Episode(
+    return ClosedLoopFlight(
         plan.aircraft.name, plan.fail, ONSET, plan.adapt, times, errors, asked, estimates, events, watch.troubles()
     )
 
 
-def _check_effects(plan: Plan) -> None:
+def _check_effects(plan: LoopScenario) -> None:
     """Raise InputError on effects that the simulator would refuse half a minute later."""
     from sysid_node.sim import Simulator  # noqa: PLC0415  # JAX takes its time
     from sysid_node.sim.flying import live  # noqa: PLC0415  # JAX takes its time
@@ -120,11 +122,11 @@ def _check_effects(plan: Plan) -> None:
     live.vector(Simulator(plan.aircraft), _effects(plan, failed=True).split())
 
 
-def _effects(plan: Plan, failed: bool) -> str:
+def _effects(plan: LoopScenario, failed: bool) -> str:
     return f"{ACTUATORS} {plan.fail}" if failed and plan.fail else ACTUATORS
 
 
-def _arguments(plan: Plan, name: str) -> list[str]:
+def _arguments(plan: LoopScenario, name: str) -> list[str]:
     """What a node is started with."""
     own = [f"aircraft:={plan.name}", *NODES[name]]
     if name == "flight_simulator":
@@ -136,7 +138,7 @@ def _arguments(plan: Plan, name: str) -> list[str]:
     return ["--ros-args", *(word for pair in own for word in ("-p", pair))]
 
 
-def _watch(plan: Plan, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[Event]:
+def _watch(plan: LoopScenario, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[Event]:
     """Ask for set-points, begin excitation, let something fail, show it all; returns what happened when."""
     console = Console()
     events: list[Event] = []
@@ -178,7 +180,7 @@ def set_points(time: float) -> dict[str, float]:
     return {"roll": roll, "pitch": pitch}
 
 
-def _picture(plan: Plan, watch: LoopWatch) -> RenderableType:
+def _picture(plan: LoopScenario, watch: LoopWatch) -> RenderableType:
     """What the terminal shows."""
     table = Table(box=None, padding=(0, 1), header_style="bold")
     for heading in ("derivative", "file", "estimate", "95 % interval", "status"):
@@ -207,7 +209,7 @@ def _rms(rows: Sequence[tuple[float, Mapping[str, float]]], axis: str) -> float:
     return math.degrees(math.sqrt(sum(v * v for v in values) / len(values))) if values else math.nan
 
 
-def _summary(plan: Plan, episode: Episode) -> str:
+def _summary(plan: LoopScenario, episode: ClosedLoopFlight) -> str:
     """How it went, in three lines."""
     (plan.out / "summary.json").write_text(json.dumps(episode.summary(), indent=2) + "\n", encoding="utf-8")
     lines = [f"{'adaptive' if plan.adapt else 'fixed'} gains; tracking error (pitch, roll), rms:"]

@@ -10,7 +10,7 @@ import argparse
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from typing import NoReturn
@@ -45,27 +45,35 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = next((word for word in arguments if not word.startswith("-")), "")
-    debug = "--debug" in arguments
+    return exit_code(command, lambda: _run(command, arguments), debug="--debug" in arguments)
+
+
+def _run(command: str, arguments: Sequence[str]) -> int:
+    _one_thread_for_linear_algebra()  # before the command's module imports NumPy
+    parser = build_parser(command)
+    args = parser.parse_args(arguments)
+    if not args.command:
+        parser.print_help()
+        return BAD_INPUT
+    import_module(f"sysid_node.cli.{command}").run(args)
+    return DONE
+
+
+def exit_code(command: str, work: Callable[[], int], *, debug: bool = False) -> int:
+    """The exit code of ``work``; an error becomes one line on stderr, after its traceback where ``debug``."""
     try:
-        _one_thread_for_linear_algebra()  # before the command's own module brings NumPy
-        parser = build_parser(command)
-        args = parser.parse_args(arguments)
-        if not args.command:
-            parser.print_help()
-            return BAD_INPUT
-        import_module(f"sysid_node.cli.{command}").run(args)
+        return work()
     except KeyboardInterrupt:
         return _say(command, "interrupted", INTERRUPTED)
-    except BrokenPipeError:  # whoever read our output has left; Python must not complain of it at exit
+    except BrokenPipeError:  # the reader of our output has ended; Python must not complain about it at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
-    except Exception as error:  # every command's last resort: one line for the user, the traceback on request
+    except Exception as error:  # whatever else goes wrong is one line for the user
         if debug:
             traceback.print_exc()
         if isinstance(error, InputError):
             return _say(command, str(error), BAD_INPUT)
         return _say(command, f"failed: {type(error).__name__}: {error} (more with --debug)", FAILED)
-    return DONE
 
 
 def build_parser(command: str) -> Parser:
@@ -75,7 +83,7 @@ def build_parser(command: str) -> Parser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, meaning in COMMANDS.items():
         if find_spec(f"sysid_node.cli.{name}") is None:
-            continue  # of a layer that is not installed
+            continue  # this command belongs to a layer that is not installed
         if name == command:
             one = import_module(f"sysid_node.cli.{name}").add_parser(commands)
             one.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
@@ -85,15 +93,16 @@ def build_parser(command: str) -> Parser:
 
 
 def _one_thread_for_linear_algebra() -> None:
-    """Unless the environment says otherwise; before NumPy is imported.
+    """Let BLAS use one thread unless the environment says otherwise; it reads this when NumPy is imported.
 
-    Matrices are small and commands have threads of their own: with BLAS's beside them ``sysid gap`` took 34 s for 29.
+    The matrices are small, and the commands use threads themselves: with the threads of BLAS in addition,
+    ``sysid gap`` took 34 s instead of 29 s.
     """
     if "OMP_NUM_THREADS" not in os.environ:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _say(command: str, message: str, code: int) -> int:
-    """One line on stderr, whatever the message holds."""
+    """The code, after the message as one line on stderr."""
     print(f"sysid {command}: {' '.join(message.split())}", file=sys.stderr)
     return code

@@ -7,18 +7,17 @@ from importlib.util import find_spec
 
 import pytest
 
-from sysid_node.cli import convert
-from sysid_node.cli.main import COMMANDS, main
+from sysid_node.cli.main import COMMANDS, exit_code, main
 from sysid_node.errors import InputError
 
 CONVERT = ["convert", "log.csv", "--out", "bag"]
 
 
 def raising(error):
-    def run(_):
+    def work():
         raise error
 
-    return run
+    return work
 
 
 def said(capsys) -> str:
@@ -41,22 +40,20 @@ def said(capsys) -> str:
         ),
     ],
 )
-def test_errors_are_one_line_and_a_code(monkeypatch, capsys, error, code, line):
-    monkeypatch.setattr(convert, "run", raising(error))
-    assert main(CONVERT) == code
+def test_errors_are_one_line_and_a_code(capsys, error, code, line):
+    assert exit_code("convert", raising(error)) == code
     assert said(capsys) == line
 
 
 @pytest.mark.parametrize("arguments", [["--debug", *CONVERT], [*CONVERT, "--debug"]])
-def test_debug_shows_the_traceback(monkeypatch, capsys, arguments):
-    monkeypatch.setattr(convert, "run", raising(InputError("no")))
+def test_debug_shows_the_traceback(capsys, arguments):
+    """There is no log.csv."""
     assert main(arguments) == 2
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_done_is_zero(monkeypatch):
-    monkeypatch.setattr(convert, "run", lambda _: None)
-    assert main(CONVERT) == 0
+def test_done_is_zero():
+    assert exit_code("convert", lambda: 0) == 0
 
 
 @pytest.mark.parametrize(
@@ -108,10 +105,9 @@ def test_every_command_has_help(command, capsys):
 
 def test_a_reader_that_leaves_is_no_error():
     code = (
-        "import sys; from sysid_node.cli import convert, main\n"
-        "def run(_):\n    print('x' * 10**6)\n    sys.stdout.flush()\n"
-        "convert.run = run\n"
-        "sys.exit(main.main(['convert', 'a', '--out', 'b']))"
+        "import sys; from sysid_node.cli.main import exit_code\n"
+        "def work():\n    print('x' * 10**6)\n    sys.stdout.flush()\n    return 0\n"
+        "sys.exit(exit_code('convert', work))"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.close()

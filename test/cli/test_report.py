@@ -5,13 +5,15 @@ import pytest
 from sysid_node.cli.main import main
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.files.run_folder import write_run
-from sysid_node.report.results.run_result import Prior, RunResult
+from sysid_node.report.results.run_result import Prior, References, RunResult
 
 
 @pytest.fixture
 def folder(tmp_path):
     d = DerivativeEstimate("Cm_q", -1.3, 0.1, -1.5, -1.1, True, "ok")
-    run = RunResult("kestrel", "sls_rft", [Estimates(9.0, {"Cm_q": d}, {})], prior={"Cm_q": Prior(-1.2, 0.3)})
+    run = RunResult(
+        "kestrel", "sls_rft", [Estimates(9.0, {"Cm_q": d}, {})], references=References({"Cm_q": Prior(-1.2, 0.3)})
+    )
     write_run(tmp_path, run)
     return tmp_path
 

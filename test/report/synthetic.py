@@ -4,7 +4,8 @@ import numpy as np
 
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.report.results.run_result import Prior, Response, RunResult, Spectra
+from sysid_node.report.results.run_result import Prior, References, RunData, RunResult
+from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
 TRUTH = {
     **{"CL_0": 0.05, "CL_alpha": 3.0, "CL_q": 4.0, "CL_de": 1.1},
@@ -28,15 +29,16 @@ def run(seconds: float = 60.0, rate: float = 100.0, publish_rate: float = 5.0) -
         aircraft="synthetic",
         method="sls_rft",
         history=_history(random, times, rate),
-        data_seconds=seconds,
-        samples=len(flight),
+        data=RunData(
+            seconds,
+            len(flight),
+            {"air_data: not finite": 12, "imu/data: duplicate stamp": 3, "actuators: out of order": 1},
+        ),
         settings={"frequencies": (0.1, 0.04, 2.0), "method": "sls_rft", "forgetting_time": 0.0, "use_prior": False},
-        prior={name: Prior(1.1 * value + 0.002, 0.12 * abs(value) + 0.001) for name, value in TRUTH.items()},
-        truth=TRUTH,
-        flight=flight,
-        spectra=_spectra(random),
-        responses={name: _response(random, seconds) for name in ("CL", "Cm")},
-        rejected={"air_data: not finite": 12, "imu/data: duplicate stamp": 3, "actuators: out of order": 1},
+        references=References(
+            {name: Prior(1.1 * value + 0.002, 0.12 * abs(value) + 0.001) for name, value in TRUTH.items()}, TRUTH
+        ),
+        signals=RunSignals(flight, _spectra(random), {name: _response(random, seconds) for name in ("CL", "Cm")}),
         holdout={"second flight": {"Cm": {"r_squared": 0.97, "theil": 0.08}, "CL": {"r_squared": 0.99, "theil": 0.05}}},
         remarks=["All numbers of this page are synthetic."],
     )

@@ -20,7 +20,7 @@ TURN = 3.0  # s of flight for which each half is shown where there is no room fo
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceValues:
     """What the estimates are compared with: the truth of a simulated flight, or the aircraft file's values."""
 
     label: str  # heading of the column: "true" or "file"
@@ -28,7 +28,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Moment:
+class LiveStatus:
     """What the table shows at one time."""
 
     title: str
@@ -39,7 +39,7 @@ class Moment:
 
 
 def live_table(
-    moment: Moment, names: Sequence[str], reference: Reference, width: int, height: int | None = None
+    moment: LiveStatus, names: Sequence[str], reference: ReferenceValues, width: int, height: int | None = None
 ) -> RenderableType:
     """The whole picture for a terminal ``width`` columns wide.
 
@@ -57,7 +57,7 @@ def live_table(
     return Group(_headline(moment), *tables)
 
 
-def _headline(moment: Moment) -> RenderableType:
+def _headline(moment: LiveStatus) -> RenderableType:
     derivatives = moment.estimates.derivatives.values() if moment.estimates else ()
     valid = sum(d.valid for d in derivatives)
     line = Table.grid(padding=(0, 2))
@@ -70,7 +70,7 @@ def _headline(moment: Moment) -> RenderableType:
     return Group(line, Text(moment.remark, style="dim"))
 
 
-def _table(names: Sequence[str], known: Mapping[str, DerivativeEstimate], reference: Reference) -> Table:
+def _table(names: Sequence[str], known: Mapping[str, DerivativeEstimate], reference: ReferenceValues) -> Table:
     table = Table(box=None, padding=(0, 1), header_style="bold")
     table.add_column("derivative", min_width=10)
     for heading in ("estimate", "95 % interval", reference.label):

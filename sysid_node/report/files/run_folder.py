@@ -16,7 +16,8 @@ from sysid_node.report.drawing.thinning import MAX_ROWS, thin_curve, thin_flight
 from sysid_node.report.files import run_tables as tables
 from sysid_node.report.files.fault_summary import as_summary, from_summary
 from sysid_node.report.pages.run_page import write_report
-from sysid_node.report.results.run_result import Response, RunResult
+from sysid_node.report.results.run_result import References, RunData, RunResult
+from sysid_node.report.results.signals import Response, RunSignals
 
 SUMMARY = "summary.json"
 REPORT = "report.html"
@@ -48,26 +49,23 @@ def rebuild_report(folder: Path) -> Path:
 def read_run(folder: Path) -> RunResult:
     """The run that ``write_run`` wrote. Raises InputError naming the file where something is missing or wrong."""
     found = _read_summary(folder / SUMMARY)
-    prior, truth, since = tables.read_references(folder / "derivatives.csv")
     return RunResult(
         aircraft=found["aircraft"],
         method=found["method"],
         history=tables.read_history(folder / "estimates.csv", folder / "fits.csv"),
         title=found.get("title", ""),
-        data_seconds=_from_json(found.get("data_seconds")),
-        samples=found.get("samples", 0),
+        data=RunData(_from_json(found.get("data_seconds")), found.get("samples", 0), found.get("rejected", {})),
         settings=found.get("settings", {}),
-        prior=prior,
-        truth=truth,
-        truth_since=since,
-        flight=tables.read_signals(folder / "signals.csv"),
-        spectra=tables.read_spectra(folder / "spectra.csv"),
-        responses=tables.read_responses(folder / "responses.csv"),
-        rejected=found.get("rejected", {}),
+        references=tables.read_references(folder / "derivatives.csv"),
+        signals=RunSignals(
+            tables.read_signals(folder / "signals.csv"),
+            tables.read_spectra(folder / "spectra.csv"),
+            tables.read_responses(folder / "responses.csv"),
+            found.get("response_note", ""),
+        ),
         holdout=_from_json(found.get("holdout", {})),
         faults=from_summary(found.get("faults")),
         remarks=found.get("remarks", []),
-        response_note=found.get("response_note", ""),
     )
 
 
@@ -78,16 +76,16 @@ def summary(run: RunResult) -> dict[str, Any]:
         "aircraft": run.aircraft,
         "method": run.method,
         "title": run.title,
-        "data_seconds": run.data_seconds,
-        "samples": run.samples,
-        "rejected": run.rejected,
+        "data_seconds": run.data.seconds,
+        "samples": run.data.samples,
+        "rejected": run.data.rejected,
         "settings": run.settings,
         "derivatives": {name: _without(d._asdict(), "name") for name, d in final.derivatives.items()},
         "fits": {name: _without(f._asdict(), "coefficient") for name, f in final.fits.items()},
         "holdout": run.holdout,
         "faults": as_summary(run.faults),
         "remarks": list(run.remarks),
-        "response_note": run.response_note,
+        "response_note": run.signals.response_note,
     }
     plain: dict[str, Any] = _to_json(content)
     return plain
@@ -99,11 +97,16 @@ def _stored(run: RunResult) -> RunResult:
     return replace(
         run,
         history=[e for e in run.history if e.derivatives or e.fits],
-        prior={name: prior for name, prior in run.prior.items() if name in known},
-        truth={name: value for name, value in run.truth.items() if name in known},
-        truth_since={name: time for name, time in run.truth_since.items() if name in known},
-        flight=thin_flight(run.flight) if run.flight else None,
-        responses={name: _thin_response(response) for name, response in run.responses.items()},
+        references=References(
+            {name: prior for name, prior in run.references.prior.items() if name in known},
+            {name: value for name, value in run.references.truth.items() if name in known},
+            {name: time for name, time in run.references.truth_since.items() if name in known},
+        ),
+        signals=replace(
+            run.signals,
+            flight=thin_flight(run.signals.flight) if run.signals.flight else None,
+            responses={name: _thin_response(response) for name, response in run.signals.responses.items()},
+        ),
     )
 
 
@@ -123,12 +126,12 @@ def _writing(folder: Path) -> Iterator[None]:
 
 def _write_tables(folder: Path, run: RunResult) -> None:
     final = run.final.derivatives.values() if run.final else ()
-    tables.write_derivatives(folder / "derivatives.csv", final, run.prior, run.truth, run.truth_since)
+    tables.write_derivatives(folder / "derivatives.csv", final, run.references)
     tables.write_estimates(folder / "estimates.csv", run.history)
     tables.write_fits(folder / "fits.csv", run.history)
-    tables.write_signals(folder / "signals.csv", run.flight)
-    tables.write_spectra(folder / "spectra.csv", run.spectra)
-    tables.write_responses(folder / "responses.csv", run.responses)
+    tables.write_signals(folder / "signals.csv", run.signals.flight)
+    tables.write_spectra(folder / "spectra.csv", run.signals.spectra)
+    tables.write_responses(folder / "responses.csv", run.signals.responses)
 
 
 def _read_summary(path: Path) -> dict[str, Any]:

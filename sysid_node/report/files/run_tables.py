@@ -27,7 +27,8 @@ from sysid_node.csv_table import Row, write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.report.results.run_result import Prior, Response, Spectra
+from sysid_node.report.results.run_result import Prior, References
+from sysid_node.report.results.signals import Response, Spectra
 
 ESTIMATE_COLUMNS = ("name", "value", "standard_error", "lower", "upper", "valid", "status")
 FIT_COLUMNS = ("coefficient", "r_squared", "residual_std", "degrees_of_freedom", "samples")
@@ -37,29 +38,24 @@ RESPONSE_COLUMNS = ("name", "unit", "time", "measured", "modelled")
 T = TypeVar("T")
 
 
-def write_derivatives(
-    path: Path,
-    derivatives: Iterable[DerivativeEstimate],
-    prior: Mapping[str, Prior],
-    truth: Mapping[str, float],
-    since: Mapping[str, float],
-) -> None:
-    """The final estimates, each with what was believed and what is true of it."""
+def write_derivatives(path: Path, derivatives: Iterable[DerivativeEstimate], references: References) -> None:
+    """The final estimates, each with its prior and its true value."""
+    prior = references.prior
     rows = (
         (
             *_estimate_cells(d),
             prior[d.name].value if d.name in prior else math.nan,
             prior[d.name].tolerance if d.name in prior else math.nan,
-            truth.get(d.name, math.nan),
-            since.get(d.name, math.nan),
+            references.truth.get(d.name, math.nan),
+            references.truth_since.get(d.name, math.nan),
         )
         for d in derivatives
     )
     _write(path, ESTIMATE_COLUMNS + REFERENCE_COLUMNS, rows)
 
 
-def read_references(path: Path) -> tuple[dict[str, Prior], dict[str, float], dict[str, float]]:
-    """Prior, truth and since when (s) it is that, by derivative, from ``derivatives.csv``; empty without the file."""
+def read_references(path: Path) -> References:
+    """What ``write_derivatives`` wrote of the references; empty where there is no such file."""
     prior: dict[str, Prior] = {}
     truth: dict[str, float] = {}
     since: dict[str, float] = {}
@@ -71,7 +67,7 @@ def read_references(path: Path) -> tuple[dict[str, Prior], dict[str, float], dic
             truth[row[0]] = true
         if not math.isnan(time):
             since[row[0]] = time
-    return prior, truth, since
+    return References(prior, truth, since)
 
 
 def write_estimates(path: Path, history: Iterable[Estimates]) -> None:

@@ -28,7 +28,7 @@ class Event(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Episode:
+class ClosedLoopFlight:
     """A flight in closed loop; times in s of the flight, angles in rad."""
 
     aircraft: str
@@ -101,13 +101,13 @@ class Episode:
         return [event for event in self.events if event.node == FAULT_MONITOR and ": " in event.text]
 
 
-def write_loop(folder: Path, episode: Episode) -> None:
+def write_loop(folder: Path, episode: ClosedLoopFlight) -> None:
     """``report.html`` in the folder."""
     page = render_page(f"{episode.aircraft} in closed loop", SECTIONS, episode)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
-def _context(episode: Episode) -> dict[str, Any]:
+def _context(episode: ClosedLoopFlight) -> dict[str, Any]:
     flown = [_flown(episode, axis) for axis in episode.asked]
     errors = [
         _figure(episode, f"{axis}: tracking error, deg", [(axis, values, BLUE)])
@@ -120,7 +120,7 @@ def _context(episode: Episode) -> dict[str, Any]:
     return {"episode": episode, "figures": [*flown, *errors], "rows": rows, "axes": list(episode.errors)}
 
 
-def _flown(episode: Episode, axis: str) -> Figure:
+def _flown(episode: ClosedLoopFlight, axis: str) -> Figure:
     """What was asked for and what was flown."""
     asked = np.asarray(episode.asked[axis], dtype=float)
     flown = asked + np.asarray(episode.errors[axis], dtype=float)
@@ -131,7 +131,7 @@ def _flown(episode: Episode, axis: str) -> Figure:
     )
 
 
-def _figure(episode: Episode, label: str, curves: Sequence[tuple[str, Any, str]]) -> Figure:
+def _figure(episode: ClosedLoopFlight, label: str, curves: Sequence[tuple[str, Any, str]]) -> Figure:
     """Angles (rad) over time; with excitation, failure and alarms."""
     time = np.asarray(episode.time, dtype=float)
     thin = max(time.size // 3000, 1)
@@ -150,4 +150,4 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-SECTIONS: tuple[Section[Episode], ...] = (Section("loop", "", "loop.html.j2", _context),)
+SECTIONS: tuple[Section[ClosedLoopFlight], ...] = (Section("loop", "", "loop.html.j2", _context),)

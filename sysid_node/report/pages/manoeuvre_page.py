@@ -9,7 +9,8 @@ import numpy as np
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.pages.render import render_page
 from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
-from sysid_node.report.results.run_result import RunResult, Spectra
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.results.signals import RunSignals, Spectra
 from sysid_node.report.sections import excitation
 from sysid_node.report.sections.manoeuvre import correlations, plan, prediction
 from sysid_node.report.sections.section import Section
@@ -29,7 +30,7 @@ def _run(result: ManoeuvreResult) -> RunResult:
     symbols = result.aircraft.control_symbols
     spectrum = amplitude_spectrum(flight.time, np.column_stack([flight[s] for s in symbols]), _FREQUENCIES)
     spectra = Spectra(_FREQUENCIES, inputs=dict(zip(symbols, spectrum.T, strict=True)))
-    return RunResult(result.aircraft.name, "excite", (), flight=flight, spectra=spectra)
+    return RunResult(result.aircraft.name, "excite", (), signals=RunSignals(flight, spectra))
 
 
 SECTIONS: tuple[Section[ManoeuvreResult], ...] = (

@@ -15,7 +15,8 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
-from sysid_node.report.results.run_result import Response, RunResult, Spectra, prior_of
+from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
+from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
 #: Hz: what the drawn spectra show.
 _SPECTRUM = np.arange(0.1, 5.01, 0.1)
@@ -39,16 +40,14 @@ def identification_result(
         aircraft=aircraft.name,
         method=fit.method,
         history=[estimates],
-        data_seconds=sum(record.duration for record in records),
-        samples=sum(len(record) for record in records),
+        data=RunData(
+            sum(record.duration for record in records), sum(len(record) for record in records), _rejected(records)
+        ),
         settings=settings.as_dict(),
-        prior=prior_of(aircraft),
-        truth=truth or {},
-        flight=first,
-        spectra=_spectra(aircraft, first, found.coefficients),
-        responses=_responses(found),
-        response_note=_note(records, settings),
-        rejected=_rejected(records),
+        references=References(prior_of(aircraft), truth or {}),
+        signals=RunSignals(
+            first, _spectra(aircraft, first, found.coefficients), _responses(found), _note(records, settings)
+        ),
         holdout=found.holdout,
         remarks=[_sentence(remark) for remark in (fit.message, *fit.remarks)],
     )

@@ -20,7 +20,8 @@ from sysid_node.online.settings import Settings
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.comparison import changes
-from sysid_node.report.results.run_result import Response, RunResult, Spectra, prior_of
+from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
+from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
 THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
 FEWEST = 10  # samples that anything is drawn from
@@ -71,17 +72,15 @@ def replay_result(
         method=settings.method,
         history=history,
         title=title,
-        data_seconds=float(time[-1] - time[0]) if time.size else 0.0,
-        samples=int(time.size),
+        data=RunData(float(time[-1] - time[0]) if time.size else 0.0, int(time.size), rejected),
         settings=settings.as_dict(),
-        prior=prior_of(aircraft),
-        truth=truth or {},
-        truth_since=truth_since or {},
-        flight=_flight(aircraft, time, samples),
-        spectra=_spectra(settings, counted) if counted else None,
-        responses=_responses(settings, motion) if motion else {},
-        response_note=RESPONSE_NOTE,
-        rejected=rejected,
+        references=References(prior_of(aircraft), truth or {}, truth_since or {}),
+        signals=RunSignals(
+            _flight(aircraft, time, samples),
+            _spectra(settings, counted) if counted else None,
+            _responses(settings, motion) if motion else {},
+            RESPONSE_NOTE,
+        ),
         faults=faults,
         remarks=[*remarks, *_change_remark(noticed), *_fault_remarks(faults)],
     )

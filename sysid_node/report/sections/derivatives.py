@@ -60,14 +60,18 @@ def context(run: RunResult) -> Mapping[str, Any]:
     return {
         "groups": groups,
         "span": f"{number(100 * span, 2)}\u202f%",
-        "reference": "true value" if run.truth else "aircraft file" if run.prior else "",
-        "has_prior": bool(run.prior),
-        "has_truth": bool(run.truth),
+        "reference": "true value" if run.references.truth else "aircraft file" if run.references.prior else "",
+        "has_prior": bool(run.references.prior),
+        "has_truth": bool(run.references.truth),
     }
 
 
 def _row(run: RunResult, d: DerivativeEstimate, span: float) -> Row:
-    prior, truth, reference = run.prior.get(d.name), run.truth.get(d.name), _reference(run, d.name)
+    prior, truth, reference = (
+        run.references.prior.get(d.name),
+        run.references.truth.get(d.name),
+        _reference(run, d.name),
+    )
     drawn = math.isfinite(reference) and reference != 0.0
     return Row(
         name=d.name,
@@ -89,9 +93,9 @@ def _row(run: RunResult, d: DerivativeEstimate, span: float) -> Row:
 
 def _reference(run: RunResult, name: str) -> float:
     """What the picture is normalised by: the truth where any is known, else the prior; NaN = neither."""
-    if run.truth:
-        return run.truth.get(name, math.nan)
-    return run.prior[name].value if name in run.prior else math.nan
+    if run.references.truth:
+        return run.references.truth.get(name, math.nan)
+    return run.references.prior[name].value if name in run.references.prior else math.nan
 
 
 def _span(run: RunResult, estimates: Iterable[DerivativeEstimate]) -> float:

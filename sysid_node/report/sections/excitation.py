@@ -12,7 +12,8 @@ from sysid_node.flight.record import COLUMNS, Array, FlightRecord
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
 from sysid_node.report.drawing.thinning import thin_curve
-from sysid_node.report.results.run_result import RunResult, Spectra
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.results.signals import Spectra
 from sysid_node.report.sections.section import Section
 
 DEGREES = 180.0 / np.pi
@@ -51,13 +52,13 @@ _SURFACES = {"de": "elevator", "da": "aileron", "dr": "rudder"}
 
 def context(run: RunResult) -> Mapping[str, Any]:
     """Captions and figures, the deflections first."""
-    spectrum = None if run.spectra is None or not run.spectra.inputs else _spectrum(run.spectra)
+    spectrum = None if run.signals.spectra is None or not run.signals.spectra.inputs else _spectrum(run.signals.spectra)
     return {"plots": figures_of(run), "spectrum": spectrum}
 
 
 def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
     """Titles and figures of what was flown; none where the record itself is not there."""
-    return [] if run.flight is None else histories(run.flight)
+    return [] if run.signals.flight is None else histories(run.signals.flight)
 
 
 def histories(flight: FlightRecord) -> list[tuple[str, Figure]]:

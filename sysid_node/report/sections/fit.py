@@ -9,7 +9,8 @@ from typing import Any
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import Figure
 from sysid_node.report.drawing.thinning import MAX_POINTS, thin_curve
-from sysid_node.report.results.run_result import Response, RunResult
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.results.signals import Response
 from sysid_node.report.sections.section import Section
 from sysid_node.report.wording.names import COEFFICIENT_WORDS, symbol, words_of
 from sysid_node.report.wording.numbers import number
@@ -32,15 +33,15 @@ def context(run: RunResult) -> Mapping[str, Any]:
             }
             for fit in fits
         ],
-        "response_note": run.response_note,
-        "responses": [(name, symbol(name), r.unit, _figure(name, r)) for name, r in run.responses.items()],
+        "response_note": run.signals.response_note,
+        "responses": [(name, symbol(name), r.unit, _figure(name, r)) for name, r in run.signals.responses.items()],
         "holdout": [_flight(name, outputs) for name, outputs in run.holdout.items()],
     }
 
 
 def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
     """Measured and modelled, under the name of each output or coefficient."""
-    return [(f"{name}, {r.unit}" if r.unit else name, _figure(name, r)) for name, r in run.responses.items()]
+    return [(f"{name}, {r.unit}" if r.unit else name, _figure(name, r)) for name, r in run.signals.responses.items()]
 
 
 def _percent(share: float) -> str:

@@ -55,8 +55,8 @@ def context(run: RunResult) -> Mapping[str, Any]:
     groups = [(title, [_panel(run, final[name]) for name in names]) for title, names in grouped(final)]
     return {
         "groups": groups,
-        "has_prior": bool(run.prior),
-        "has_truth": bool(run.truth),
+        "has_prior": bool(run.references.prior),
+        "has_truth": bool(run.references.truth),
         "has_changes": any(changes(run.history, name) for name in final),
     }
 
@@ -108,12 +108,12 @@ def _touching(mask: Mask) -> Mask:
 
 def _references(run: RunResult, name: str) -> list[dict[str, Any]]:
     shapes = []
-    if name in run.prior:
-        shapes.append(figures.level(run.prior[name].value, figures.MUTED, "dash"))
-    if name in run.truth:
-        since = run.truth_since.get(name)
+    if name in run.references.prior:
+        shapes.append(figures.level(run.references.prior[name].value, figures.MUTED, "dash"))
+    if name in run.references.truth:
+        since = run.references.truth_since.get(name)
         span = None if since is None else (since, run.history[-1].time)
-        shapes.append(figures.level(run.truth[name], figures.VERMILION, span=span))
+        shapes.append(figures.level(run.references.truth[name], figures.VERMILION, span=span))
     return shapes
 
 
@@ -125,8 +125,8 @@ def _limits(run: RunResult, name: str, c: _Curves) -> list[float]:
         shown = progress >= 0.6
     wanted = [*_percentiles(c.value[shown], 1, 99), *_percentiles(c.lower[shown], 15, 85)]
     wanted += [*_percentiles(c.upper[shown], 15, 85), c.lower[-1], c.upper[-1], c.value[-1]]
-    wanted += [run.truth[name]] if name in run.truth else []
-    wanted += [run.prior[name].value] if name in run.prior else []
+    wanted += [run.references.truth[name]] if name in run.references.truth else []
+    wanted += [run.references.prior[name].value] if name in run.references.prior else []
     finite = [float(value) for value in wanted if np.isfinite(value)]
     if not finite:
         finite = c.value[np.isfinite(c.value)].tolist()

@@ -44,7 +44,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
 
 
 def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
-    length = f"{seconds(run.data_seconds)} of flight" if math.isfinite(run.data_seconds) else "this flight"
+    length = f"{seconds(run.data.seconds)} of flight" if math.isfinite(run.data.seconds) else "this flight"
     if not derivatives:
         return Markup(
             "<strong>No derivative was estimated</strong> from {} of {}. The tables below list what was "
@@ -98,25 +98,24 @@ def _unknown(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | No
 
 
 def _against_truth(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
-    checked = [d for d in derivatives if d.valid and d.name in run.truth]
+    checked = [d for d in derivatives if d.valid and d.name in run.references.truth]
     if not checked:
         return None
-    held = sum(covers(d, run.truth[d.name]) for d in checked)
+    held = sum(covers(d, run.references.truth[d.name]) for d in checked)
     return Markup("The true values are known for this flight: {} of {} valid intervals contain theirs.").format(
         held, len(checked)
     )
 
 
 def _against_prior(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
-    checked = [d for d in derivatives if d.valid and d.name in run.prior]
+    prior = run.references.prior
+    checked = [d for d in derivatives if d.valid and d.name in prior]
     if not checked:
         return None
-    differing = [d for d in checked if not agrees(d, run.prior[d.name])]
+    differing = [d for d in checked if not agrees(d, prior[d.name])]
     if not differing:
         return Markup("No estimate differs from the aircraft file by more than the two uncertainties explain.")
-    clauses = [
-        Markup("{} is {}").format(symbol(d.name), _difference(d.value, run.prior[d.name].value)) for d in differing
-    ]
+    clauses = [Markup("{} is {}").format(symbol(d.name), _difference(d.value, prior[d.name].value)) for d in differing]
     return Markup("These differ from the aircraft file by more than the two uncertainties explain: {}.").format(
         listing(clauses)
     )
@@ -136,11 +135,11 @@ def _named(d: DerivativeEstimate) -> bool:
 
 
 def _facts(run: RunResult) -> list[tuple[str, str]]:
-    lost = sum(run.rejected.values())
+    lost = sum(run.data.rejected.values())
     return [
         ("Aircraft", run.aircraft),
         ("Method", METHOD_WORDS.get(run.method, run.method)),
-        ("Data", f"{seconds(run.data_seconds)}, {plural(run.samples, 'sample')}"),
+        ("Data", f"{seconds(run.data.seconds)}, {plural(run.data.samples, 'sample')}"),
         ("Rejected", plural(lost, "message") if lost else "nothing"),
     ]
 

@@ -11,7 +11,7 @@ from sysid_node.report.sections.section import Section
 
 def context(run: RunResult) -> Mapping[str, Any]:
     """Rows (topic, reason, count), the most frequent first."""
-    rows = [(*_split(key), count) for key, count in run.rejected.items() if count]
+    rows = [(*_split(key), count) for key, count in run.data.rejected.items() if count]
     return {"rows": sorted(rows, key=lambda row: -row[2]), "total": sum(row[2] for row in rows)}
 
 

@@ -7,14 +7,15 @@ from typing import Any
 
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import Figure
-from sysid_node.report.results.run_result import RunResult, Spectra
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.results.signals import Spectra
 from sysid_node.report.sections.section import Section
 from sysid_node.report.wording.names import COEFFICIENT_WORDS, symbol
 
 
 def context(run: RunResult) -> Mapping[str, Any]:
     """One panel a coefficient: its residual, and itself where it is known."""
-    spectra = run.spectra
+    spectra = run.signals.spectra
     names = () if spectra is None else tuple(spectra.residuals)
     return {
         "panels": [(symbol(n), n, COEFFICIENT_WORDS.get(n, ""), _figure(spectra, n)) for n in names if spectra],
@@ -24,7 +25,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
 
 def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
     """The residual's spectrum under the name of each coefficient."""
-    spectra = run.spectra
+    spectra = run.signals.spectra
     return [(name, _figure(spectra, name)) for name in (spectra.residuals if spectra else ())] if spectra else []
 
 

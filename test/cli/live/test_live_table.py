@@ -5,7 +5,7 @@ import math
 
 from rich.console import Console
 
-from sysid_node.cli.live.live_table import Moment, Reference, live_table
+from sysid_node.cli.live.live_table import LiveStatus, ReferenceValues, live_table
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 NAMES = ("CL_alpha", "Cm_q", "Cl_p", "Cn_r", "CY_beta")
@@ -24,8 +24,8 @@ ESTIMATES = Estimates(
 def shown(estimates: Estimates | None, width: int, height: int | None = None, seconds: float = 12.0) -> list[str]:
     """The table's lines without colours."""
     console = Console(width=width, record=True, file=io.StringIO())
-    moment = Moment("cdrw, a flight", seconds, 60.0, "imu/data 200 Hz", estimates)
-    reference = Reference("true", {"CL_alpha": 3.1, "Cm_q": -1.0, "Cl_p": 0.2})
+    moment = LiveStatus("cdrw, a flight", seconds, 60.0, "imu/data 200 Hz", estimates)
+    reference = ReferenceValues("true", {"CL_alpha": 3.1, "Cm_q": -1.0, "Cl_p": 0.2})
     console.print(live_table(moment, NAMES, reference, width, height))
     return console.export_text().splitlines()
 

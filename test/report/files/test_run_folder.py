@@ -12,6 +12,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.report.files.run_folder import read_run, rebuild_report, summary, write_run
 from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.results.signals import RunSignals
 
 
 def test_rebuilt_report_equals_the_first(tmp_path):
@@ -36,13 +37,13 @@ def test_run_of_almost_nothing_goes_both_ways(tmp_path):
     assert sorted(p.name for p in (tmp_path / "new" / "folder").iterdir()) == ["report.html", "summary.json"]
     back = read_run(tmp_path / "new" / "folder")
     assert back.final is None
-    assert math.isnan(back.data_seconds)
+    assert math.isnan(back.data.seconds)
 
 
 def test_files_of_an_earlier_run_do_not_linger(tmp_path):
     write_run(tmp_path, synthetic.run(seconds=10.0))
     write_run(tmp_path, RunResult("kestrel", "sls_rft", []))
-    assert read_run(tmp_path).flight is None
+    assert read_run(tmp_path).signals.flight is None
 
 
 def test_summary_keeps_to_the_contract():
@@ -56,7 +57,9 @@ def test_summary_keeps_to_the_contract():
 
 def test_summary_is_strict_json_without_nan():
     run = synthetic.run(seconds=2.0)  # before anything is known
-    unknown = replace(run, data_seconds=math.nan, settings={"window": np.float64(math.inf), "lines": np.arange(2)})
+    unknown = replace(
+        run, data=replace(run.data, seconds=math.nan), settings={"window": np.float64(math.inf), "lines": np.arange(2)}
+    )
     content = json.loads(json.dumps(summary(unknown), allow_nan=False))
     assert content["derivatives"]["Cm_alpha"]["value"] is None
     assert content["data_seconds"] is None
@@ -65,8 +68,10 @@ def test_summary_is_strict_json_without_nan():
 
 def test_references_of_what_was_not_estimated_are_left_out(tmp_path):
     run = synthetic.run(seconds=10.0)
-    write_run(tmp_path, replace(run, truth={**run.truth, "CL_flaps": 1.0}))
-    assert read_run(tmp_path).truth == run.truth
+    write_run(
+        tmp_path, replace(run, references=replace(run.references, truth={**run.references.truth, "CL_flaps": 1.0}))
+    )
+    assert read_run(tmp_path).references.truth == run.references.truth
 
 
 @pytest.mark.parametrize(
@@ -94,5 +99,5 @@ def test_estimates_out_of_order_are_refused():
 
 
 def test_flight_without_columns(tmp_path):
-    write_run(tmp_path, RunResult("kestrel", "sls_rft", [], flight=FlightRecord(np.arange(3.0), {})))
-    assert read_run(tmp_path).flight.duration == 2.0
+    write_run(tmp_path, RunResult("kestrel", "sls_rft", [], signals=RunSignals(FlightRecord(np.arange(3.0), {}))))
+    assert read_run(tmp_path).signals.flight.duration == 2.0

@@ -9,7 +9,8 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.report.files import run_tables as tables
-from sysid_node.report.results.run_result import Prior, Response, Spectra
+from sysid_node.report.results.run_result import Prior, References
+from sysid_node.report.results.signals import Response, Spectra
 
 HARD = (1.0 / 3.0, -5e-324, 1.7976931348623157e308, math.inf, -0.1)
 
@@ -48,12 +49,12 @@ def test_references_read_back(tmp_path):
     path = tmp_path / "derivatives.csv"
     prior = {"Cm_q": Prior(-1.3, 0.2), "CL_0": Prior(0.1)}
     known = [estimate(name, 1.0, 0.1, 0.8, 1.2) for name in ("Cm_q", "CL_0", "CL_q")]
-    tables.write_derivatives(path, known, prior, {"CL_q": 4.0}, {"CL_q": 30.0})
-    read_prior, truth, since = tables.read_references(path)
-    assert read_prior["Cm_q"] == prior["Cm_q"]
-    assert math.isnan(read_prior["CL_0"].tolerance)
-    assert truth == {"CL_q": 4.0}
-    assert since == {"CL_q": 30.0}
+    tables.write_derivatives(path, known, References(prior, {"CL_q": 4.0}, {"CL_q": 30.0}))
+    back = tables.read_references(path)
+    assert back.prior["Cm_q"] == prior["Cm_q"]
+    assert math.isnan(back.prior["CL_0"].tolerance)
+    assert back.truth == {"CL_q": 4.0}
+    assert back.truth_since == {"CL_q": 30.0}
 
 
 def test_signals_spectra_and_responses_read_back(tmp_path):

@@ -14,7 +14,8 @@ import synthetic
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.pages.render import render_page
 from sysid_node.report.pages.run_page import SECTIONS
-from sysid_node.report.results.run_result import Prior, RunResult, Spectra
+from sysid_node.report.results.run_result import Prior, References, RunData, RunResult
+from sysid_node.report.results.signals import RunSignals, Spectra
 from sysid_node.report.sections import derivatives
 
 VOID = {"meta", "link", "br", "rect", "line", "circle", "path"}
@@ -64,8 +65,9 @@ def outline(run: RunResult) -> Outline:
     return page
 
 
-def single(d: DerivativeEstimate, **more) -> RunResult:
-    return RunResult("kestrel", "output_error", [Estimates(8.0, {d.name: d}, {})], **more)
+def single(d: DerivativeEstimate, **references) -> RunResult:
+    history = [Estimates(8.0, {d.name: d}, {})]
+    return RunResult("kestrel", "output_error", history, references=References(**references))
 
 
 @pytest.fixture(scope="module")
@@ -150,6 +152,13 @@ def test_a_difference_from_prior_and_truth_is_flagged():
 
 
 NOTHING = RunResult("kestrel", "sls_rft", [])
+
+
+def spectral(spectra: Spectra) -> RunResult:
+    """A run that holds spectra and nothing else."""
+    return replace(NOTHING, signals=RunSignals(spectra=spectra))
+
+
 NAN = DerivativeEstimate("Cm_q", math.nan, math.nan, math.nan, math.nan, False, "not excited")
 WIDE = DerivativeEstimate("Cm_q", 1.0, math.inf, -math.inf, math.inf, False, "converging")
 EXACT = DerivativeEstimate("bias <q>", 0.0, 0.0, 0.0, 0.0, True, "ok")
@@ -159,14 +168,14 @@ EXACT = DerivativeEstimate("bias <q>", 0.0, 0.0, 0.0, 0.0, True, "ok")
     "run",
     [
         NOTHING,
-        replace(NOTHING, rejected={"no reason": 3, "imu/data: stale": 0}),
+        replace(NOTHING, data=RunData(rejected={"no reason": 3, "imu/data: stale": 0})),
         single(NAN, prior={"Cm_q": Prior(-1.0)}, truth={"Cm_q": 0.0}),
         replace(single(NAN), history=[Estimates(t, {"Cm_q": NAN}, {}) for t in (1.0, 2.0)]),
         replace(single(WIDE), history=[Estimates(t, {"Cm_q": WIDE}, {}) for t in (1.0, 1.0)]),
         single(WIDE, prior={"Cm_q": Prior(0.0, 0.0)}),
         single(EXACT, truth={"bias <q>": 1.0}),
-        replace(NOTHING, spectra=Spectra(np.array([0.1]), {"de": np.array([np.nan])}, {}, {"Cm": np.array([0.0])})),
-        replace(NOTHING, spectra=Spectra(np.empty(0))),
+        spectral(Spectra(np.array([0.1]), {"de": np.array([np.nan])}, {}, {"Cm": np.array([0.0])})),
+        spectral(Spectra(np.empty(0))),
         replace(synthetic.run(seconds=2.0), title="<script>alert(1)</script> & more"),
     ],
     ids=[

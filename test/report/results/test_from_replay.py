@@ -66,7 +66,7 @@ def result(aircraft):
 
 @pytest.mark.parametrize("coefficient", LONGITUDINAL)
 def test_measured_and_modelled_agree_where_the_model_is_true(result, coefficient):
-    response = result.responses[coefficient]
+    response = result.signals.responses[coefficient]
     motion = np.ptp(response.modelled)
     assert motion > 0.001
     assert np.abs(response.measured - response.modelled)[2:-2].max() < 0.01 * motion
@@ -74,7 +74,7 @@ def test_measured_and_modelled_agree_where_the_model_is_true(result, coefficient
 
 @pytest.mark.parametrize("coefficient", LONGITUDINAL)
 def test_nothing_is_left_where_the_model_is_true(result, coefficient):
-    spectra = result.spectra
+    spectra = result.signals.spectra
     assert spectra.residuals[coefficient].max() < 0.01 * spectra.measured[coefficient].max()
 
 
@@ -82,7 +82,9 @@ def test_what_the_model_lacks_is_left_at_its_frequency(aircraft):
     time, samples = flight(aircraft)
     samples[:, SAMPLE_COLUMNS.index("az")] += 0.5 * np.sin(2 * np.pi * 1.3 * time)
     history = [believed(aircraft, 60.0)]
-    spectra = replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={}).spectra
+    spectra = replay_result(
+        aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={}
+    ).signals.spectra
     assert spectra.frequency[np.argmax(spectra.residuals["CL"])] == pytest.approx(1.3)
     pressure = 0.5 * aircraft.reference.air_density * aircraft.reference.airspeed**2
     amplitude = 0.5 * aircraft.mass * np.cos(0.08) / (pressure * aircraft.geometry.S)
@@ -90,9 +92,9 @@ def test_what_the_model_lacks_is_left_at_its_frequency(aircraft):
 
 
 def test_signals_prior_and_settings_come_along(result, aircraft):
-    assert result.flight["de"].size == result.samples == 6000
-    assert "air_interval" not in result.flight.columns
-    assert result.prior["Cm_alpha"].value == aircraft.derivatives["Cm_alpha"].value
+    assert result.signals.flight["de"].size == result.data.samples == 6000
+    assert "air_interval" not in result.signals.flight.columns
+    assert result.references.prior["Cm_alpha"].value == aircraft.derivatives["Cm_alpha"].value
     assert result.settings["frequencies"] == SETTINGS.frequencies
 
 
@@ -117,8 +119,8 @@ def test_incomplete_samples_are_left_out(aircraft):
     samples[1000:1100, SAMPLE_COLUMNS.index("alpha")] = np.nan
     history = [believed(aircraft, 60.0)]
     result = replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={})
-    assert np.isfinite(result.responses["CL"].measured).all()
-    assert result.spectra.residuals["CL"].max() < 0.01 * result.spectra.measured["CL"].max()
+    assert np.isfinite(result.signals.responses["CL"].measured).all()
+    assert result.signals.spectra.residuals["CL"].max() < 0.01 * result.signals.spectra.measured["CL"].max()
 
 
 @pytest.mark.parametrize("seconds", [10.0, 60.0, 500.0])
@@ -140,5 +142,5 @@ def test_after_an_abrupt_change_only_what_follows_counts(aircraft):
     derivatives = {n: d._replace(valid=False, status="changed") for n, d in changed.derivatives.items()}
     history = [believed(aircraft, 20.0), replace(changed, derivatives=derivatives), believed(aircraft, 60.0)]
     result = replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={})
-    assert result.spectra.residuals["CL"].max() < 0.01 * result.spectra.measured["CL"].max()
+    assert result.signals.spectra.residuals["CL"].max() < 0.01 * result.signals.spectra.measured["CL"].max()
     assert "noticed at 31.0 s" in result.remarks[0]
