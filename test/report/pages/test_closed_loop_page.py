@@ -50,7 +50,7 @@ def test_the_page_shows_what_happened(tmp_path: Path) -> None:
     assert page.count('class="plot"') == 5
     assert "<td>fault_monitor</td><td>elevator: loss of effectiveness</td>" in page
     assert "<code>imu/data</code> 3." in page
-    assert "the failure sets in" in page
+    assert "the failure begins" in page
     write_loop(tmp_path, episode(EVENTS[:4], failure=""))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Nothing fails." in page
