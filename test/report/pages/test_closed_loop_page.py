@@ -53,5 +53,5 @@ def test_the_page_shows_what_happened(tmp_path: Path) -> None:
     assert "the failure begins" in page
     write_loop(tmp_path, episode(EVENTS[:4], failure=""))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Nothing fails." in page
+    assert "No failure was simulated." in page
     assert "Dotted" not in page
