@@ -1,4 +1,4 @@
-"""A YAML file in which every value knows its file, line and dotted key, so that an error can say where."""
+"""YAML values with file, line and dotted key, which error messages name."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Entry:
     file: str
 
     def error(self, problem: str) -> InputError:
-        """The error to raise about this value: ``file:line: dotted.key: problem``."""
+        """The error about this value: ``file:line: dotted.key: problem``."""
         return InputError(f"{self.file}:{self.node.start_mark.line + 1}: {self.key or 'top level'}: {problem}")
 
     def mismatch(self, expected: str) -> InputError:
-        """The error that says what was got and what was expected."""
+        """The error that gives the value and what was expected."""
         return self.error(f"got {self._got()}, expected {expected}")
 
     def number(self, expected: str, accept: Callable[[float], bool] = math.isfinite) -> float:

@@ -1,4 +1,4 @@
-"""``Aircraft`` to the text of an aircraft file: the inverse of ``load``."""
+"""Writes an ``Aircraft`` as the text of an aircraft file; the inverse of ``load``."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _flow(values: Mapping[str, float]) -> str:
 
 
 def _source(text: str) -> list[str]:
-    """Folded over several lines where that gives the same text back."""
+    """The source, on several lines where the text can be read back unchanged."""
     if not text:
         return []
     if text != " ".join(text.split()) or not text.isprintable():

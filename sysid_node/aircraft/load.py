@@ -1,4 +1,4 @@
-"""Aircraft files: YAML to ``Aircraft``, every value checked, every mistake one line that says where."""
+"""Loads aircraft files: every value is checked, and every mistake is one line that names file, line and key."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def load_aircraft(name_or_path: str | Path) -> Aircraft:
     """The aircraft of a file, or one that comes with the package, by name (``"cdrw"``).
 
     A ``str`` that ends in .yaml or .yml or holds a path separator is a file, any other a name.
-    Raises InputError (one line: file, line, dotted key, what was got, what was expected).
+    Raises InputError (one line: file, line, dotted key, the value, what was expected).
     """
     path = _find(name_or_path)
     try:
@@ -80,7 +80,7 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
 
 
 def aircraft_folders() -> list[Path]:
-    """Where named aircraft are looked for: the source tree, then the installed package's share folder."""
+    """The folders that are searched for named aircraft: the source tree, then the share folder of the package."""
     prefixes = [sys.prefix, *os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)]
     candidates = [Path(__file__).resolve().parents[2] / "config" / "aircraft"]
     candidates += [Path(prefix) / "share" / "sysid_node" / "config" / "aircraft" for prefix in prefixes if prefix]
@@ -111,7 +111,7 @@ def _angle(entry: Entry) -> float:
 
 
 def _inertia(entry: Entry | None) -> Inertia:
-    """A moment that is left out is NaN: not known. Ixz alone left out is zero, the symmetric aircraft's."""
+    """The inertia. A moment that is left out is NaN (unknown); Ixz is then zero, as in a symmetric aircraft."""
     if entry is None:
         return Inertia(math.nan, math.nan, math.nan, math.nan)
     fields = entry.fields({}, optional=("Ixx", "Iyy", "Izz", "Ixz"))
@@ -123,7 +123,7 @@ def _inertia(entry: Entry | None) -> Inertia:
 
 
 def _check_inertia(entry: Entry, inertia: Inertia) -> None:
-    """What every rigid body obeys. A comparison with NaN is false: what is not known is not checked."""
+    """Raise an error where no rigid body has these moments. Unknown moments (NaN) are not checked."""
     moments = {"Ixx": inertia.Ixx, "Iyy": inertia.Iyy, "Izz": inertia.Izz}
     for name, moment in moments.items():
         others = {k: v for k, v in moments.items() if k != name}
@@ -141,7 +141,7 @@ def _check_inertia(entry: Entry, inertia: Inertia) -> None:
 def _geometry(entry: Entry) -> Geometry:
     fields = entry.fields({"S": "the reference area in m^2", "b": "the span in m", "cbar": "the mean chord in m"})
     S, b, cbar = (_positive(fields[k], unit) for k, unit in (("S", "m^2"), ("b", "m"), ("cbar", "m")))
-    # S = b times the mean chord, whichever mean was meant: a factor of 3 is a wrong unit.
+    # S is b times a mean chord; whichever mean was meant, a factor of 3 shows a wrong unit.
     if not 1 / 3 < S / (b * cbar) < 3:
         raise entry.error(f"S = {S:g} m^2 does not go with b cbar = {b * cbar:g} m^2; check the units")
     return Geometry(S, b, cbar)
@@ -220,7 +220,7 @@ def _check_symbols(entries: Mapping[str, Entry], controls: Mapping[str, Control]
 
 
 def _check_joints(entries: Mapping[str, Entry], controls: Mapping[str, Control], throttle: Throttle | None) -> None:
-    """Controls must be independent combinations of joints, or their derivatives cannot be told apart."""
+    """Raise an error where the controls are dependent combinations of joints: their derivatives would be collinear."""
     joints = sorted({joint for control in controls.values() for joint in control.joints})
     rows: list[list[float]] = []
     for name, control in controls.items():

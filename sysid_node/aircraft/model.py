@@ -1,4 +1,4 @@
-"""What is believed of an aircraft: geometry, mass, controls, derivatives. SI, radians, body axes FRD."""
+"""The contents of an aircraft file: geometry, mass, controls, derivatives. SI units, radians, body axes FRD."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ class Derivative:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Where the sensors sit, from the CG in body axes FRD, m."""
+    """Positions of the sensors relative to the CG, body axes FRD, m."""
 
     imu: Vector3 = (0.0, 0.0, 0.0)
     air_data: Vector3 = (0.0, 0.0, 0.0)
 
 
-#: Typical 1-sigma noise of small-UAV sensors; used where the aircraft file is silent.
+#: Typical 1-sigma noise of sensors of small UAVs, used where the aircraft file gives none.
 DEFAULT_NOISE: Mapping[str, float] = MappingProxyType(
     {
         "accel": 0.05,  # m/s^2
@@ -90,7 +90,7 @@ DEFAULT_NOISE: Mapping[str, float] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Aircraft:
-    """The aircraft file, validated."""
+    """The validated contents of an aircraft file."""
 
     name: str
     source: str

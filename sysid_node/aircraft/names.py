@@ -1,4 +1,4 @@
-"""The field's names: coefficients, regressors, and the derivatives made of both.
+"""Names of coefficients, regressors and derivatives.
 
 A derivative is called ``<coefficient>_<regressor>``: ``Cm_alpha``, ``CL_0``, ``Cn_dr``.
 Symbols follow Klein & Morelli, "Aircraft System Identification" (2006), ch. 3.
@@ -15,7 +15,7 @@ COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 LONGITUDINAL = ("CL", "CD", "Cm")
 LATERAL = ("CY", "Cl", "Cn")
 
-#: Regressors that every aircraft has, and what each means. Control symbols come on top.
+#: Regressors that every aircraft has, and their meaning. The symbols of its controls are regressors, too.
 STATE_REGRESSORS = {
     "0": "offset, 1",
     "alpha": "angle of attack, rad",
@@ -30,10 +30,10 @@ STATE_REGRESSORS = {
 #: Symbols of the standard controls; a further control states its own in the aircraft file.
 CONTROL_SYMBOLS = {"elevator": "de", "aileron": "da", "rudder": "dr"}
 
-#: Names of signals, which no control's symbol may take.
+#: Names of signals, which a control's symbol must not have.
 RESERVED_SYMBOLS = frozenset(STATE_REGRESSORS) | {"ax", "ay", "az", "phi", "theta", "psi", "rho", "thrust", "time", "t"}
 
-#: The full linear model of the design, in the order in which tables list it.
+#: The derivatives of the full linear model, in the order of tables.
 STANDARD_DERIVATIVES = (
     *("CL_0", "CL_alpha", "CL_q", "CL_de"),
     *("CD_0", "CD_alpha", "CD_q", "CD_de"),
@@ -45,7 +45,7 @@ STANDARD_DERIVATIVES = (
 
 
 def split_derivative(name: str) -> tuple[str, str]:
-    """``"Cm_alpha"`` to ``("Cm", "alpha")``. Raises ValueError for any other form."""
+    """Coefficient and regressor: ``("Cm", "alpha")`` of ``"Cm_alpha"``. Raises ValueError for any other form."""
     coefficient, _, regressor = name.partition("_")
     if coefficient not in COEFFICIENTS or not regressor:
         raise ValueError(

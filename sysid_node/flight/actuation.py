@@ -1,4 +1,4 @@
-"""Joints to controls: the aircraft file's linear map, for messages one by one and for arrays of them."""
+"""Controls from joint positions, by the aircraft file's linear map, for single messages and for arrays of them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from sysid_node.flight.record import Array
 
 @dataclass(frozen=True)
 class Actuation:
-    """How thrust and controls follow from joint positions, in the order in which they are judged and summed."""
+    """The map from joint positions to thrust and controls, in the order in which they are checked and summed."""
 
-    joints: tuple[str, ...]  # that the controls are made of, each once
-    controls: tuple[tuple[float, tuple[tuple[int, float], ...]], ...]  # offset, (place in ``joints``, scale)...
+    joints: tuple[str, ...]  # the joints of all controls, each once
+    controls: tuple[
+        tuple[float, tuple[tuple[int, float], ...]], ...
+    ]  # offset, then (place in ``joints``, scale) of each joint
     throttle: str | None
     max_thrust: float | None  # None: the throttle joint is in N
 
@@ -36,12 +38,12 @@ class Actuation:
         return cls(joints, controls, throttle.joint if throttle else None, throttle.max_thrust if throttle else None)
 
     def places(self, names: Sequence[str]) -> tuple[int, ...]:
-        """Where the joints, then the throttle, stand among ``names``; -1 where one is missing."""
+        """The places of the joints, then of the throttle, among ``names``; -1 where one is missing."""
         at = {name: i for i, name in reversed(list(enumerate(names)))}
         return tuple(at.get(joint, -1) for joint in (*self.joints, self.throttle or ""))
 
     def of_message(self, places: Sequence[int], positions: Sequence[float]) -> tuple[float, ...] | str:
-        """Thrust (N, NaN = not known) and controls (rad) of one message, or what is wrong with it."""
+        """Thrust (N, NaN = unknown) and controls (rad) of one message, or the reason why it is rejected."""
         count = len(positions)
         *angles, throttle = [positions[i] if 0 <= i < count else math.nan for i in places]
         for name, angle in zip(self.joints, angles, strict=True):
@@ -60,10 +62,10 @@ class Actuation:
         return tuple(values)
 
     def of_array(self, names: Sequence[str], positions: Array) -> tuple[Array, NDArray[np.object_]]:
-        """``of_message`` of each row of (N, J): values (N, 1 + controls), faults (N,) (None = good)."""
+        """``of_message`` for each row of (N, J): values (N, 1 + controls) and reasons (N,), None = accepted."""
         absent = np.full(len(positions), np.nan)
         *angles, throttle = [positions[:, i] if i >= 0 else absent for i in self.places(names)]
-        with np.errstate(over="ignore", invalid="ignore"):  # in rows that are at fault
+        with np.errstate(over="ignore", invalid="ignore"):  # in rows that are rejected
             columns = [throttle if self.max_thrust is None else self.max_thrust * throttle]
             for offset, terms in self.controls:
                 total = np.full(len(positions), offset)
@@ -73,7 +75,7 @@ class Actuation:
         return np.column_stack(columns), self._faults(angles, throttle)
 
     def _faults(self, angles: Sequence[Array], throttle: Array) -> NDArray[np.object_]:
-        """Reasons by row: the checks of ``of_message``, the last first so that the first one's reason stays."""
+        """Reasons by row: the checks of ``of_message`` in reverse order, so that the first one's reason remains."""
         in_newton = self.max_thrust is None
         faults = np.full(throttle.shape, None, object)
         with np.errstate(invalid="ignore"):
@@ -84,11 +86,11 @@ class Actuation:
                 faults[bad] = [joint_fault(name, x) for x in angle[bad].tolist()]
         return faults
 
-    def require(self, names: Sequence[str], said: str) -> None:
-        """Raises InputError where ``names`` lack a joint of the controls; ``said`` is the flight's name in it."""
+    def require(self, names: Sequence[str], flight: str) -> None:
+        """Raise InputError, which names the ``flight``, where ``names`` lack a joint of the controls."""
         missing = [joint for joint in self.joints if joint not in names]
         if missing:
             raise InputError(
-                f"{said}: actuators have no joint {', '.join(map(repr, missing))}; they have "
+                f"{flight}: actuators have no joint {', '.join(map(repr, missing))}; they have "
                 f"{', '.join(map(repr, names)) or 'none'}; name them so under controls in the aircraft file"
             )

@@ -1,12 +1,12 @@
-"""Alignment: three topics of different rates to one sample per IMU message, all messages at once.
+"""Aligns three topics of different rates to one sample per IMU message, for a whole recording.
 
 The IMU's stamps are the time base. Air data and actuators are interpolated linearly in stamp time between their
-neighbours, never held. A hold is late by half a period T on average, and a late angle of attack, which moves with the
-pitch rate, passes part of Cm_alpha off as damping: Cm_q is off by up to Cm_alpha 2 V T / cbar. With air data held at
-100 Hz (T = 5 ms), 18 m/s and a chord of 0.3 m that is 0.6 Cm_alpha: where Cm_alpha = -0.6 and Cm_q = -7, 5 % of it.
-Interpolation has no delay, and an amplitude error of (w h)^2 / 12 at angular frequency w and period h: 0.1 % at 2 Hz.
+neighbours. To hold the last value instead would delay it by half a period on average, T. The angle of attack moves with
+the pitch rate, so that a delay of it appears as damping: Cm_q is off by up to Cm_alpha 2 V T / cbar. With air data held
+at 100 Hz (T = 5 ms), 18 m/s and a chord of 0.3 m this is 0.6 Cm_alpha; where Cm_alpha = -0.6 and Cm_q = -7, 5 %.
+Interpolation has no delay. Its amplitude error is (w h)^2 / 12 at angular frequency w and period h: 0.1 % at 2 Hz.
 
-Nothing is interpolated across more than ``max_gap``: those IMU samples are left out, and counted.
+IMU messages between neighbours that are more than ``max_gap`` apart are left out and counted.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Arrival, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
-STEP_BACK_NS = 1_000_000_000  # stamps that go back further are a clock that was set, not late messages
-STEP_FORWARD_NS = 300_000_000_000  # and those that leap forward further
-BUFFER_NS = 5_000_000_000  # what is kept of each topic while waiting for the others
+STEP_BACK_NS = 1_000_000_000  # a larger step back means that the clock was set, not that a message was late
+STEP_FORWARD_NS = 300_000_000_000  # a larger step forward means the same
+BUFFER_NS = 5_000_000_000  # how long messages of a topic are kept while the others are awaited
 
 AIR_INTERVAL = "air_interval"
 
@@ -37,7 +37,7 @@ Rejected = dict[str, dict[str, int]]  # topic -> reason -> messages
 
 @dataclass(frozen=True)
 class ScreenedMessages:
-    """The messages of a topic that are believed."""
+    """The messages of a topic that were accepted."""
 
     kept: NDArray[np.intp]  # places in the stream
     stamps: Stamps  # (kept), strictly increasing unless ``steps_back``
@@ -50,7 +50,7 @@ class ScreenedMessages:
 
 @dataclass(frozen=True)
 class Alignment:
-    """Aligned samples, and where each came from.
+    """Aligned samples, and the messages that each was made of.
 
     ``samples`` (N, 12 + controls): ax ay az p q r V alpha beta rho thrust air_interval, then the controls in the
     aircraft's order. The air interval (s) is the time between the air-data messages on either side.
@@ -58,8 +58,8 @@ class Alignment:
 
     imu: ScreenedMessages
     others: tuple[ScreenedMessages, ScreenedMessages]  # air data, actuators
-    right: tuple[NDArray[np.intp], NDArray[np.intp]]  # of each IMU sample: its right neighbour in each
-    used: NDArray[np.intp]  # of the IMU's kept samples, those that were aligned
+    right: tuple[NDArray[np.intp], NDArray[np.intp]]  # of each IMU sample, its later neighbour in each of the others
+    used: NDArray[np.intp]  # places of the aligned samples among the IMU's accepted messages
     samples: Array
     rejected: Rejected
 
@@ -70,12 +70,12 @@ class Alignment:
 
     @property
     def time(self) -> Array:
-        """(N,) s, from the first IMU message that was believed."""
+        """(N,) s, from the first accepted IMU message."""
         return seconds_since(self.imu.stamps[0], self.stamps) if self.used.size else np.empty(0)
 
     @property
     def wait(self) -> Array:
-        """(N,) s from each sample to the last of the messages that it lies before."""
+        """(N,) s from each sample to the last message that was needed to align it."""
         last = np.maximum(
             *(other.stamps[right[self.used]] for other, right in zip(self.others, self.right, strict=True))
         )
@@ -83,13 +83,13 @@ class Alignment:
 
 
 def seconds_since(start_ns: int | np.int64, stamps: Stamps) -> Array:
-    """Seconds as float64 of a difference in whole nanoseconds: nothing is lost in 104 days."""
+    """Seconds since ``start_ns``, from a difference in whole nanoseconds, which float64 holds exactly for 104 days."""
     time: Array = (stamps - start_ns) / 1e9
     return time
 
 
 def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> ScreenedMessages:
-    """Leaves out messages with a fault (N,) of their own, then those with a stamp that is absent, repeated or late."""
+    """Leave out messages that have a fault (N,), then those whose stamp is absent, repeated or late."""
     good = np.array([fault is None for fault in faults], bool) if faults.size else np.empty(0, bool)
     rejected = Counter(faults[~good].tolist())
     stamped = arrival.stamp_ns > 0
@@ -111,7 +111,7 @@ def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> Scre
 
 
 def _steps(stamps: Stamps) -> tuple[Stamps, NDArray[np.intp]]:
-    """Each stamp's step past the latest before it (the first's is 1), and where one falls back too far to be late."""
+    """The step of each stamp past the latest before it (1 for the first), and the places where a clock was set back."""
     if not stamps.size:
         return stamps, np.empty(0, np.intp)
     step = np.ones_like(stamps)
@@ -120,12 +120,11 @@ def _steps(stamps: Stamps) -> tuple[Stamps, NDArray[np.intp]]:
 
 
 def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
-    """One sample per IMU message that lies between close enough neighbours in air data and actuators.
+    """One sample for each IMU message between neighbours in air data and actuators at most ``max_gap`` (s) apart.
 
-    ``max_gap`` s: the longest spacing of neighbours that is interpolated across. IMU messages at the end
-    whose neighbours have not come yet are neither used nor rejected, unless they waited longer than the buffer.
-    The stamps alone decide, not the order of arrival. Meant for clocks that were not set on the way
-    (``steps_back``): what came after such a step is left out as late.
+    IMU messages at the end whose later neighbours are missing are neither used nor rejected, unless they waited longer
+    than the buffer. The stamps decide, not the order of arrival. Where a clock was set back in the recording
+    (``steps_back``), the messages after that are left out as late.
     """
     imu = screen(streams.imu.arrival, streams.imu.values, imu_faults(streams.imu.values))
     air = _screen_air_data(aircraft, streams)
@@ -161,14 +160,14 @@ def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
 
 
 def _screen_air_data(aircraft: Aircraft, streams: Streams) -> ScreenedMessages:
-    """Air data, with the reference density where it is not measured."""
+    """The accepted air data, with the reference density where the density is not measured."""
     values = streams.air_data.values
     density = np.where(np.isnan(values[:, 3]), aircraft.reference.air_density, values[:, 3])
     return screen(streams.air_data.arrival, np.column_stack([values[:, :3], density]), air_data_faults(values))
 
 
 def buffer_ns(max_gap: float) -> int:
-    """How long an IMU message waits for its neighbours, in ns of its own stamps."""
+    """How long an IMU message waits for its neighbours, ns by its own stamps."""
     return max(BUFFER_NS, 2 * gap_ns(max_gap))
 
 
@@ -180,9 +179,9 @@ def gap_ns(max_gap: float) -> int:
 def bracket(
     stamps: Stamps, at: Stamps, max_gap: float
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of each ``at``: its right neighbour's place, whether its neighbours are near enough, whether it waits for one.
+    """For each ``at``: the place of its later neighbour, whether both are near enough, whether one is missing.
 
-    A stamp that is met exactly needs no other neighbour.
+    A stamp that is equal to ``at`` needs no other neighbour.
     """
     right = np.searchsorted(stamps, at, side="left")
     waits = right == stamps.size
@@ -195,15 +194,15 @@ def bracket(
 
 
 def intervals(stamps: Stamps, max_gap: float) -> Array:
-    """Time (s) of each stamp since the one before, at most ``max_gap``; the first's is zero."""
+    """Time (s) from the stamp before to each stamp, at most ``max_gap``; zero for the first."""
     since: Array = np.minimum(np.diff(stamps, prepend=stamps[:1]), gap_ns(max_gap)) / 1e9
     return since
 
 
 def interpolate(stamps: Stamps, values: Array, right: NDArray[np.intp], at: Stamps) -> Array:
-    """Values (n, K) at the stamps ``at`` (n,), each on the line through its right neighbour and the one before.
+    """Values (n, K) at the stamps ``at`` (n,), each on the line through its later neighbour and the one before that.
 
-    The message-by-message path does the same operations in the same order: both give the same bits.
+    ``online.alignment.streaming`` does the same operations in the same order, so that both give the same bits.
     """
     left = np.maximum(right - 1, 0)
     exact = stamps[right] == at
@@ -220,9 +219,9 @@ def counts_by_reason(rejected: Mapping[str, Mapping[str, int]]) -> dict[str, int
 
 
 def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> FlightRecord:
-    """The flight as aligned columns, with the IMU's attitude where it gave one.
+    """The flight as aligned columns, with the attitude where the IMU's messages hold one.
 
-    Raises InputError where nothing could be aligned, or where a clock was set back in the middle.
+    Raises InputError where nothing could be aligned, or a clock was set back during the recording.
     """
     aligned = align(aircraft, streams, max_gap)
     _require_one_clock(streams, aligned)
@@ -243,7 +242,7 @@ def sample_columns(aircraft: Aircraft) -> tuple[str, ...]:
 
 
 def _require_one_clock(streams: Streams, aligned: Alignment) -> None:
-    """Raises InputError where stamps were set back on the way, saying which and when."""
+    """Raise InputError, which names topic and time, where a clock was set back during the recording."""
     for (topic, stream), screened in zip(streams.by_topic.items(), (aligned.imu, *aligned.others), strict=True):
         if screened.steps_back >= 0:
             log_ns = stream.arrival.log_ns
@@ -255,12 +254,12 @@ def _require_one_clock(streams: Streams, aligned: Alignment) -> None:
 
 
 def why_nothing_aligned(streams: Streams, rejected: Mapping[str, Mapping[str, int]]) -> str:
-    """One line: the topics' spans where they do not overlap, else what was rejected most."""
+    """One line: the time spans of the topics where they do not overlap, else the most frequent reasons of rejection."""
     stamps = {topic: stream.arrival.stamp_ns / 1e9 for topic, stream in streams.by_topic.items()}
     spans = {topic: (t.min(), t.max()) for topic, t in stamps.items()}
     if max(start for start, _ in spans.values()) > min(stop for _, stop in spans.values()):
-        said = ", ".join(f"{topic} {start:.3f} to {stop:.3f} s" for topic, (start, stop) in spans.items())
-        return f"{streams.name}: the header stamps do not overlap: {said}; stamp all topics with one clock"
+        intervals = ", ".join(f"{topic} {start:.3f} to {stop:.3f} s" for topic, (start, stop) in spans.items())
+        return f"{streams.name}: the header stamps do not overlap: {intervals}; stamp all topics with one clock"
     worst = sorted(counts_by_reason(rejected).items(), key=lambda item: -item[1])[:3]
-    said = "; ".join(f"{count} x {reason}" for reason, count in worst) or "fewer than two IMU messages"
-    return f"{streams.name}: no two samples could be aligned: {said}; correct the messages or the aircraft file"
+    reasons = "; ".join(f"{count} x {reason}" for reason, count in worst) or "fewer than two IMU messages"
+    return f"{streams.name}: no two samples could be aligned: {reasons}; correct the messages or the aircraft file"

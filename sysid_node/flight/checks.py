@@ -1,7 +1,7 @@
-"""Plausibility: what no fixed-wing aircraft measures is rejected, with a reason that names the likely mistake.
+"""Plausibility limits: messages with values that no fixed-wing aircraft measures are rejected, with a reason.
 
-The limits are far outside what aircraft of any size do and close enough in to catch degrees for radians. Messages
-one by one (``*_fault``) and arrays of them (``*_faults``) are judged alike.
+The limits are far outside the motion of aircraft of any size, and narrow enough to detect degrees given for radians.
+The functions ``*_fault`` check single messages, and ``*_faults`` apply the same checks to arrays of messages.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ CLOCK_STEP = "clock step"
 
 
 def gap(topic: str) -> str:
-    """The reason where an IMU message has no close enough neighbours in another topic."""
+    """The reason where an IMU message has no neighbours in another topic that are near enough."""
     return f"{topic} gap"
 
 
@@ -51,12 +51,12 @@ def no_joint(name: str) -> str:
 
 
 def joint_angle(name: str) -> str:
-    """The reason where a joint is deflected further than any surface goes."""
+    """The reason where a joint is deflected further than any surface can be."""
     return f"joint {name!r} over pi/2 rad (degrees?)"
 
 
 def is_nan(x: float) -> bool:
-    """Whether x is NaN; unlike ``math.isnan`` it takes integers of any size."""
+    """Whether x is NaN. Unlike ``math.isnan`` it accepts integers of any size."""
     return not -math.inf <= x <= math.inf
 
 
@@ -123,7 +123,7 @@ def joint_fault(name: str, position: float) -> str | None:
 
 
 def throttle_limit(in_newton: bool) -> float:
-    """The largest throttle, or thrust in N, that is believed."""
+    """The largest throttle, or thrust in N, that is accepted."""
     return THRUST_LIMIT if in_newton else THROTTLE_LIMIT
 
 
@@ -135,7 +135,7 @@ def throttle_fault(position: float, in_newton: bool) -> str | None:
 
 
 def _first(*cases: tuple[Any, str]) -> NDArray[np.object_]:
-    """Of each row the reason of the first case (N,) that holds, or None."""
+    """For each row the reason of the first case (N,) that is true, or None."""
     faults = np.full(cases[0][0].shape, None, object)
     for wrong, reason in reversed(cases):
         faults[wrong] = reason

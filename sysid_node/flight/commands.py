@@ -1,4 +1,4 @@
-"""What the joints of a recorded flight were told: one message after the other, in log order."""
+"""The commands to the joints in a recorded flight, message by message in log order."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class JointMessage(NamedTuple):
 
 
 def read_commands(path: str | Path) -> list[JointMessage]:
-    """The commands in a bag that ``read_streams`` can read; none where it holds none of this type."""
+    """The commands in a bag that ``read_streams`` can read; an empty list where it holds none of this type."""
     with Reader(Path(path)) as reader:
         chosen = [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]
         found = [(log_ns, data) for _, log_ns, data in reader.messages(chosen)] if chosen else []

@@ -1,4 +1,4 @@
-"""Flight CSV: one row a sample, columns named as in ``record.COLUMNS`` and ``t`` in s; an empty cell: not measured."""
+"""Flights as CSV: one row per sample, columns named as in ``record.COLUMNS``, and ``t`` in s. Empty: not measured."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ TIME = "t"
 
 
 def read_csv(path: str | Path) -> FlightRecord:
-    """A flight from CSV; a column of another name counts as a further control.
+    """The flight in a CSV file; a column with another name is taken as a further control.
 
-    Raises InputError naming file and line where a cell is no number, a row is cut short or the time does not increase.
+    Raises InputError that names file and line where a cell is no number, a row is incomplete or time does not increase.
     """
     path = Path(path)
     try:

@@ -1,7 +1,7 @@
-"""Between ROS axes and the axes inside: FLU and FRD bodies, ENU and NED worlds, quaternions and Euler angles.
+"""Conversion of axes: FLU and FRD body axes, ENU and NED world axes, quaternions and Euler angles.
 
-REP-103 has the body forward-left-up and the world east-north-up; inside, bodies are forward-right-down and
-worlds north-east-down. Both changes of axes are half turns: FLU to FRD about x, ENU to NED about x = y.
+ROS (REP-103) has body axes forward-left-up and world axes east-north-up. This package has body axes forward-right-down
+and world axes north-east-down. Both conversions are half turns: FLU to FRD about x, ENU to NED about the line x = y.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ BODY_FRAMES: tuple[BodyFrame, ...] = get_args(BodyFrame)
 
 
 def turn_vectors(vectors: Array, frame: BodyFrame) -> Array:
-    """Vectors (N, 3) between ``frame`` and FRD, either way: y and z change sign where the frame is FLU."""
+    """Vectors (N, 3) converted between ``frame`` and FRD, in either direction: for FLU, y and z change sign."""
     signs = (1.0, 1.0, 1.0) if frame == "frd" else (1.0, -1.0, -1.0)
     turned: Array = vectors * np.array(signs)
     return turned
@@ -27,8 +27,8 @@ def turn_vectors(vectors: Array, frame: BodyFrame) -> Array:
 def euler_from_quaternion(quaternion: Array, frame: BodyFrame) -> Array:
     """Euler angles phi theta psi (N, 3) rad, 3-2-1, FRD against NED, of unit quaternions x y z w (N, 4).
 
-    The quaternion turns ``frame`` axes into the world's: ENU for an FLU body, NED for an FRD body.
-    Where it is not of unit length (within 1 %) there is no attitude: NaN.
+    The quaternion rotates vectors from ``frame`` axes to world axes: ENU for FLU, NED for FRD. The angles are NaN where
+    its length is not 1 (within 1 %), as that marks a missing attitude.
     """
     length = np.sqrt(np.sum(quaternion**2, axis=1))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -42,7 +42,7 @@ def euler_from_quaternion(quaternion: Array, frame: BodyFrame) -> Array:
 
 
 def tilt_from_quaternion(quaternion: tuple[float, float, float, float], frame: BodyFrame) -> tuple[float, float]:
-    """Roll and pitch of ``euler_from_quaternion`` of one quaternion, without arrays: for every message in flight."""
+    """Roll and pitch (rad) of ``euler_from_quaternion`` for one quaternion, without arrays, for use in flight."""
     length = math.hypot(*quaternion)
     if not abs(length - 1.0) < 0.01:
         return math.nan, math.nan
@@ -53,7 +53,7 @@ def tilt_from_quaternion(quaternion: tuple[float, float, float, float], frame: B
 
 
 def quaternion_from_euler(euler: Array, frame: BodyFrame) -> Array:
-    """Quaternions x y z w (N, 4) of Euler angles phi theta psi (N, 3) rad: the way back."""
+    """Quaternions x y z w (N, 4) of Euler angles phi theta psi (N, 3) rad; inverse of ``euler_from_quaternion``."""
     phi, theta, psi = euler.T / 2.0
     if frame == "flu":
         theta, psi = -theta, math.pi / 4.0 - psi

@@ -1,4 +1,4 @@
-"""Flights from files: bags and logs by suffix, and a log's samples as the messages that would have carried them."""
+"""Loads flights from bags and logs, chosen by suffix, and converts a log's samples to streams of messages."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
 
-#: Readers of logs that hold samples already aligned, by suffix.
+#: Readers of logs, whose samples are already aligned, by suffix.
 READERS: Mapping[str, Callable[[Path], FlightRecord]] = MappingProxyType({".csv": read_csv})
 
-#: Joints of a log's controls, by symbol; thrust is in N.
+#: Joints for the controls of a log -> the controls' symbols; thrust is in N.
 STANDARD_JOINTS = MappingProxyType({"elevator": "de", "aileron": "da", "rudder": "dr"})
 THROTTLE_JOINT = "throttle"
 
-_START_NS = 1_000_000_000  # of a log without a date: a stamp of zero would say that there is none
+_START_NS = 1_000_000_000  # first stamp of a log without a date, as a stamp of zero means that there is none
 _NEEDED = ("ax", "ay", "az", "p", "q", "r", "V")
 
 
 def read_log(path: str | Path) -> FlightRecord:
-    """A flight from a log. Raises InputError where the suffix is not known or the log cannot be read."""
+    """The flight in a log. Raises InputError where the suffix is unknown or the log cannot be read."""
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -45,17 +45,17 @@ def load_flight_record(
     frame: BodyFrame = "flu",
     max_gap: float = 0.2,
 ) -> FlightRecord:
-    """A flight from a log, or from a bag (aligned; ``max_gap`` s as of ``align``). Raises InputError."""
+    """The flight in a log, or in a bag, aligned with ``max_gap`` (s) as in ``align``. Raises InputError."""
     if Path(path).suffix.lower() in READERS:
         return read_log(path)
     return flight_record(aircraft, read_streams(path, topics, frame), max_gap)
 
 
 def streams_from_record(flight: FlightRecord, aircraft: Aircraft | None = None) -> Streams:
-    """A flight as messages, one on each topic per sample, stamped from the flight's start.
+    """The messages of a flight: one on each topic per sample, stamped from the flight's start.
 
-    Joints are the aircraft's where one is given (its map turned round), else ``elevator``, ``aileron``,
-    ``rudder``, with thrust in N as ``throttle``. Raises InputError where a column that every flight needs is missing.
+    The joints are those of the aircraft, by the inverse of its map, where one is given; otherwise ``elevator``,
+    ``aileron`` and ``rudder``, with thrust in N as ``throttle``. Raises InputError where a needed column is missing.
     """
     missing = [column for column in _NEEDED if not flight.measured(column)]
     if missing:
@@ -77,7 +77,7 @@ def _side_by_side(flight: FlightRecord, *columns: str) -> Array:
 
 
 def _standard_joints(flight: FlightRecord) -> dict[str, Array]:
-    """Joints that are the controls themselves; those not measured are left out."""
+    """Joints equal to the controls; controls that were not measured are left out."""
     joints = {joint: flight[symbol] for joint, symbol in STANDARD_JOINTS.items() if flight.measured(symbol)}
     if flight.measured("thrust"):
         joints[THROTTLE_JOINT] = flight["thrust"]
@@ -87,7 +87,7 @@ def _standard_joints(flight: FlightRecord) -> dict[str, Array]:
 
 
 def _aircraft_joints(flight: FlightRecord, aircraft: Aircraft) -> dict[str, Array]:
-    """The joints from which the aircraft file would make the flight's controls; of several such, the smallest."""
+    """The smallest joint positions from which the aircraft file's map gives the flight's controls."""
     controls = list(aircraft.controls.values())
     unmeasured = [control.symbol for control in controls if not flight.measured(control.symbol)]
     if unmeasured:

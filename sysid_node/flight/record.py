@@ -1,4 +1,4 @@
-"""FlightRecord: a flight as time-aligned columns. SI, radians, body axes forward-right-down."""
+"""``FlightRecord``, a flight as time-aligned columns. SI units, radians, body axes forward-right-down."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Columns a record may hold, with their units. A record also holds one column per further control.
+#: The columns that a record may hold, with their units. It has one more column for each further control.
 COLUMNS = {
     "ax": "specific force, body x, m/s^2",
     "ay": "specific force, body y, m/s^2",
@@ -34,10 +34,10 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """A flight on one time base.
+    """A flight with one time base.
 
     ``time`` (N,) s, strictly increasing, usually from zero; ``columns`` name -> (N,), NaN = not measured.
-    ``start_ns`` is the header stamp of ``time == 0``. ``rejected`` counts input left out, by reason.
+    ``start_ns`` is the header stamp (ns) at ``time == 0``. ``rejected`` counts messages left out, by reason.
     Raises ValueError where times do not increase or lengths differ.
     """
 
@@ -64,7 +64,7 @@ class FlightRecord:
                 )
 
     def __getitem__(self, column: str) -> Array:
-        """The column, or all NaN where it was not measured."""
+        """The column (N,); all NaN where it was not measured."""
         if column in self.columns:
             return self.columns[column]
         return np.full(self.time.shape, np.nan)

@@ -1,4 +1,4 @@
-"""Streams: what the three input topics said, one array a topic, before anything is aligned or rejected."""
+"""The messages of the three input topics as arrays, before any message is aligned or rejected."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Stamps = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Arrival:
-    """When the messages of a topic were stamped and when they came, in log order; all (N,)."""
+    """Stamps, log times and order of the N messages of a topic, in log order."""
 
-    stamp_ns: Stamps  # the headers' own
-    log_ns: Stamps  # when each was recorded
-    order: Stamps  # place among the messages of all topics
+    stamp_ns: Stamps  # (N,) of the headers, ns
+    log_ns: Stamps  # (N,) when each was recorded, ns
+    order: Stamps  # (N,) place among the messages of all topics
 
     def __len__(self) -> int:
         return int(self.stamp_ns.size)
@@ -59,7 +59,7 @@ class JointStream(Stream):
 
 @dataclass(frozen=True)
 class Streams:
-    """A flight as it was recorded; ``name`` is what errors call it. Raises InputError where a topic is empty."""
+    """A flight as recorded; ``name`` stands in error messages. Raises InputError where a topic has no messages."""
 
     imu: ImuStream
     air_data: AirDataStream
@@ -73,12 +73,12 @@ class Streams:
 
     @property
     def by_topic(self) -> dict[str, Stream]:
-        """The streams by the topics' own names."""
+        """The streams by topic."""
         return {IMU: self.imu, AIR_DATA: self.air_data, ACTUATORS: self.actuators}
 
 
 def arrivals_in_stamp_order(*stamps_ns: Stamps) -> list[Arrival]:
-    """Arrivals of topics whose messages came when they were stamped; at equal stamps the first topic's first."""
+    """Arrivals of topics whose messages arrived when they were stamped; at equal stamps in the order of the topics."""
     every = np.concatenate(stamps_ns)
     order = np.empty(every.size, np.int64)
     order[np.argsort(every, kind="stable")] = np.arange(every.size)

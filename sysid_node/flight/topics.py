@@ -1,4 +1,4 @@
-"""The topics that carry a flight: their names and message types."""
+"""Names and message types of the topics that describe a flight."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ INPUT_TOPICS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-#: Where the node called ``identifier`` publishes, and its type.
+#: The topic on which the node ``identifier`` publishes, and its type.
 DERIVATIVES = "/identifier/derivatives"
 DERIVATIVES_TYPE = "sysid_msgs/msg/DerivativeEstimates"
 
 
 def topic_names(remaps: Iterable[str] = ()) -> dict[str, str]:
-    """Absolute names of the input topics, changed by remaps like ``imu/data:=/mavros/imu/data``.
+    """Absolute names of the input topics, after remaps such as ``imu/data:=/mavros/imu/data``.
 
     Raises InputError where a remap is malformed or names no input topic.
     """

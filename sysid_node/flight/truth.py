@@ -1,4 +1,4 @@
-"""The truth beside a simulated bag: ``BAG.truth.json``, kept apart so that nothing that reads the bag sees it."""
+"""True derivatives of a simulated bag, in ``BAG.truth.json`` beside it, so that readers of the bag do not see them."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from sysid_node.errors import InputError
 
 
 def truth_path(bag: str | Path) -> Path:
-    """The truth file of a bag, whether it is given as its folder or as a file in it."""
+    """The truth file of a bag, which is given as its folder or as a file in it."""
     bag = Path(bag).resolve()
     folder = bag if bag.is_dir() or not bag.suffix else bag.parent
     return folder.with_name(f"{folder.name}.truth.json")
 
 
 class Truth(NamedTuple):
-    """True derivatives by name as they are at a flight's end, and since when (s) those that have changed are so."""
+    """True derivatives by name at the end of a flight, and since when (s) those that changed have their value."""
 
     values: dict[str, float]
     since: dict[str, float]
 
 
 def read_truth(bag: str | Path) -> dict[str, float]:
-    """As ``truth_at_end``, of those derivatives alone that are the same from a flight's beginning to its end."""
+    """The true derivatives that are constant during the whole flight."""
     truth = truth_at_end(bag)
     return {name: value for name, value in truth.values.items() if name not in truth.since}
 
 
 def truth_at_end(bag: str | Path) -> Truth:
-    """All that is true at the end; empty where there is no truth file. Raises InputError where it is no such file."""
+    """The true derivatives at the end; empty where there is no truth file. Raises InputError where it is malformed."""
     path = truth_path(bag)
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""What an adapter hears, what it says, and what it needs to be told."""
+"""The interface of an adapter, the samples that it gives, and its settings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.attitude import Attitude, LastAttitude
 from sysid_node.flight.autopilots.joints import joints_of
 
-#: Of dry air, J/(kg K); of the sea-level standard atmosphere, kg/m^3 (ICAO Doc 7488, 1993).
+#: Gas constant of dry air, J/(kg K), and density of the standard atmosphere at sea level, kg/m^3 (ICAO Doc 7488, 1993).
 GAS_CONSTANT = 287.05287
 SEA_LEVEL_DENSITY = 1.225
 
@@ -21,7 +21,7 @@ Vector = tuple[float, float, float]
 
 
 class ImuSample(NamedTuple):
-    """Forward-right-down axes; the attitude turns them into north-east-down, None = not known."""
+    """Specific force and rates in FRD axes; the attitude rotates these to north-east-down, None = unknown."""
 
     stamp_ns: int
     force: Vector  # m/s^2
@@ -30,7 +30,7 @@ class ImuSample(NamedTuple):
 
 
 class AirSample(NamedTuple):
-    """NaN = not measured. None of the autopilots measures flow angles."""
+    """Air data; NaN = not measured. None of the autopilots measures flow angles."""
 
     stamp_ns: int
     true_airspeed: float  # m/s
@@ -40,7 +40,7 @@ class AirSample(NamedTuple):
 
 
 class JointSample(NamedTuple):
-    """Commands: what the autopilot asks of its servos and motors, not where they are."""
+    """The commands to servos and motors, not their positions."""
 
     stamp_ns: int
     names: tuple[str, ...]
@@ -50,7 +50,7 @@ class JointSample(NamedTuple):
 Sample = ImuSample | AirSample | JointSample
 
 
-#: What the settings may be, by name.
+#: The allowed range of each numerical setting.
 RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"air_temperature": (-60.0, 60.0), "air_data_delay": (0.0, 1.0)}
 )
@@ -58,11 +58,11 @@ RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class AdapterSettings:
-    """What no message says. Raises InputError on a value outside ``RANGES``."""
+    """What the messages do not say. Raises InputError on a value outside ``RANGES``."""
 
-    joints: str = ""  # which output moves which joint; see ``joints_of``
-    air_temperature: float = 15.0  # degC, of the outside air where the pressure is measured
-    air_data_delay: float = 0.0  # s, by which airspeed is stamped too late
+    joints: str = ""  # the output that moves each joint; see ``joints_of``
+    air_temperature: float = 15.0  # degC, of the outside air; used where the pressure alone is measured
+    air_data_delay: float = 0.0  # s by which the airspeed's stamps are late
 
     def __post_init__(self) -> None:
         for name, (lower, upper) in RANGES.items():
@@ -72,37 +72,40 @@ class AdapterSettings:
 
 
 class Adapter(ABC):
-    """Takes an autopilot's messages one by one; remembers what they say in part.
+    """Converts an autopilot's messages one by one, and remembers those that are needed for later samples.
 
-    Raises InputError where the joints are not given or name an output that there is not.
+    Raises InputError where no joints are given, or one names an unknown output.
     """
 
     topics: ClassVar[Mapping[str, str]]  # name -> message type
     outputs: ClassVar[tuple[str, ...]]  # names of servo and motor outputs
-    example: ClassVar[str]  # of the parameter joints
-    package: ClassVar[str]  # of its messages
+    example: ClassVar[str]  # a value of the parameter joints
+    package: ClassVar[str]  # that defines its messages
     remedy: ClassVar[str]  # where to get that package
 
     def __init__(self, settings: AdapterSettings) -> None:
         self.settings = settings
         self.joints = joints_of(settings.joints, self.outputs, self.example)
         self.attitude = LastAttitude()
-        self.air_density = math.nan  # kg/m^3, held until the next; without it there is no true airspeed
+        self.air_density = math.nan  # kg/m^3, the latest; without it there is no true airspeed
 
     def hear(self, topic: str, message: Any) -> Sample | None:
-        """What a message on one of ``topics`` gives, if anything by itself. Any object with the message's fields."""
+        """The sample that a message on one of ``topics`` gives, or None.
+
+        Any object with the message's fields will do.
+        """
         return self.listeners()[topic](message)
 
     @abstractmethod
     def listeners(self) -> Mapping[str, Callable[[Any], Sample | None]]:
-        """What takes the messages of each of the ``topics``."""
+        """The function that converts the messages of each topic."""
 
     def air(self, stamp_ns: int, true_airspeed: float, density: float) -> AirSample:
-        """Air data, stamped when they were measured."""
+        """An air data sample, its stamp corrected by the delay."""
         return AirSample(stamp_ns - round(1e9 * self.settings.air_data_delay), true_airspeed, density)
 
     def deflections(self, stamp_ns: int, outputs: Mapping[str, float]) -> JointSample:
-        """All joints, NaN where their output is not known."""
+        """The positions of all joints, NaN where the output is unknown."""
         positions = tuple(joint.position(outputs.get(joint.output, math.nan)) for joint in self.joints)
         return JointSample(stamp_ns, tuple(joint.name for joint in self.joints), positions)
 
@@ -113,17 +116,17 @@ class Adapter(ABC):
 
 
 def adapter_for(autopilot: str, adapters: Mapping[str, type[Adapter]], settings: AdapterSettings) -> Adapter:
-    """The adapter of an autopilot. Raises InputError where there is none of that name."""
+    """The adapter of an autopilot. Raises InputError where the name is unknown."""
     if autopilot not in adapters:
         raise InputError(f"parameter autopilot = {autopilot!r}: expected one of {', '.join(adapters)}")
     return adapters[autopilot](settings)
 
 
 def header_ns(message: Any) -> int:
-    """A header's stamp, ns."""
+    """The stamp of a message's header, ns."""
     return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
 
 
 def numbered(prefix: str, values: Sequence[float]) -> dict[str, float]:
-    """Outputs by name, from 1."""
+    """Outputs by name: the prefix and a number from 1."""
     return {f"{prefix}{i}": float(value) for i, value in enumerate(values, 1)}

@@ -1,4 +1,4 @@
-"""An autopilot that says what is needed on five topics, one of each kind."""
+"""An autopilot with five topics: IMU, attitude, static pressure, airspeed and outputs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sysid_node.flight.autopilots.base import Adapter, AirSample, ImuSample, Joi
 
 
 class FiveTopics(Adapter):
-    """``parts`` names the topics of the IMU, attitude, static pressure, airspeed and outputs."""
+    """``parts`` are the topics of IMU, attitude, static pressure, airspeed and outputs."""
 
     parts: ClassVar[tuple[str, str, str, str, str]]
 

@@ -1,4 +1,4 @@
-"""From an autopilot's outputs to joint positions: a linear map a joint, which only who built the aircraft knows."""
+"""Joint positions from an autopilot's outputs: a linear map for each joint, given by the builder of the aircraft."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ class Joint:
 
     name: str
     output: str
-    trim: float  # unit of the output, where the joint is at zero
-    scale: float  # rad per unit of the output; of a throttle 1 per unit
+    trim: float  # value of the output at which the joint is at zero
+    scale: float  # rad per unit of the output; for a throttle, its range 0..1 per unit
 
     def position(self, value: float) -> float:
-        """Where an output puts the joint: rad, or 0..1."""
+        """The position of the joint for a value of the output: rad, or 0..1."""
         return self.scale * (value - self.trim)
 
 
 def joints_of(text: str, outputs: Sequence[str], example: str) -> tuple[Joint, ...]:
-    """Joints from ``name=output:trim:scale``, with spaces between.
+    """The joints described by words ``name=output:trim:scale`` with spaces between.
 
-    Raises InputError where there is none, one is malformed, named twice, or of an output that is not in ``outputs``.
+    Raises InputError where there is none, or one is malformed, given twice, or not of one of the ``outputs``.
     """
     words = text.split()
     if not words:

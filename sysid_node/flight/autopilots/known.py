@@ -1,4 +1,4 @@
-"""The autopilots that there are adapters for."""
+"""The autopilots that have an adapter."""
 
 from __future__ import annotations
 

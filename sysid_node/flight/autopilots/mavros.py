@@ -1,4 +1,4 @@
-"""ArduPilot, through MAVROS: package mavros_msgs. MAVROS has turned the axes to forward-left-up and east-north-up."""
+"""ArduPilot through MAVROS (package mavros_msgs), which gives axes forward-left-up and east-north-up."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ OUTPUTS = "/mavros/rc/out"
 #: MAVLink's SERVO_OUTPUT_RAW counts microseconds in 32 bits.
 WRAP_NS = 2**32 * 1000
 
-#: Pulses (us) outside this are no positions: 0 and 65535 mean that an output is not used.
+#: Pulses (us) outside this range are no positions: 0 and 65535 mean that an output is not used.
 PULSES = (400.0, 2600.0)
 
 
 class Mavros(FiveTopics):
-    """ArduPlane beside MAVROS 2."""
+    """ArduPlane with MAVROS 2."""
 
     parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
@@ -54,7 +54,7 @@ class Mavros(FiveTopics):
         self._last_imu_ns = 0
 
     def _imu(self, message: Any) -> ImuSample:
-        """Of data_raw: in data the force is that of the message before, at the attitude's time."""
+        """A sample from data_raw. The topic data holds the force of an earlier message, with the attitude's stamp."""
         stamp_ns = self._last_imu_ns = header_ns(message)
         force, rate = message.linear_acceleration, message.angular_velocity
         rates = (float(rate.x), -float(rate.y), -float(rate.z))
@@ -69,12 +69,15 @@ class Mavros(FiveTopics):
         self.air_density = self.density(float(message.fluid_pressure))
 
     def _air(self, message: Any) -> AirSample:
-        """ArduPlane's airspeed is the equivalent one: true by the root of the densities' ratio."""
+        """Air data with the true airspeed: ArduPlane's equivalent airspeed times the root of the ratio of densities."""
         true_airspeed = float(message.airspeed) * math.sqrt(SEA_LEVEL_DENSITY / self.air_density)
         return self.air(header_ns(message), true_airspeed, self.air_density)
 
     def _joints(self, message: Any) -> JointSample:
-        """Stamped by a counter that wraps every 71.6 minutes: as many wraps on as bring it next to the IMU's stamp."""
+        """Deflections.
+
+        Their stamp is a counter that wraps every 71.6 minutes, so the wraps nearest to the IMU are added.
+        """
         stamp_ns = header_ns(message)
         wraps = round((self._last_imu_ns - stamp_ns) / WRAP_NS) if self._last_imu_ns else 0
         used = {

@@ -1,4 +1,4 @@
-"""PX4, through its uXRCE-DDS bridge: package px4_msgs. Axes are forward-right-down, times microseconds of one clock."""
+"""PX4 through its uXRCE-DDS bridge (package px4_msgs). Axes are forward-right-down, stamps are in microseconds."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Px4(Adapter):
         }
 
     def _imu(self, message: Any) -> ImuSample:
-        """Stamped when the rates were measured; no force where the accelerometer's time says that it is invalid."""
+        """A sample stamped when the rates were measured; without force where the accelerometer's time is invalid."""
         rx, ry, rz = (float(rate) for rate in message.gyro_rad)
         fx, fy, fz = (float(force) for force in message.accelerometer_m_s2)
         if message.accelerometer_timestamp_relative == message.RELATIVE_TIMESTAMP_INVALID:
@@ -77,7 +77,7 @@ class Px4(Adapter):
         self.air_density = float(message.rho)
 
     def _air(self, message: Any) -> AirSample:
-        """No airspeed where it is ground speed minus wind, or synthetic: those are no measurements of the air."""
+        """Air data; no airspeed where it is ground speed minus wind, or synthetic, as those are not measured."""
         source = getattr(message, "airspeed_source", None)
         if source is None:  # until 1.15
             source = message.selected_airspeed_index
@@ -89,7 +89,7 @@ class Px4(Adapter):
         self._last_motors = numbered("motor", message.control)
 
     def _servos(self, message: Any) -> JointSample:
-        """With the motors' last commands."""
+        """Deflections, with the motors' last commands."""
         return self.deflections(_stamp_ns(message), self._last_motors | numbered("servo", message.control))
 
 

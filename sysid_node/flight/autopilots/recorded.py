@@ -1,4 +1,4 @@
-"""A recording of an autopilot's own topics, as the streams that its adapter would have published."""
+"""Streams from a recording of an autopilot's own topics: what its adapter would have published."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointSt
 
 
 class LoggedSample(NamedTuple):
-    """A sample, and when the message that gave it was recorded."""
+    """A sample, and place and log time of the message that gave it."""
 
     order: int
     log_ns: int
@@ -30,7 +30,7 @@ class LoggedSample(NamedTuple):
 
 
 def read_recorded(path: str | Path, adapter: Adapter) -> Streams:
-    """What the adapter makes of a bag of the autopilot's topics, message for message in log order.
+    """The streams that the adapter makes of a bag of the autopilot's topics, message by message in log order.
 
     Raises InputError where the bag cannot be read, lacks a topic or the definition of a message, or gives no sample.
     """
@@ -40,7 +40,7 @@ def read_recorded(path: str | Path, adapter: Adapter) -> Streams:
         return streams_of_samples(_read(path, adapter, said), said)
     except InputError:
         raise
-    except Exception as error:  # a damaged file makes its parsers fail in any way there is
+    except Exception as error:  # parsers of a damaged file raise all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{said}: cannot be read: {words}; give a rosbag2 folder, .mcap or .db3 file") from error
 
@@ -54,7 +54,7 @@ def _read(path: Path, adapter: Adapter, said: str) -> list[LoggedSample]:
 
 
 def _types(connections: list[Connection], adapter: Adapter, said: str) -> Typestore:
-    """The type store with the messages' definitions, which the bag holds."""
+    """The type store, with the definitions of the messages that the bag holds."""
     store = deepcopy(type_store())
     for connection in connections:
         wanted = adapter.topics[connection.topic]
@@ -82,7 +82,7 @@ def _samples(
 
 
 def streams_of_samples(logged: list[LoggedSample], name: str) -> Streams:
-    """The samples by kind, one array each. Raises InputError where there is none of a kind."""
+    """The streams of the samples of each kind. Raises InputError where there is none of a kind."""
     imu = [(one, one.sample) for one in logged if isinstance(one.sample, ImuSample)]
     air = [(one, one.sample) for one in logged if isinstance(one.sample, AirSample)]
     joints = [(one, one.sample) for one in logged if isinstance(one.sample, JointSample)]
@@ -108,7 +108,7 @@ def _arrival(logged: list[LoggedSample]) -> Arrival:
 
 
 def _euler(samples: list[ImuSample]) -> Array:
-    """Euler angles (N, 3), NaN where there is no attitude."""
+    """Euler angles (N, 3) rad, NaN where there is no attitude."""
     none = (np.nan,) * 4
     wxyz = np.array([sample.attitude or none for sample in samples]).reshape(-1, 4)
     return euler_from_quaternion(np.roll(wxyz, -1, axis=1), "frd")

@@ -1,4 +1,4 @@
-"""ROSflight, through rosflight_io: package rosflight_msgs. Axes are forward-right-down and north-east-down."""
+"""ROSflight through rosflight_io (package rosflight_msgs). Axes are forward-right-down and north-east-down."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ class Rosflight(FiveTopics):
     remedy = "build github.com/rosflight/rosflight_ros_pkgs, and source that workspace"
 
     def _imu(self, message: Any) -> ImuSample:
-        """Its own orientation is an older attitude without a time; the stamped one is taken."""
+        """A sample with the stamped attitude of another topic.
+
+        The message's own orientation is older and has no stamp.
+        """
         stamp_ns = header_ns(message)
         force, rate = message.linear_acceleration, message.angular_velocity
         rates = (float(rate.x), float(rate.y), float(rate.z))
@@ -53,6 +56,9 @@ class Rosflight(FiveTopics):
         return self.deflections(header_ns(message), numbered("out", message.values))
 
     def _air(self, message: Any) -> AirSample:
-        """By Bernoulli, 0.2 % high at 40 m/s; the firmware's own velocity depends on its probe's temperature."""
+        """Air data by Bernoulli's equation, 0.2 % high at 40 m/s.
+
+        The firmware's velocity depends on its probe's temperature.
+        """
         pressure = max(float(message.differential_pressure), 0.0)
         return self.air(header_ns(message), math.sqrt(2.0 * pressure / self.air_density), self.air_density)

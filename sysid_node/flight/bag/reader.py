@@ -21,7 +21,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
-#: Above this variance (rad^2) an IMU's heading counts as not measured.
+#: A heading with a larger variance (rad^2) counts as not measured.
 HEADING_UNKNOWN = 1.0e3
 
 
@@ -61,7 +61,7 @@ def reading(path: Path) -> Iterator[None]:
         raise
     except FileNotFoundError as error:
         raise InputError(f"bag {path.name}: {_not_found(path)}") from error
-    except Exception as error:  # a damaged file makes its parsers fail in any way there is
+    except Exception as error:  # parsers of a damaged file raise all kinds of exceptions
         raise InputError(f"bag {path.name}: cannot be read: {_one_line(error)}; {_remedy(path)}") from error
 
 
