@@ -15,6 +15,9 @@ COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 LONGITUDINAL = ("CL", "CD", "Cm")
 LATERAL = ("CY", "Cl", "Cn")
 
+#: Signals of motion in the plane of symmetry: those that a flight without lateral measurements has.
+LONGITUDINAL_SIGNALS = ("V", "alpha", "theta", "q", "ax", "az")
+
 #: Regressors that every aircraft has, and their meaning. The symbols of its controls are regressors, too.
 STATE_REGRESSORS = {
     "0": "offset, 1",

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import LATERAL, LONGITUDINAL
 from sysid_node.batch.regression.coloured_residuals import coloured_covariance
 from sysid_node.batch.regression.combined_fit import combined_fit
 from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
@@ -36,8 +37,8 @@ from sysid_node.flight.record import Array, FlightRecord
 
 #: Motion, what changes of it, and the coefficients that change it.
 _GROUPS = (
-    (("V", "alpha", "theta", "q"), ("V", "alpha", "q"), ("CL", "CD", "Cm")),
-    (("beta", "p", "r", "phi"), ("beta", "p", "r"), ("CY", "Cl", "Cn")),
+    (("V", "alpha", "theta", "q"), ("V", "alpha", "q"), LONGITUDINAL),
+    (("beta", "p", "r", "phi"), ("beta", "p", "r"), LATERAL),
 )
 _HIDDEN = 6
 _RATE = 25.0  # Hz: enough for what the low-pass leaves

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import LATERAL
 from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.models.rigid_body import OUTPUTS, STATES, rigid_body
 from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
@@ -15,7 +16,7 @@ from sysid_node.flight.record import FlightRecord
 #: Coefficients that each axis' states need, and the states they then allow.
 _AXES = {
     ("CL", "Cm"): ("alpha", "q", "theta"),
-    ("CY", "Cl", "Cn"): ("beta", "p", "r", "phi"),
+    LATERAL: ("beta", "p", "r", "phi"),
 }
 _MODELLED_BY = {"ax": "CD", "ay": "CY", "az": "CL"}
 

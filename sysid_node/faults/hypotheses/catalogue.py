@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.aircraft.names import COEFFICIENTS, LATERAL, LONGITUDINAL
 from sysid_node.faults.hypotheses.bayes_factors import Shift
-from sysid_node.faults.model.terms import LATERAL, LONGITUDINAL, RATES, Terms
+from sysid_node.faults.model.terms import RATES, Terms
 from sysid_node.faults.types import AIRSPEED, DAMAGE, LOSS, SHIFTED, STUCK, VANE_OFFSET
 
 Array = NDArray[np.float64]

@@ -21,7 +21,6 @@ _SURFACE = 0.05  # rad
 _LOOSE = (0.5, 0.05)  # of a derivative without a tolerance: this share of its value, or so much
 _OFFSET = 0.01  # what an offset that is not in the file may be
 
-LONGITUDINAL, LATERAL = ("CL", "CD", "Cm"), ("CY", "Cl", "Cn")
 RATES = ("p", "q", "r")
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.names import LATERAL
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.air_motion import is_gusty
@@ -99,9 +100,7 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
             "honest error; give derivatives a tolerance (1 sigma) in the aircraft file"
         )
     lateral = any(v.flight.lateral for v in every)
-    sigma = {
-        f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in _LATERAL
-    }
+    sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
     sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
     if any(is_gusty(v) for v in every):
@@ -124,5 +123,4 @@ def _turning_air(aircraft: Aircraft) -> dict[str, float]:
     return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}
 
 
-_LATERAL = frozenset({"CY", "Cl", "Cn"})
 _SIDEWAYS = frozenset({"ay", "p", "r", "beta"})

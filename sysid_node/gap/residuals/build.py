@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sysid_node.aircraft.names import LONGITUDINAL, LONGITUDINAL_SIGNALS
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import flow_angles, thrust
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
@@ -24,7 +25,7 @@ from sysid_node.gap.residuals.windowed_spectra import Windows
 from sysid_node.sim import Simulator
 
 #: Channels of a flight without lateral measurements.
-_LONGITUDINAL = frozenset({"CL", "CD", "Cm", "V", "alpha", "theta"})
+_LONGITUDINAL = frozenset({*LONGITUDINAL, *LONGITUDINAL_SIGNALS})
 
 #: Realisations of the sensors' noise that its power is averaged over.
 _REALISATIONS = 4

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.aircraft.names import LONGITUDINAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.flightdata import thrust
@@ -33,9 +34,6 @@ WINDOW = 2.0
 READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
 
 _COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
-
-#: What a flight without lateral measurements shows.
-_LONGITUDINAL = frozenset({"ax", "az", "q", "theta", "V", "alpha"})
 
 #: Bootstrap draws, and short flights in a row that are drawn together.
 _DRAWS, _BLOCK = 2000, 2
@@ -67,7 +65,7 @@ def simulation_gap(base: Evidence, final: Evidence) -> Gap | None:
     lateral = all(flight.lateral for flight in flights)
     unread = {angle for flight in flights for angle in flight.inferred}
     unread |= thrust.THRUST_READINGS if any(not flight.metered for flight in flights) else set()
-    counted = np.array([(lateral or name in _LONGITUDINAL) and name not in unread for name in READINGS])
+    counted = np.array([(lateral or name in LONGITUDINAL_SIGNALS) and name not in unread for name in READINGS])
     counted &= motion.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
     if not counted.any():
         return None

@@ -17,10 +17,10 @@ def write_gap_report(path: Path, found: Diagnosis) -> None:
 
 
 SECTIONS: tuple[Section[Diagnosis], ...] = (
-    Section("opening", "", "gap_opening.html.j2", opening.opening),
-    Section("channels", "Error before and after the correction", "gap_channels.html.j2", opening.channels),
-    Section("where", "Where the gap lies", "gap_where.html.j2", waterfall.where),
-    Section("flight", "Measured and simulated", "gap_flight.html.j2", flight.flight),
-    Section("candidates", "Possible causes", "gap_candidates.html.j2", candidates.candidates),
-    Section("shape", "Shape of the missing force or moment", "gap_shape.html.j2", shape.shape),
+    Section("opening", "", "gap/opening.html.j2", opening.opening),
+    Section("channels", "Error before and after the correction", "gap/channels.html.j2", opening.channels),
+    Section("where", "Where the gap lies", "gap/where.html.j2", waterfall.where),
+    Section("flight", "Measured and simulated", "gap/flight.html.j2", flight.flight),
+    Section("candidates", "Possible causes", "gap/candidates.html.j2", candidates.candidates),
+    Section("shape", "Shape of the missing force or moment", "gap/shape.html.j2", shape.shape),
 )

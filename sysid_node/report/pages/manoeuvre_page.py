@@ -34,9 +34,9 @@ def _run(result: ManoeuvreResult) -> RunResult:
 
 
 SECTIONS: tuple[Section[ManoeuvreResult], ...] = (
-    Section("opening", "", "manoeuvre_opening.html.j2", plan.opening),
-    Section("manoeuvre", "The manoeuvre", "manoeuvre.html.j2", plan.context),
-    Section("prediction", "Predicted standard errors", "prediction.html.j2", prediction.context),
-    Section("correlations", "Correlated derivatives", "correlations.html.j2", correlations.context),
+    Section("opening", "", "manoeuvre/opening.html.j2", plan.opening),
+    Section("manoeuvre", "The manoeuvre", "manoeuvre/plan.html.j2", plan.context),
+    Section("prediction", "Predicted standard errors", "manoeuvre/prediction.html.j2", prediction.context),
+    Section("correlations", "Correlated derivatives", "manoeuvre/correlations.html.j2", correlations.context),
     Section("excitation", "Predicted flight", "excitation.html.j2", lambda result: excitation.context(_run(result))),
 )

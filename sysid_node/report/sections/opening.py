@@ -73,7 +73,7 @@ def _handling(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | N
     if not clauses:
         return None
     text = Markup("; ").join(clauses)
-    return Markup("In the air this means: {}.").format(text)
+    return Markup("Their signs say how it flies: {}.").format(text)
 
 
 def _best(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:

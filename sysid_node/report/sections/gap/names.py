@@ -31,7 +31,7 @@ def units_of(effect: str) -> dict[str, str]:
 
 def percent(share: float) -> str:
     """``38 %``."""
-    return f"{number(100.0 * share, 2)} %"
+    return f"{number(100.0 * share, 2)}\u202f%"
 
 
 def signal_words(name: str) -> str:

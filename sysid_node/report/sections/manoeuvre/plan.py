@@ -14,7 +14,7 @@ from sysid_node.excite.prediction import tolerances_of
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, GREEN, PURPLE, VERMILION, Figure
 from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
-from sysid_node.report.wording.numbers import number, plural, seconds
+from sysid_node.report.wording.numbers import listing, number, plural, seconds
 
 DEGREES = 180.0 / np.pi
 _COLOURS = {"elevator": BLUE, "aileron": VERMILION, "rudder": GREEN}
@@ -31,7 +31,7 @@ def opening(result: ManoeuvreResult) -> Mapping[str, Any]:
     return {
         "aircraft": result.aircraft.name,
         "length": seconds(plan.duration),
-        "moved": ", ".join(plan.moved),
+        "moved": listing(list(plan.moved)),
         "well": int((left < WELL).sum()),
         "count": plural(left.size, "derivative"),
         "hardly": int((left > HARDLY).sum()),
