@@ -76,7 +76,8 @@ def _alternatives(
     rest = [candidate for candidate in pool if candidate.effect not in without.fit.effects]
     screened = fitter.screen_upon([without], rest, lambda share, text: None)
     likely = screened[: THRESHOLDS.search.alternatives] if others else []
-    delays = [pair for pair in screened[len(likely) :] if {pair[1][1].effect, cause.effect} <= RESPONSE_DELAYS]
+    rest_screened = screened[len(likely) :]
+    delays = [p for p in rest_screened if {p.screened.candidate.effect, cause.effect} <= RESPONSE_DELAYS]
     fitted = fitter.fit_screened([*likely, *delays], lambda share, text: None)
     by_label = {} if others else {each.added.label: each for each in first if each.added}
     by_label |= {each.added.label: each for _, each in fitted if each.added}

@@ -1,4 +1,4 @@
-"""What is confused with what: how alike two explanations are on a flight, once the nuisances have done theirs."""
+"""How similar the effects' responses are on a flight, after the nuisances were fitted: what may be confused."""
 
 from __future__ import annotations
 
@@ -15,22 +15,26 @@ from sysid_node.gap.selection.candidate_fitter import FittedSet
 
 @dataclass(frozen=True)
 class Confusion:
-    """Explanations tried alone, the best first, and the cosines (K, K) between what they take away."""
+    """Candidates fitted alone, the best first, and the cosines (K, K) of the angles between what they remove."""
 
     labels: tuple[str, ...]
     cosines: Array
 
 
-def confusion_of(base: FittedSet, trials: Sequence[FittedSet]) -> Confusion:
-    """One: the two change the simulated flight in the same way, and no data of this flight part them."""
-    left = _rows(base.fit, base.fit)
-    taken = [left - _rows(trial.fit, base.fit) for trial in trials]
-    table = np.stack([t / max(float(np.linalg.norm(t)), 1e-300) for t in taken])
-    return Confusion(tuple(t.added.label for t in trials if t.added), table @ table.T)
+def confusion_of(base: FittedSet, fitted: Sequence[FittedSet]) -> Confusion:
+    """The confusion of candidates fitted alone, against nuisances alone (``base``).
+
+    A cosine of one says that two candidates change the prediction in the same way, so that this flight cannot tell
+    them apart.
+    """
+    before = _weighted_residual(base.fit, base.fit)
+    removed = [before - _weighted_residual(each.fit, base.fit) for each in fitted]
+    table = np.stack([each / max(float(np.linalg.norm(each)), 1e-300) for each in removed])
+    return Confusion(tuple(each.added.label for each in fitted if each.added), table @ table.T)
 
 
-def _rows(fit: CandidateFit, like: CandidateFit) -> Array:
-    """What a fit leaves, weighted as another's remainder."""
+def _weighted_residual(fit: CandidateFit, like: CandidateFit) -> Array:
+    """The residual (R,) of a fit with the weights of another."""
     pieces = [
         real_rows(flight.residual, weighted.weights).ravel()
         for flight, weighted in zip(fit.flights, like.flights, strict=True)

@@ -7,7 +7,7 @@ compared with its alternatives (``alternatives``), and those that are improbable
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate, candidates_of
@@ -22,86 +22,72 @@ from sysid_node.gap.instruments.overidentification import (
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import is_accepted, predicts_better
-from sysid_node.gap.selection.candidate_fitter import (
-    CandidateFitter,
-    FittedSet,
-    Progress,
-    best_screened,
-    with_found_onsets,
-)
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.selection.comparison import Comparison, probability_against
+from sysid_node.gap.selection.screening import best_screened, with_found_onsets
 from sysid_node.gap.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
 class Attribution:
-    """The explanation, what it was built on, and what is left."""
+    """An explanation of flights: its causes, what it was built on, and what it leaves."""
 
     base: FittedSet  # nuisances only
-    chosen: FittedSet
-    corrected: CandidateFit  # chosen, its unknowns as gusts do not bias them
+    chosen: FittedSet  # the causes' candidates
+    corrected: CandidateFit  # of ``chosen``, free of the bias that gusts cause
     structure_before: OveridentificationTest  # of what the nuisances leave
-    structure_left: OveridentificationTest  # of what the chosen effects leave
+    structure_left: OveridentificationTest  # of what the causes leave
     causes: tuple[Cause, ...]
-    doubted: tuple[Cause, ...]  # what predicts better, but is less likely to be there than not
-    ranking: tuple[tuple[str, float], ...]  # effects tried first, and their probabilities, best first
-    first_stage: tuple[FittedSet, ...] = field(default=())  # of the first stage
+    doubted: tuple[Cause, ...]  # what predicts better, but is improbable
+    ranking: tuple[tuple[str, float], ...]  # candidates fitted alone, and their probabilities, the best first
+    first_stage: tuple[FittedSet, ...] = ()  # these candidates, fitted
     held_out: tuple[HeldOutFlight, ...] = ()
     size_source: CandidateFit | None = None  # of the sizes, where the corrected fit has the file's derivatives
 
     @property
     def keeps_file_derivatives(self) -> bool:
-        """Whether derivatives are the file's, beside causes."""
+        """Whether the derivatives are the file's, with causes beside them."""
         return self.size_source is not None
 
     @property
     def size_fit(self) -> CandidateFit:
-        """The fit that sizes and their errors are from."""
+        """The fit that the sizes of causes and their standard errors are from."""
         return self.size_source or self.corrected
 
     def as_in_file(self) -> Attribution:
-        """The aircraft file as it is: where even the derivatives that were fitted predict worse."""
+        """The same with the aircraft file as the corrected fit: where fitted derivatives predict worse."""
         neutral = [model.simulator.neutral() for model in self.base.fit.models]
         return replace(self, corrected=linearised(self.base.fit.at(neutral)))
 
     def with_file_derivatives(self) -> Attribution:
-        """The causes beside the file's own derivatives: where those that were fitted predict worse."""
+        """The same causes with the file's own derivatives."""
         fit, neutral = self.corrected, self.corrected.simulator.neutral()
-        own, points = [*fit.indices, *fit.widened], [neutral.copy() for _ in fit.flights]
+        entries, points = [*fit.indices, *fit.widened], [neutral.copy() for _ in fit.flights]
         for point, flight in zip(points, fit.flights, strict=True):
-            point[own] = flight.point[own]
+            point[entries] = flight.point[entries]
         moved = replace(linearised(fit.at(points)), information=fit.information)
         return replace(self, corrected=moved, size_source=fit)
 
     def by_least_squares(self) -> Attribution:
-        """Sizes as least squares has them: where those without bias predict nothing."""
+        """The same causes with the sizes of least squares."""
         return replace(self, corrected=self.chosen.fit, size_source=None)
 
     def without_least_probable(self) -> Attribution:
-        """Without the cause that is the least probable."""
+        """The explanation without its least probable cause."""
         weakest = min(self.causes, key=lambda cause: cause.probability)
-        fit, causes = weakest.without.fit, tuple(cause for cause in self.causes if cause is not weakest)
-        return replace(
-            self,
-            chosen=weakest.without,
-            corrected=liml_estimate(fit),
-            size_source=None,
-            structure_left=pooled_overidentification(fit, self.held_out),
-            causes=causes,
-        )
+        causes = tuple(cause for cause in self.causes if cause is not weakest)
+        return self._explained_by(weakest.without, causes)
 
     def without_causes(self) -> Attribution:
-        """Nothing blamed: where the causes predict no better than the derivatives within their tolerances."""
-        corrected = liml_estimate(self.base.fit)
-        return replace(
-            self,
-            chosen=self.base,
-            corrected=corrected,
-            size_source=None,
-            structure_left=pooled_overidentification(self.base.fit, self.held_out),
-            causes=(),
-        )
+        """The derivatives within their tolerances alone."""
+        return self._explained_by(self.base, ())
+
+    def _explained_by(self, chosen: FittedSet, causes: tuple[Cause, ...]) -> Attribution:
+        """The same with fewer causes."""
+        left = pooled_overidentification(chosen.fit, self.held_out)
+        corrected = liml_estimate(chosen.fit)
+        return replace(self, chosen=chosen, corrected=corrected, size_source=None, structure_left=left, causes=causes)
 
 
 def attribute(
@@ -145,9 +131,9 @@ def _forward(
     """
     best, frontier, stages = base, [base], list[list[FittedSet]]()
     for count, (width, most) in enumerate(THRESHOLDS.search.stages):
-        screened = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
-        fitted = fitter.fit_screened(best_screened(screened, most), _share_of(progress, count))
-        candidates = with_found_onsets(candidates, [each for _, each in screened])
+        pairs = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
+        fitted = fitter.fit_screened(best_screened(pairs, most), _share_of(progress, count))
+        candidates = with_found_onsets(candidates, [pair.screened for pair in pairs])
         stages.append([larger for _, larger in fitted])
         better = [
             larger

@@ -1,7 +1,7 @@
-"""When something begins: looked for by stepping through the flight.
+"""The onset of an effect, searched by stepping through the flight.
 
-An onset has no slope but at the very moment it is thought to be, and many places where it rests; so every time is
-tried, the effect's size anew for each, first coarsely, then finely about the best.
+The deviance has many local minima in an onset, and its slope is zero but at the samples next to it. So every time is
+tried, with one step of all other parameters at each: first coarsely, then finely about the best.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from sysid_node.gap.instruments.moment_equations import limited_step, moment_equ
 from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.parameter_priors import bounds
 
-#: Steps between times that are tried, s, and how far about the best the finer ones reach, s.
+#: Coarse and fine steps between the times that are tried, and how far about the best the fine ones reach, s.
 _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
 
-#: The same where all of them count, s.
-_GRAIN = 0.5
+#: Step between times whose likelihoods give the uncertainty in still air, s; in gusts it is the coarse one.
+_LIKELIHOOD_STEP = 0.5
 
 
 def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
-    """The fit with the onset of one of its candidates where it leaves least; as it was where that is best."""
+    """The fit with the onset of one of its candidates at the least deviance; the fit itself where none is less."""
     names = fit.simulator.names
     places = [fit.indices.index(i) for i in candidate.indices if names[i].endswith(".onset")]
     if not places:
@@ -33,8 +33,8 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     problem, place = VariableProjection(fit), places[0]
     best = (problem.deviance(problem.residual(fit.values)), fit.values)
     end = max(float(model.record.duration) for model in fit.models)
-    best = _best(problem, best, place, np.arange(0.0, end, _COARSE))
-    best = _best(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
+    best = _best_of(problem, best, place, np.arange(0.0, end, _COARSE))
+    best = _best_of(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
     values = best[1]
     if values is fit.values:
         return fit
@@ -45,25 +45,25 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
 
 
 def onset_uncertainty(fit: CandidateFit, place: int) -> float:
-    """How far (s, rms) the time at this place of the values may be from where it stands, by all times' likelihood.
+    """Standard error (s) of the onset at this place of the values: rms distance of all times, by their likelihood.
 
-    A surface that rests tells nothing of when it failed, but that it did before it moved again; in moving air, at rest
-    is what only an autopilot moves, for it moves it with the gusts.
+    While a surface is at rest, nothing shows when it failed. In gusts the likelihood is that of what the commands
+    predict, because an autopilot moves the surfaces with the gusts.
     """
     moving = any(is_gusty(model) for model in fit.models)
-    grain = _COARSE if moving else _GRAIN
-    times = np.arange(0.0, max(float(model.record.duration) for model in fit.models), grain)
+    step_s = _COARSE if moving else _LIKELIHOOD_STEP
+    times = np.arange(0.0, max(float(model.record.duration) for model in fit.models), step_s)
     if moving:
-        deviance = np.array([_foretold(fit, place, float(time)) for time in times])
+        deviance = np.array([_command_deviance(fit, place, float(time)) for time in times])
     else:
         problem = VariableProjection(fit)
         deviance = np.array([_at(problem, fit.values, place, float(time))[0] for time in times])
     weight = np.exp(-0.5 * (deviance - deviance.min()))
-    return float(np.sqrt(np.average((times - fit.values[place]) ** 2, weights=weight) + grain**2 / 12.0))
+    return float(np.sqrt(np.average((times - fit.values[place]) ** 2, weights=weight) + step_s**2 / 12.0))
 
 
-def _foretold(fit: CandidateFit, place: int, time: float) -> float:
-    """What of the remainder the commands foretell with an onset at a time, all else at its best, in noise levels."""
+def _command_deviance(fit: CandidateFit, place: int, time: float) -> float:
+    """Deviance of what the commands predict, with an onset at a time and all else at its best."""
     points = [flight.point.copy() for flight in fit.flights]
     for point in points:
         point[fit.indices[place]] = time
@@ -73,8 +73,8 @@ def _foretold(fit: CandidateFit, place: int, time: float) -> float:
     return float(seen.constant - 2.0 * seen.right @ step + step @ seen.information @ step)
 
 
-def _best(problem: VariableProjection, known: tuple[float, Array], place: int, times: Array) -> tuple[float, Array]:
-    """The deviance and parameters of the best of these times, or what is known so far."""
+def _best_of(problem: VariableProjection, known: tuple[float, Array], place: int, times: Array) -> tuple[float, Array]:
+    """Deviance and parameters at the best of these times, or those known so far where these are better."""
     tried = (_at(problem, known[1], place, float(time)) for time in times)
     return min((known, *tried), key=lambda pair: pair[0])
 

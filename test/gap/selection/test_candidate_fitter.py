@@ -11,7 +11,8 @@ from sysid_node.gap.estimation.candidates import Candidate, candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet, best_screened, with_found_onsets
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet
+from sysid_node.gap.selection.screening import Screened, ScreenedPair
 from sysid_node.sim import Simulator
 
 
@@ -59,15 +60,17 @@ def test_a_fit_without_numbers_is_no_explanation(late) -> None:
 
     fitter, base, candidates = late
     failing = CandidateFitter(fitter.nuisances, Failing())
-    assert failing.add(base, (0.0, candidates["command_delay"], (0.02,))) is None
-    assert failing.fit_screened([(base, (0.0, candidates["command_delay"], (0.02,)))], silent) == []
+    assert failing.add(base, Screened(0.0, candidates["command_delay"], (0.02,))) is None
+    pair = ScreenedPair(base, Screened(0.0, candidates["command_delay"], (0.02,)))
+    assert failing.fit_screened([pair], silent) == []
 
 
 def test_a_start_that_is_not_finite_is_no_explanation(late) -> None:
     """SciPy's own error for it would end the diagnosis."""
     fitter, base, candidates = late
     assert (
-        CandidateFitter(fitter.nuisances, Checkpoint()).add(base, (0.0, candidates["command_delay"], (np.nan,))) is None
+        CandidateFitter(fitter.nuisances, Checkpoint()).add(base, Screened(0.0, candidates["command_delay"], (np.nan,)))
+        is None
     )
 
 
@@ -77,29 +80,3 @@ def test_screening_leaves_infinitely_much_where_no_numbers_come(late) -> None:
     endless = replace(candidates["command_delay"], starts=((np.nan,),))
     ((deviance, candidate, _),) = CandidateFitter(fitter.nuisances, Checkpoint()).screen(base, [endless], silent)
     assert deviance == np.inf and candidate is endless
-
-
-def labelled(effect: str, control: str = "") -> Candidate:
-    return Candidate(effect, f"{effect} of {control}" if control else effect, (0,), ((0.1,), (0.2,)))
-
-
-def test_the_best_of_each_explanation_are_kept_at_most_two_of_one_effect(late) -> None:
-    _, base, _ = late
-    other = replace(base)
-    surfaces = [labelled("stuck_surface", control) for control in ("elevator", "aileron", "rudder")]
-    screened = [(base, (float(k), candidate, (0.1,))) for k, candidate in enumerate([*surfaces, labelled("cg_shift")])]
-    screened.append((other, (9.0, labelled("mass_error"), (0.1,))))
-    kept = best_screened(screened, 3)
-    assert [pair[1][1].label for pair in kept] == [
-        "stuck_surface of elevator",
-        "stuck_surface of aileron",
-        "cg_shift",
-        "mass_error",
-    ]
-    assert best_screened(screened, 1) == [screened[0], screened[-1]]
-
-
-def test_onsets_that_were_found_are_the_only_starts_of_the_next_stage() -> None:
-    stuck, shift = labelled("stuck_surface", "elevator"), labelled("cg_shift")
-    screened = [(1.0, stuck, (0.3,)), (2.0, shift, (0.4,)), (3.0, stuck, (0.9,))]  # the best first
-    assert [c.starts for c in with_found_onsets([stuck, shift], screened)] == [((0.3,),), shift.starts]

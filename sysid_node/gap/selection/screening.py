@@ -1,0 +1,96 @@
+"""Screening: what each candidate would remove, from one Gauss-Newton step, so that only the best are fitted.
+
+The parameters that are already in the explanation move along with the candidate's. Held, they would hide it, because
+they have been fitted to a part of its response.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
+from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate
+from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.residuals.parameter_priors import bounds
+from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from sysid_node.gap.selection.candidate_fitter import FittedSet
+
+
+class Screened(NamedTuple):
+    """A candidate that was screened: the deviance that it leaves, and the values from which its fit starts."""
+
+    deviance: float
+    candidate: Candidate
+    start: tuple[float, ...]
+
+
+class ScreenedPair(NamedTuple):
+    """A candidate that was screened, and the explanation to which it would be added."""
+
+    explanation: FittedSet
+    screened: Screened
+
+
+def screened_or_infinite(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Screened:
+    """The candidate screened; its deviance is infinite where the linear algebra gives no numbers."""
+    try:
+        return screened(fit, problem, candidate)
+    except np.linalg.LinAlgError:
+        return Screened(np.inf, candidate, candidate.starts[0])
+
+
+def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidate) -> Screened:
+    """The candidate with the least deviance that it leaves, over its starts and one step from each.
+
+    ``problem`` is the variable projection of ``fit``. Raises numpy.linalg.LinAlgError.
+    """
+    if not candidate.indices:
+        widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
+        problem = VariableProjection(widened)
+        return Screened(problem.deviance(problem.residual(widened.values)), candidate, ())
+    low, high = bounds(fit.simulator, (*fit.indices, *candidate.indices))
+    best = Screened(np.inf, candidate, candidate.starts[0])
+    extended = problem.with_candidate(candidate)
+    for start in candidate.starts:
+        values = np.concatenate([fit.values, start])
+        residual = extended.residual_and_slopes(values)
+        step = np.linalg.lstsq(extended.jacobian(values), -residual, rcond=None)[0]
+        stepped = np.clip(values + step, low, high)
+        for tried, left in ((values, residual), (stepped, extended.residual(stepped))):
+            deviance = extended.deviance(left)
+            if deviance < best.deviance:
+                best = Screened(deviance, candidate, tuple(tried[fit.values.size :].tolist()))
+    return best
+
+
+def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Thresholds = THRESHOLDS) -> list[ScreenedPair]:
+    """Of pairs, the best first, at most so many for each explanation, and a few of each effect.
+
+    An effect may act on several controls or coefficients, each of them a candidate; others must have room, too.
+    """
+    counts: Counter[tuple[int, str]] = Counter()
+    kept = []
+    for pair in pairs:
+        explanation, effect = id(pair.explanation), pair.screened.candidate.effect
+        if counts[explanation, ""] < most and counts[explanation, effect] < thresholds.search.per_effect:
+            counts.update([(explanation, ""), (explanation, effect)])
+            kept.append(pair)
+    return kept
+
+
+def with_found_onsets(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:
+    """The candidates, those with an onset with the best start alone: screening every start again costs most.
+
+    ``found`` are the candidates screened, the best first.
+    """
+    best = {each.candidate.label: each.start for each in reversed(found)}
+    return [
+        replace(c, starts=(best[c.label],)) if c.effect in PER_CONTROL and c.label in best else c for c in candidates
+    ]

@@ -1,0 +1,44 @@
+"""Which screened candidates are fitted; truth: lists made by hand."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from sysid_node.gap.estimation.candidates import Candidate
+from sysid_node.gap.selection.screening import Screened, ScreenedPair, best_screened, with_found_onsets
+
+
+def explanation() -> Any:
+    """An explanation is known by itself alone here."""
+    return SimpleNamespace()
+
+
+def labelled(effect: str, control: str = "") -> Candidate:
+    return Candidate(effect, f"{effect} of {control}" if control else effect, (0,), ((0.1,), (0.2,)))
+
+
+def test_the_best_of_each_explanation_are_kept_at_most_two_of_one_effect() -> None:
+    base, other = explanation(), explanation()
+    surfaces = [labelled("stuck_surface", control) for control in ("elevator", "aileron", "rudder")]
+    screened = [
+        ScreenedPair(base, Screened(float(k), candidate, (0.1,)))
+        for k, candidate in enumerate([*surfaces, labelled("cg_shift")])
+    ]
+    screened.append(ScreenedPair(other, Screened(9.0, labelled("mass_error"), (0.1,))))
+    kept = best_screened(screened, 3)
+    assert [pair.screened.candidate.label for pair in kept] == [
+        "stuck_surface of elevator",
+        "stuck_surface of aileron",
+        "cg_shift",
+        "mass_error",
+    ]
+    assert best_screened(screened, 1) == [screened[0], screened[-1]]
+
+
+def test_onsets_that_were_found_are_the_only_starts_of_the_next_stage() -> None:
+    stuck, shift = labelled("stuck_surface", "elevator"), labelled("cg_shift")
+    screened = [
+        Screened(1.0, stuck, (0.3,)),
+        Screened(2.0, shift, (0.4,)),
+        Screened(3.0, stuck, (0.9,)),
+    ]  # the best first
+    assert [c.starts for c in with_found_onsets([stuck, shift], screened)] == [((0.3,),), shift.starts]
