@@ -13,14 +13,16 @@ from sysid_node.batch.methods.constrained_least_squares import constrained_least
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error
+from sysid_node.batch.methods.joint_estimation import KALMAN_FILTERS, JointEstimation
+from sysid_node.batch.methods.maximum_likelihood_estimation import MaximumLikelihoodEstimation
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
-from sysid_node.batch.methods.state_space import StateSpaceEstimation
 from sysid_node.batch.regression.filtering import lowpass
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.batch.regression.regressors import regressor_matrix
 from sysid_node.batch.regression.stepwise import StepwiseSelection, supported_model
-from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
@@ -35,7 +37,12 @@ _REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], BatchSetting
     "constrained_least_squares": lambda a, records, _: constrained_least_squares(a, records),
     "neural_gauss_newton": lambda a, records, s: neural_gauss_newton(a, records, s.low_pass),
 }
-METHODS = (*_REGRESSIONS, "output_error", "filter_error")
+#: Methods that integrate a model.
+_ESTIMATIONS: dict[str, type[MaximumLikelihoodEstimation] | type[JointEstimation]] = {
+    **dict.fromkeys(("output_error", "filter_error"), MaximumLikelihoodEstimation),
+    **dict.fromkeys(KALMAN_FILTERS, JointEstimation),
+}
+METHODS = (*_REGRESSIONS, *_ESTIMATIONS)
 
 #: Flight -> output or coefficient -> figure of merit -> value.
 FiguresByFlight = dict[str, dict[str, dict[str, float]]]
@@ -81,7 +88,7 @@ def identify(
         aircraft, selections = supported_model(aircraft, records, settings.low_pass)
         lost = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(lost) or 'nothing'}")
-    integrated = None if method in _REGRESSIONS else StateSpaceEstimation.of(method, aircraft, records, settings)
+    integrated = None if method in _REGRESSIONS else _ESTIMATIONS[method].of(method, aircraft, records, settings)
     fit = integrated.fit() if integrated else _REGRESSIONS[method](aircraft, records, settings)
     answered: FiguresByFlight = {}
     for record in holdout:

@@ -33,11 +33,12 @@ class BatchSettings:
     use_prior: bool = False  # whether the aircraft file's tolerances count
     stepwise: bool = False  # leave out regressors that the data do not support (by equation error)
     correct_sensors: bool = False  # estimate IMU and air-data errors from the kinematics first, and take them out
+    process_noise: float = 1.0  # times that of light turbulence (Kalman filters of state and parameters); 0 = none
     max_gap: float = 0.2  # s: the longest gap in a bag that is bridged by interpolation
 
     def __post_init__(self) -> None:
         check_frequencies(self.frequencies)
-        for name in ("low_pass", "rate", "segment"):
+        for name in ("low_pass", "rate", "segment", "process_noise"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"setting {name} = {value}: expected a number, zero or more")
@@ -53,6 +54,7 @@ class BatchSettings:
                 raise InputError(f"setting {key!r} is not one of a batch method; those are {', '.join(kinds)}")
         return cls(**{key: parsed(key, kinds[key], value) for key, value in values.items()})
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values by name, for ``summary.json``."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+    def as_dict(self, method: str) -> dict[str, Any]:
+        """Plain values by name, for the ``summary.json`` of ``method``; only Kalman filters have ``process_noise``."""
+        others = () if method.endswith("kalman_filter") else ("process_noise",)
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in others}

@@ -19,7 +19,7 @@ def test_texts_become_values():
     assert settings == BatchSettings(
         frequencies=(0.2, 0.1, 3.0), segment=5.0, use_prior=True, states=("alpha", "q"), biases=("ax", "az")
     )
-    assert BatchSettings.from_mapping(settings.as_dict()) == settings
+    assert BatchSettings.from_mapping(settings.as_dict("output_error")) == settings
 
 
 @pytest.mark.parametrize(

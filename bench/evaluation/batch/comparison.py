@@ -19,10 +19,6 @@ from evaluation.pages import table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import identify, predicted_coefficients
-from sysid_node.batch.methods import kalman_filters
-from sysid_node.batch.models.manoeuvres import manoeuvre_data
-from sysid_node.batch.models.model_for_flights import model_for_flights
-from sysid_node.batch.regression.filtering import block_averaged
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.logs import load_flight_record
@@ -38,10 +34,6 @@ BAGS = Path(__file__).resolve().parents[3] / "bags"
 WATCHED = ("CL_alpha", "CL_de", "CD_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_beta", "Cl_p", "Cl_da")
 WATCHED = (*WATCHED, "Cn_beta", "Cn_r", "Cn_dr")
 
-#: Process noise that the Kalman filters are told of, per root second: light turbulence, as an operator might guess.
-GUSTS = {"V": 0.4, "alpha": 0.03, "beta": 0.04, "p": 0.3, "q": 0.1, "r": 0.1, "phi": 1e-3, "theta": 1e-3}
-#: Kinds of the aircraft file's noise, by output.
-KINDS = {"V": "airspeed", "p": "gyro", "q": "gyro", "r": "gyro", "phi": "attitude", "theta": "attitude"}
 AIR_INTERVAL = 0.02  # s between air data in the bundled flights
 
 #: Value, lower and upper end of the interval; NaN where not valid.
@@ -85,21 +77,6 @@ def by_online(method: str, flown: Case) -> Found:
     return {n: (d.value, d.lower, d.upper) for n, d in last.derivatives.items() if d.valid}
 
 
-def by_kalman(method: Callable[..., kalman_filters.Track], flown: Case) -> Found:
-    """A filter of state and parameters, told the aircraft file's noise, values and tolerances."""
-    model, _ = model_for_flights(flown.aircraft, [flown.record], BatchSettings())
-    piece = manoeuvre_data(model, block_averaged(flown.record, 100.0))
-    noise = flown.aircraft.noise
-    sensors = np.array(
-        [noise[KINDS.get(name, "accel" if name.startswith("a") and len(name) == 2 else name)] for name in model.outputs]
-    )
-    first = [sensors[model.outputs.index(name)] for name in model.states]
-    start = [flown.aircraft.derivatives[name].tolerance or 0.1 for name in model.names]
-    q = np.array([GUSTS[name] ** 2 for name in model.states])
-    final = method(model, piece, q, sensors**2, np.array([*first, *start])).final
-    return {n: (e.value, e.lower, e.upper) for n, e in final.items()}
-
-
 METHODS: Mapping[str, Callable[[Case], Found]] = {
     "online, sls_rft": partial(by_online, "sls_rft"),
     "online, iv_rft": partial(by_online, "iv_rft"),
@@ -114,9 +91,10 @@ METHODS: Mapping[str, Callable[[Case], Found]] = {
             "neural_gauss_newton",
         )
     },
-    "extended Kalman filter": partial(by_kalman, kalman_filters.extended_kalman),
-    "iterated Kalman filter": partial(by_kalman, kalman_filters.iterated_kalman),
-    "unscented Kalman filter": partial(by_kalman, kalman_filters.unscented_kalman),
+    **{
+        f"{kind} Kalman filter": partial(by_batch, f"{kind}_kalman_filter")
+        for kind in ("extended", "iterated", "unscented")
+    },
     "output error": partial(by_batch, "output_error"),
     "filter error": partial(by_batch, "filter_error"),
 }

@@ -20,8 +20,8 @@ from evaluation.judging import Verdict, judge
 from evaluation.pages import table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.batch.identify import identify
-from sysid_node.batch.methods.state_space import StateSpaceEstimation
-from sysid_node.batch.results.batch_fit import ParameterEstimate
+from sysid_node.batch.methods.maximum_likelihood_estimation import MaximumLikelihoodEstimation
+from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
@@ -118,9 +118,9 @@ def _rows(trial: Trial, record: FlightRecord) -> dict[str, list[float]]:
 
 
 @lru_cache
-def _first(trial: Trial) -> StateSpaceEstimation:
+def _first(trial: Trial) -> MaximumLikelihoodEstimation:
     """The method set up, so that it compiles only once."""
-    return StateSpaceEstimation.of(trial.method, AIRCRAFT, [fly(1, trial)], trial.settings)
+    return MaximumLikelihoodEstimation.of(trial.method, AIRCRAFT, [fly(1, trial)], trial.settings)
 
 
 def _row(e: ParameterEstimate, converged: bool) -> list[float]:

@@ -10,10 +10,13 @@ import numpy as np
 import reference_flights as published
 
 from evaluation.pages import table
+from sysid_node.batch.likelihood.joint_kalman_filter import FilterNoise
+from sysid_node.batch.methods.extended_kalman_filter import extended_kalman_filter
 from sysid_node.batch.methods.filter_error import filter_error
-from sysid_node.batch.methods.kalman_filters import extended_kalman, unscented_kalman
 from sysid_node.batch.methods.output_error import output_error
-from sysid_node.batch.results.batch_fit import BatchFit, ParameterEstimate
+from sysid_node.batch.methods.unscented_kalman_filter import unscented_kalman_filter
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import ParameterEstimate
 
 Reference = Mapping[str, tuple[float, float]]
 REPEAT = 5
@@ -73,8 +76,10 @@ def _filters(case: published.ReferenceCase, biased: BatchFit) -> str:
     fit = filter_error(case.model, [case.manoeuvre])
     r, q = (np.array(variances) for variances in published.HFB_FILTER_NOISE)
     start = np.full(len(case.model.states) + len(case.model.names), np.sqrt(10.0))
-    arguments = (case.model, case.manoeuvre, q / case.manoeuvre.step**2, r, start)
-    filters = (extended_kalman(*arguments).final, unscented_kalman(*arguments).final)
+    told = FilterNoise(q / case.manoeuvre.step**2, r, start)
+    filters = [
+        method(case.model, [case.manoeuvre], told).final for method in (extended_kalman_filter, unscented_kalman_filter)
+    ]
     rows = []
     for name, value in published.HFB_FILTER_ERROR.items():
         e = fit.estimates[name]

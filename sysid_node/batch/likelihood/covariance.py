@@ -8,7 +8,8 @@ import numpy as np
 
 from sysid_node.batch.likelihood.maximum_likelihood import LikelihoodProblem, inverted
 from sysid_node.batch.likelihood.unknowns import Unknowns
-from sysid_node.batch.results.batch_fit import BatchFit, ParameterEstimate, confidence_interval
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.results.identifiability import (
     UnidentifiableGroups,
     identifiability_remarks,

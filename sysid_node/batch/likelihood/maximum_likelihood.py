@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from sysid_node.batch.likelihood.unknowns import Priors, Unknowns
 from sysid_node.batch.regression.coloured_residuals import coloured_covariance, spectral_degrees_of_freedom
-from sysid_node.batch.results.batch_fit import ModelResponse
+from sysid_node.batch.results.response import ModelResponse
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 

@@ -29,10 +29,16 @@ from sysid_node.batch.likelihood.maximum_likelihood import (
     responses_with_nuisances_estimated,
 )
 from sysid_node.batch.likelihood.unknowns import Priors, Unknowns
-from sysid_node.batch.models.model import ManoeuvreData, ModelEquations, StateSpaceModel, check_manoeuvres
+from sysid_node.batch.models.model import (
+    ManoeuvreData,
+    ModelEquations,
+    StateSpaceModel,
+    check_every_output_measured,
+    check_manoeuvres,
+)
 from sysid_node.batch.regression.jackknife import jackknife
-from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
-from sysid_node.errors import InputError
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.response import ModelResponse
 from sysid_node.flight.record import Array
 
 #: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
@@ -95,7 +101,7 @@ class _FilterError(LikelihoodProblem):
 
     def __init__(self, unknowns: Unknowns, correlated: bool = False) -> None:
         super().__init__(unknowns)
-        _check_complete(unknowns)
+        check_every_output_measured(unknowns.model, unknowns.manoeuvres, "filter error")
         self._correlated = correlated
         self._noise_start = _rough_noise(unknowns)
 
@@ -205,19 +211,6 @@ _predict_jacobian = jax.jit(jax.jacfwd(_predict, argnums=7), static_argnums=(0, 
 
 def _noise_names(model: StateSpaceModel) -> list[str]:
     return [f"process_{name}" for name in model.driven_states] + [f"sensor_{name}" for name in model.outputs]
-
-
-def _check_complete(unknowns: Unknowns) -> None:
-    for m in unknowns.manoeuvres:
-        if m.every != 1:
-            raise InputError(f"{m.name}: filter error needs an output at every sample, not means over {m.every}")
-        gaps = np.argwhere(~np.isfinite(m.outputs))
-        if gaps.size:
-            raise InputError(
-                f"{m.name}: output {unknowns.model.outputs[gaps[0][1]]} has gaps, the first at "
-                f"{m.time[gaps[0][0]]:.2f} s; filter error needs every sample of an output: cut the flight there, "
-                "leave that output out, or use output_error"
-            )
 
 
 def _rough_noise(unknowns: Unknowns) -> Array:

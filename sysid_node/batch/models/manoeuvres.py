@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -43,6 +44,16 @@ def manoeuvre_data(
     outputs = np.column_stack([_output(record, name) for name in model.outputs])
     time = record.time - record.time[0]
     return ManoeuvreData(time, inputs, block_means(outputs, every), start, record.name or "flight", every)
+
+
+def record_for_model(model: StateSpaceModel, aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
+    """The record with the columns that ``model`` derives from others: forces at the CG, and the reference's density."""
+    if set(AT_CG) & set(model.inputs):
+        record = with_forces_at_cg(aircraft, record)
+    if record.measured("rho"):
+        return record
+    density = np.full(len(record), aircraft.reference.air_density)
+    return replace(record, columns={**record.columns, "rho": density})
 
 
 def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:

@@ -110,6 +110,10 @@ class StateSpaceModel:
         """The same model with some fields replaced."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
+    def fixed(self) -> StateSpaceModel:
+        """The same model with every parameter fixed at its start value."""
+        return self.changed(parameters=tuple(replace(parameter, fixed=True) for parameter in self.parameters))
+
     def started_at(self, values: Mapping[str, float]) -> StateSpaceModel:
         """The same model with other start values (clipped into the bounds) for some parameters."""
         unknown = sorted(set(values) - set(self.names))
@@ -195,3 +199,19 @@ def check_manoeuvres(model: StateSpaceModel, manoeuvres: Sequence[ManoeuvreData]
     for column, name in enumerate(model.outputs):
         if not any(np.isfinite(manoeuvre.outputs[:, column]).any() for manoeuvre in manoeuvres):
             raise InputError(f"output {name} was never measured; leave it out of model {model.name}")
+
+
+def check_every_output_measured(model: StateSpaceModel, manoeuvres: Sequence[ManoeuvreData], method: str) -> None:
+    """Raises InputError where an output has gaps or is a mean over samples, which ``method`` (a noun) cannot use."""
+    for manoeuvre in manoeuvres:
+        if manoeuvre.every != 1:
+            raise InputError(
+                f"{manoeuvre.name}: {method} needs an output at every sample, not means over {manoeuvre.every}"
+            )
+        gaps = np.argwhere(~np.isfinite(manoeuvre.outputs))
+        if gaps.size:
+            raise InputError(
+                f"{manoeuvre.name}: output {model.outputs[gaps[0][1]]} has gaps, the first at "
+                f"{manoeuvre.time[gaps[0][0]]:.2f} s; {method} needs every sample of an output: cut the flight there, "
+                "leave that output out, or use output_error"
+            )

@@ -12,10 +12,12 @@ from sysid_node.batch.regression.linear_regression import Regression
 from sysid_node.batch.regression.measured_coefficients import (
     MeasuredCoefficients,
 )
-from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse, ParameterEstimate
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.results.identifiability import (
     identifiability_remarks,
 )
+from sysid_node.batch.results.response import ModelResponse
 
 
 def combined_fit(method: str, fits: Mapping[str, Regression], flights: Sequence[MeasuredCoefficients]) -> BatchFit:

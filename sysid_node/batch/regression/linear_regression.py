@@ -13,7 +13,7 @@ from sysid_node.batch.regression.errors_in_variables import (
     corrected_normal_equations,
     inflated_covariance,
 )
-from sysid_node.batch.results.batch_fit import ParameterEstimate, confidence_interval
+from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.results.identifiability import UnidentifiableGroups, identifiability_status, unidentifiable_groups
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array

@@ -14,7 +14,8 @@ from sysid_node.batch.regression.measured_coefficients import (
     measured_coefficients,
 )
 from sysid_node.batch.regression.regressors import regressor_matrix, regressors_by_coefficient
-from sysid_node.batch.results.batch_fit import BatchFit, ParameterEstimate, confidence_interval
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.results.identifiability import (
     UnidentifiableGroups,
     identifiability_status,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from sysid_node.batch.results.batch_fit import ModelResponse
+from sysid_node.batch.results.response import ModelResponse
 from sysid_node.flight.record import Array
 
 #: Longest lag looked at, as a share of the flight.

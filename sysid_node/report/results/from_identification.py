@@ -10,7 +10,9 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import Identification
 from sysid_node.batch.models.rigid_body import OUTPUTS
-from sysid_node.batch.results.batch_fit import ModelResponse, ParameterEstimate, goodness_of_fit
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import ParameterEstimate
+from sysid_node.batch.results.response import ModelResponse, goodness_of_fit
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
@@ -39,11 +41,11 @@ def identification_result(
     return RunResult(
         aircraft=aircraft.name,
         method=fit.method,
-        history=[estimates],
+        history=[*_history(fit), estimates],
         data=RunData(
             sum(record.duration for record in records), sum(len(record) for record in records), _rejected(records)
         ),
-        settings=settings.as_dict(),
+        settings=settings.as_dict(fit.method),
         references=References(prior_of(aircraft), truth or {}),
         signals=RunSignals(
             first, _spectra(aircraft, first, found.coefficients), _responses(found), _note(records, settings)
@@ -67,6 +69,22 @@ def _derivative(
     return DerivativeEstimate(
         name, estimate.value, estimate.standard_error, estimate.lower, estimate.upper, valid, status
     )
+
+
+def _history(fit: BatchFit) -> list[Estimates]:
+    """The estimates at the end of each second, where the method passes along the flights once; else nothing."""
+    track = fit.track
+    if track is None:
+        return []
+    ends_of_seconds = np.flatnonzero(np.diff(np.floor(track.time)) > 0.0)
+    return [
+        Estimates(
+            float(track.time[k]),
+            {name: _derivative(name, estimate, "ok", ()) for name, estimate in track.at(int(k)).items()},
+            {},
+        )
+        for k in ends_of_seconds
+    ]
 
 
 def _fits(found: Identification) -> dict[str, FitQuality]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.batch.results.batch_fit import ModelResponse
+from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 
 TIME = np.arange(2000) / 50.0

@@ -11,19 +11,19 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.filter_error import filter_error, predict_filter_error
 from sysid_node.batch.methods.output_error import output_error, predict_output_error
-from sysid_node.batch.models.manoeuvres import cut_into_segments, manoeuvre_data, with_forces_at_cg
+from sysid_node.batch.models.manoeuvres import cut_into_segments, manoeuvre_data, record_for_model
 from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
 from sysid_node.batch.models.model_for_flights import model_for_flights, require_length
-from sysid_node.batch.models.rigid_body import AT_CG
 from sysid_node.batch.regression.filtering import averaging_factor, block_averaged
-from sysid_node.batch.results.batch_fit import BatchFit, ModelResponse
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
 
 @dataclass(frozen=True)
-class StateSpaceEstimation:
+class MaximumLikelihoodEstimation:
     """One estimation by a method that integrates the equations of motion."""
 
     method: str
@@ -36,12 +36,12 @@ class StateSpaceEstimation:
     @classmethod
     def of(
         cls, method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
-    ) -> StateSpaceEstimation:
+    ) -> MaximumLikelihoodEstimation:
         """Raises InputError where the model needs what was not measured."""
         model, remarks = model_for_flights(aircraft, records, settings, gusts=method == "filter_error")
         return cls(method, aircraft, settings, model, (), remarks).on(records)
 
-    def on(self, records: Sequence[FlightRecord]) -> StateSpaceEstimation:
+    def on(self, records: Sequence[FlightRecord]) -> MaximumLikelihoodEstimation:
         """The same model, and so the same compiled program, set up for other flights.
 
         Raises InputError where these are too short.
@@ -87,11 +87,7 @@ def _pieces(
     """The flight in pieces. Output error integrates at the full rate and averages the outputs, measured and modelled;
     a filter, which must correct the state at every output, gets averaged inputs as well.
     """
-    if set(AT_CG) & set(model.inputs):
-        record = with_forces_at_cg(aircraft, record)
-    if not record.measured("rho"):
-        density = np.full(len(record), aircraft.reference.air_density)
-        record = replace(record, columns={**record.columns, "rho": density})
+    record = record_for_model(model, aircraft, record)
     if method == "filter_error":
         return [
             manoeuvre_data(model, piece)
