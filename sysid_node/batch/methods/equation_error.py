@@ -1,8 +1,8 @@
-"""Equation error in the time domain: each coefficient regressed on what should explain it, at every sample.
+"""Equation error in the time domain: each coefficient is regressed on its regressors, at every sample.
 
-Klein & Morelli (2006), ch. 5. No model is integrated, no start values are needed, and turbulence does not bias it;
-noise on the regressors (the flow angles') does, towards zero. Both sides are low-pass filtered first, which leaves the
-constants as they are and most of that noise behind.
+Klein & Morelli, "Aircraft System Identification" (2006), ch. 5. No model is integrated, no start values are needed, and
+the motion of the air does not bias it. Noise on the regressors, those of the flow angles above all, biases it towards
+zero. Both sides are low-pass filtered first, which leaves the parameters as they are and removes most of that noise.
 """
 
 from __future__ import annotations
@@ -33,50 +33,45 @@ from sysid_node.flight.record import Array, FlightRecord
 def equation_error(aircraft: Aircraft, records: Sequence[FlightRecord], low_pass: float = DEFAULT_LOW_PASS) -> BatchFit:
     """The aircraft file's derivatives from all flights together.
 
-    ``low_pass`` Hz bounds what is used of the signals; 0 uses all. Raises InputError where signals are missing.
+    The signals are used below ``low_pass`` Hz; 0 uses all of them. Raises InputError where signals are missing.
     """
     flights = [measured_coefficients(aircraft, record) for record in records]
     sensors = [sensitivity_to_readings(aircraft, record) for record in records]
-    fits = {
-        coefficient: _fit(coefficient, regressors, flights, sensors, low_pass)
+    regressions = {
+        coefficient: _regression(coefficient, regressors, flights, sensors, low_pass)
         for coefficient, regressors in regressors_by_coefficient(aircraft, flights).items()
     }
-    return combined_fit("equation_error", fits, flights)
+    return combined_fit("equation_error", regressions, flights)
 
 
-def _fit(
+def _regression(
     coefficient: str,
     regressors: Sequence[str],
     flights: Sequence[MeasuredCoefficients],
     sensors: Sequence[Mapping[str, tuple[Array, ReadingSensitivity]]],
     low_pass: float,
 ) -> Regression:
+    """The regression of one coefficient on filtered signals; what it models is not filtered."""
     names = [f"{coefficient}_{name}" for name in regressors]
     ys = [lowpass(flight.time, flight.coefficients[coefficient], low_pass) for flight in flights]
     Xs = [regressor_matrix(flight, regressors) for flight in flights]
-    passed = [lowpass(flight.time, X, low_pass) for flight, X in zip(flights, Xs, strict=True)]
-    noisy = [
+    filtered = [lowpass(flight.time, X, low_pass) for flight, X in zip(flights, Xs, strict=True)]
+    sensor_errors = [
         ErrorsInVariables(
             lowpass(flight.time, X, low_pass),
-            _share_passed(flight.time, low_pass),
-            sensor_noises(flight.time, of_sensors, coefficient, regressors, low_pass),
+            _noise_gain(flight.time, low_pass),
+            sensor_noises(flight.time, sensitivities, coefficient, regressors, low_pass),
         )
-        for flight, X, of_sensors in zip(flights, passed, sensors, strict=True)
+        for flight, X, sensitivities in zip(flights, filtered, sensors, strict=True)
     ]
-    fit = regress(
-        names,
-        ys,
-        passed,
-        None,
-        effective_degrees_of_freedom(names, [flight.time for flight in flights], low_pass),
-        noisy,
-    )
-    values = np.array([estimate.value for estimate in fit.estimates.values()])
-    return replace(fit, modelled=[X @ values for X in Xs])
+    freedom = effective_degrees_of_freedom(names, [flight.time for flight in flights], low_pass)
+    regression = regress(names, ys, filtered, None, freedom, sensor_errors)
+    values = np.array([estimate.value for estimate in regression.estimates.values()])
+    return replace(regression, modelled=[X @ values for X in Xs])
 
 
-def _share_passed(time: Array, low_pass: float) -> float:
-    """How much of white noise's variance the filter lets through."""
+def _noise_gain(time: Array, low_pass: float) -> float:
+    """The share of white noise's variance that the low-pass filter lets through."""
     impulse = np.zeros((time.size, 1))
     impulse[time.size // 2] = 1.0
     return float(np.sum(lowpass(time, impulse, low_pass) ** 2))

@@ -1,11 +1,12 @@
-"""Equation error in the frequency domain: the same regression within a band, where the aircraft moves and little else.
+"""Equation error in the frequency domain: the regression within a band of frequencies.
 
-Klein & Morelli (2006), sec. 7.2; Morelli, "Real-Time Parameter Estimation in the Frequency Domain", JGCD 23(5), 2000.
-Trim, slow drift (a constant and a line are taken out with it), sensor noise and structural vibration stay outside.
+Klein & Morelli, "Aircraft System Identification" (2006), sec. 7.2; Morelli, "Real-Time Parameter Estimation in the
+Frequency Domain", JGCD 23(5), 2000. Trim, slow drift, sensor noise and structural vibration lie outside the band; a
+constant and a line are removed as well.
 
 Least squares on the finite Fourier transforms F y, F X at chosen frequencies is Z' (y - X theta) = 0 with the
-band-passed regressors Z = Re F^H F X. Seen so, its standard errors follow from the residuals' colour as in the time
-domain, and do not depend on how densely the frequencies lie.
+band-passed regressors Z = Re F^H F X. In this form the standard errors follow from the residuals' colour as in the time
+domain, and do not depend on the spacing of the frequencies.
 """
 
 from __future__ import annotations
@@ -31,28 +32,28 @@ from sysid_node.batch.settings import DEFAULT_FREQUENCIES, Frequencies
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
-#: A signal that moves by no more of its size than this does not move.
+#: A signal that varies by no more than this share of its size counts as constant.
 _ROUNDING = 1e-9
 
-#: What is taken out of every flight within the band: a constant and a slow drift.
+#: Number of signals removed from every flight within the band: a constant and a slow drift.
 _NUISANCES = 2
 
 
 def frequency_equation_error(
     aircraft: Aircraft, records: Sequence[FlightRecord], frequencies: Frequencies = DEFAULT_FREQUENCIES
 ) -> BatchFit:
-    """The aircraft file's derivatives from all flights together, within a band of frequencies.
+    """The aircraft file's derivatives from all flights together, within a band of ``frequencies`` (Hz).
 
     Offsets (``Cm_0``), which no frequency shows, follow from the means. Raises InputError where signals are missing, or
-    the flights hold too few independent frequencies for the model.
+    where the flights hold too few independent frequencies for the model.
     """
     flights = [measured_coefficients(aircraft, record) for record in records]
     sensors = [sensitivity_to_readings(aircraft, record) for record in records]
-    fits = {
-        coefficient: _fit(coefficient, regressors, flights, sensors, frequencies)
+    regressions = {
+        coefficient: _regression(coefficient, regressors, flights, sensors, frequencies)
         for coefficient, regressors in regressors_by_coefficient(aircraft, flights).items()
     }
-    return combined_fit("frequency_equation_error", fits, flights)
+    return combined_fit("frequency_equation_error", regressions, flights)
 
 
 def regress_in_band(
@@ -65,8 +66,8 @@ def regress_in_band(
 ) -> Regression:
     """Least squares of ``ys`` (N,) on ``Xs`` (N, p) within the band; constants must not be among the regressors.
 
-    ``noises``: what is known of the sensors' noise, flight by flight.
-    Raises InputError where the band is impossible or holds too few independent lines.
+    ``times`` (N,) s; ``noises``: what is known of the sensors' noise, flight by flight. Raises InputError where the
+    band is impossible or holds too few independent frequencies.
     """
     lines = _lines(frequencies, times)
     independent = 2.0 * (lines[-1] - lines[0]) * sum(float(t[-1] - t[0]) for t in times)
@@ -76,19 +77,20 @@ def regress_in_band(
             f"{lines[0]:g} to {lines[-1]:g} Hz holds {independent:.0f} independent values in these flights, too few "
             f"for {len(names)} regressors ({', '.join(names)}); give a longer flight or a wider band"
         )
-    # neither constant nor line changes the estimates, but they would leak into the residuals' spectrum
-    sides = [_detrended(y) for y in ys], [_detrended(X) for X in Xs]
-    instruments = [_band_passed(t, X, lines) for t, X in zip(times, sides[1], strict=True)]
-    noisy = [
-        ErrorsInVariables(Z, lines.size * float(np.median(np.diff(t))) ** 2, several)
-        for Z, t, several in zip(instruments, times, noises, strict=bool(noises))
+    # a constant and a line change no estimate, but they would leak into the residuals' spectrum
+    detrended_ys, detrended_Xs = [_detrended(y) for y in ys], [_detrended(X) for X in Xs]
+    instruments = [_band_passed(t, X, lines) for t, X in zip(times, detrended_Xs, strict=True)]
+    sensor_errors = [
+        ErrorsInVariables(Z, lines.size * float(np.median(np.diff(t))) ** 2, of_flight)
+        for Z, t, of_flight in zip(instruments, times, noises, strict=bool(noises))
     ]
-    fit = regress(names, *sides, instruments, freedom, noisy)
-    values = np.array([estimate.value for estimate in fit.estimates.values()])
-    return replace(fit, modelled=[X @ values for X in Xs])
+    regression = regress(names, detrended_ys, detrended_Xs, instruments, freedom, sensor_errors)
+    values = np.array([estimate.value for estimate in regression.estimates.values()])
+    return replace(regression, modelled=[X @ values for X in Xs])
 
 
 def _lines(frequencies: Frequencies, times: Sequence[Array]) -> Array:
+    """The frequencies (K,) Hz. Raises InputError where they are impossible or above half the sampling rate."""
     start, step, stop = frequencies
     rate = min(1.0 / float(np.median(np.diff(t))) for t in times)
     if not (0.0 < start < stop and step > 0.0):
@@ -101,7 +103,7 @@ def _lines(frequencies: Frequencies, times: Sequence[Array]) -> Array:
 
 
 def _band_passed(time: Array, X: Array, lines: Array) -> Array:
-    """Z (N, p) = Re F^H F X, made blind to a constant and a line."""
+    """Z (N, p) = Re F^H F X, made orthogonal to a constant and a line."""
     weight = np.gradient(time)
     weight[[0, -1]] *= 0.5  # trapezoidal rule at the samples' own times
     fourier = np.exp(-2j * np.pi * np.outer(lines, time - time[0])) * weight
@@ -118,53 +120,62 @@ def _drift(samples: int) -> Array:
 
 
 def _detrended(x: Array) -> Array:
-    """``x`` (N, ...) less its constant and line; what is then rounding error is zero."""
+    """``x`` (N, ...) without its constant and line; a rest of the size of rounding errors becomes zero."""
     drift = _drift(len(x))
     rest = x - drift @ np.linalg.lstsq(drift, x, rcond=None)[0]
     return np.where(np.ptp(rest, axis=0) > _ROUNDING * np.abs(x).max(axis=0), rest, 0.0)
 
 
-def _fit(
+def _regression(
     coefficient: str,
     regressors: Sequence[str],
     flights: Sequence[MeasuredCoefficients],
     sensors: Sequence[Mapping[str, tuple[Array, ReadingSensitivity]]],
     frequencies: Frequencies,
 ) -> Regression:
-    """One coefficient: the derivatives within the band, then the offset, where the model has one."""
+    """The regression of one coefficient: derivatives within the band, then the offset, where the model has one."""
     varying = [name for name in regressors if name != "0"]
     times, ys = [flight.time for flight in flights], [flight.coefficients[coefficient] for flight in flights]
     Xs = [regressor_matrix(flight, varying) for flight in flights]
-    noise_of = [sensor_noises(t, s, coefficient, varying, frequencies[2]) for t, s in zip(times, sensors, strict=True)]
-    fit = regress_in_band([f"{coefficient}_{name}" for name in varying], times, ys, Xs, frequencies, noise_of)
-    rest = [y - modelled for y, modelled in zip(ys, fit.modelled, strict=True)]
+    noises = [sensor_noises(t, s, coefficient, varying, frequencies[2]) for t, s in zip(times, sensors, strict=True)]
+    in_band = regress_in_band([f"{coefficient}_{name}" for name in varying], times, ys, Xs, frequencies, noises)
+    rest = [y - modelled for y, modelled in zip(ys, in_band.modelled, strict=True)]
     offset = regress([f"{coefficient}_0"], rest, [np.ones((r.size, 1)) for r in rest])
-    modelled = [m + o for m, o in zip(fit.modelled, offset.modelled, strict=True)]
+    modelled = [m + o for m, o in zip(in_band.modelled, offset.modelled, strict=True)]
     if "0" not in regressors:
-        return Regression(fit.estimates, fit.covariance, modelled, offset.noise, fit.lost)
-    return _joined(regressors, fit, offset, np.concatenate(Xs).mean(axis=0), modelled)
+        return replace(in_band, modelled=modelled, noise=offset.noise)
+    return _with_offset(regressors, in_band, offset, np.concatenate(Xs).mean(axis=0), modelled)
 
 
-def _joined(
-    regressors: Sequence[str], fit: Regression, offset: Regression, means: Array, modelled: list[Array]
+def _with_offset(
+    regressors: Sequence[str], in_band: Regression, offset: Regression, means: Array, modelled: list[Array]
 ) -> Regression:
-    """Derivatives and offset in the model's order; the offset's error includes that of the derivatives."""
-    count = len(fit.estimates)
+    """Derivatives and offset in the model's order; ``means`` (p,) are the regressors'.
+
+    The offset's variance includes that of the derivatives.
+    """
+    count = len(in_band.estimates)
     covariance = np.zeros((count + 1, count + 1))
-    covariance[:count, :count] = fit.covariance
-    covariance[count, :count] = covariance[:count, count] = -means @ fit.covariance
-    covariance[count, count] = offset.covariance[0, 0] + means @ fit.covariance @ means
-    found = dict(fit.estimates)
+    covariance[:count, :count] = in_band.covariance
+    covariance[count, :count] = covariance[:count, count] = -means @ in_band.covariance
+    covariance[count, count] = offset.covariance[0, 0] + means @ in_band.covariance @ means
+    estimates = dict(in_band.estimates)
     ((name, alone),) = offset.estimates.items()
     error = float(np.sqrt(covariance[count, count]))
     half = error * ((alone.upper - alone.value) / alone.standard_error if alone.standard_error > 0.0 else 1.96)
-    offset_estimate = replace(alone, standard_error=error, lower=alone.value - half, upper=alone.value + half)
-    # what the flight shows no derivative of, but was not zero, may as well be the offset
-    shared = [n for n, mean in zip(fit.estimates, means, strict=True) if mean and any(n in group for group in fit.lost)]
+    estimates[name] = replace(alone, standard_error=error, lower=alone.value - half, upper=alone.value + half)
+    # a regressor that is constant, but not zero, has the same effect as the offset
+    unidentifiable = {n for group in in_band.unidentifiable for n in group}
+    shared = [n for n, mean in zip(in_band.estimates, means, strict=True) if mean and n in unidentifiable]
     if shared:
-        offset_estimate = replace(offset_estimate, valid=False, status=f"collinear with {', '.join(shared)}")
-    found[name] = offset_estimate
+        estimates[name] = estimates[name].invalid(f"collinear with {', '.join(shared)}")
     coefficient = name.partition("_")[0]
     order = [f"{coefficient}_{regressor}" for regressor in regressors]
-    index = [list(found).index(n) for n in order]
-    return Regression({n: found[n] for n in order}, covariance[np.ix_(index, index)], modelled, offset.noise, fit.lost)
+    index = [list(estimates).index(n) for n in order]
+    return Regression(
+        {n: estimates[n] for n in order},
+        covariance[np.ix_(index, index)],
+        modelled,
+        offset.noise,
+        in_band.unidentifiable,
+    )

@@ -20,6 +20,7 @@ from sysid_node.batch.models.manoeuvres import manoeuvre_data, record_for_model
 from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
 from sysid_node.batch.models.model_for_flights import model_for_flights, require_length
 from sysid_node.batch.regression.filtering import averaging_factor, block_averaged
+from sysid_node.batch.regression.prior import tolerance_of
 from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.results.identifiability import identifiability_remarks
@@ -51,9 +52,6 @@ _NOISE_KINDS = {
 
 #: 1 sigma of the initial value of a state that is not measured: m/s, rad, rad/s.
 _UNMEASURED = {**dict.fromkeys(("alpha", "beta", "p", "q", "r", "phi", "theta"), 0.1), "V": 1.0}
-
-#: Tolerance of a derivative without one in the aircraft file: this share of its value, and at least this much.
-_DEFAULT_TOLERANCE = (0.5, 0.05)
 
 #: An estimate whose error is still this share of its start value's has learnt nothing from the flight.
 _NOT_EXCITED = 0.95
@@ -148,14 +146,9 @@ def filter_noise(model: StateSpaceModel, aircraft: Aircraft, averaged: int, proc
     deviations = [aircraft.noise[_NOISE_KINDS.get(name, name)] / np.sqrt(averaged) for name in model.outputs]
     sensor = dict(zip(model.outputs, deviations, strict=True))
     initial = [sensor.get(name, _UNMEASURED[name]) for name in model.states]
-    tolerances = [_tolerance(aircraft, name) for name in model.names]
+    tolerances = [tolerance_of(aircraft, name) for name in model.names]
     process = np.array([process_noise * PROCESS_NOISE[name] for name in model.states])
     return FilterNoise(process**2, np.array(deviations) ** 2, np.array([*initial, *tolerances]))
-
-
-def _tolerance(aircraft: Aircraft, name: str) -> float:
-    derivative = aircraft.derivatives[name]
-    return derivative.tolerance or max(_DEFAULT_TOLERANCE[0] * abs(derivative.value), _DEFAULT_TOLERANCE[1])
 
 
 def _manoeuvre(

@@ -29,7 +29,7 @@ from sysid_node.batch.regression.filtering import block_averaged, differentiate,
 from sysid_node.batch.regression.linear_regression import Regression
 from sysid_node.batch.regression.measured_coefficients import MeasuredCoefficients, at_cg, measured_coefficients
 from sysid_node.batch.regression.regressors import regressor_matrix, regressors_by_coefficient
-from sysid_node.batch.regression.sequential import regression_of
+from sysid_node.batch.regression.sequential import regression_from_values
 from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.settings import DEFAULT_LOW_PASS
 from sysid_node.errors import InputError
@@ -162,7 +162,7 @@ def _regressions(
         names = [f"{name}_{regressor}" for regressor in regressors]
         own = covariance[np.ix_(index, index)]
         spread = float(np.mean(np.concatenate([y - X @ found[index] for y, X in zip(ys, Xs, strict=True)]) ** 2))
-        fits[name] = regression_of(names, found[index], own / spread, ys, Xs)
+        fits[name] = regression_from_values(names, found[index], own / spread, ys, Xs)
     return fits
 
 

@@ -1,8 +1,9 @@
-"""Equation error sample by sample: recursive least squares, the oldest way to estimate in flight.
+"""Recursive least squares: equation error sample by sample, with unfiltered signals.
 
 Ljung & Soederstrom, "Theory and Practice of Recursive Identification" (1983), sec. 2.2; Klein & Morelli (2006), ch. 8.
-After the last sample it is least squares on all of them, unfiltered, so that noise on the regressors biases it. Its
-errors are its own: honest where the residual is white, which it hardly ever is. Here for comparison.
+After the last sample the estimates are those of least squares on all samples, so that noise on the regressors biases
+them. The standard errors are the recursion's own and hold where the residual is white, which it hardly ever is. The
+method is here for comparison.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.regression.sequential import recursion, sequential_fit
+from sysid_node.batch.regression.sequential import recursive_estimate, sequential_fit
 from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -21,7 +22,7 @@ def recursive_least_squares(aircraft: Aircraft, records: Sequence[FlightRecord],
     ``forgetting`` is the weight that a sample keeps from one to the next. Raises InputError as ``equation_error`` does.
     """
 
-    def along(_: Sequence[str], y: Array, X: Array, __: float) -> tuple[Array, Array]:
-        return recursion(y, X, forgetting, lambda error: error)
+    def estimator(_: Sequence[str], y: Array, X: Array, __: float) -> tuple[Array, Array]:
+        return recursive_estimate(y, X, forgetting, lambda error: error)
 
-    return sequential_fit("recursive_least_squares", aircraft, records, along)
+    return sequential_fit("recursive_least_squares", aircraft, records, estimator)

@@ -1,15 +1,15 @@
-"""Standard errors for coloured residuals: the covariance of a weighted least-squares estimate as it really is.
+"""The covariance of a weighted least-squares estimate with coloured residuals.
 
 Klein & Morelli, "Aircraft System Identification" (2006), eq. 6.45 (output error) and 5.63 (equation error); after
 Morelli & Klein, "Accuracy of Aerodynamic Model Parameters Estimated from Flight Test Data", JGCD 20(1), 1997:
 
     Cov = D [ sum_i sum_j S_i' R_vv(i - j) S_j ] D,   D = (sum_i S_i' S_i)^-1
 
-with S_i the sensitivities and v_i the residuals at sample i, both divided by the noise level. Three things are done
-differently from the paper. The double sum is taken in the frequency domain, where it is a single one. The residuals'
-autocorrelation, between all channels, passes a Parzen lag window (Parzen, 1957), so that no variance can come out
-negative. And what the fit has absorbed of the noise (the residuals are smaller than the noise exactly where the
-regressors are) is put back: E[V V^H] = F - H F - F H^H + S C S^H with H = S D S^H, at every frequency, solved for F.
+with S_i the sensitivities and v_i the residuals at sample i, both divided by the noise level. Three things differ from
+the paper. The double sum is evaluated in the frequency domain, where it is a single sum. The autocorrelation of the
+residuals, between all channels, passes a Parzen lag window (Parzen, 1957), so that no variance can be negative. And the
+part of the noise that the fit has absorbed is restored, because the residuals are smaller than the noise exactly where
+the regressors have power: E[V V^H] = F - H F - F H^H + S C S^H with H = S D S^H, at every frequency, solved for F.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ LAG_SHARE = 0.15
 #: Degrees of freedom of a Parzen spectrum per record length over lag width (Priestley, 1981, table 6.1).
 _PARZEN_FREEDOM = 3.709
 
-#: Rounds of putting back what the fit has absorbed; the third changes nothing that matters.
-_ROUNDS = 2
+#: Fixed-point iterations that restore what the fit has absorbed; a third changes no digit that counts.
+_ITERATIONS = 2
 
 
 def spectral_degrees_of_freedom(lengths: Sequence[int]) -> float:
@@ -45,14 +45,16 @@ def coloured_covariance(
     sensitivities: Sequence[Array],
     residuals: Sequence[Array],
     instruments: Sequence[Array] | None = None,
+    iterations: int = _ITERATIONS,
 ) -> Array:
     """Covariance (P, P) of estimates with residuals of any colour.
 
     ``inverse_information`` (P, P) is the covariance that would hold for white residuals of unit variance;
     ``sensitivities`` (N, ny, P) and ``residuals`` (N, ny) of each manoeuvre are divided by the noise level of each
     output and are zero where nothing was measured. Residuals are uncorrelated between manoeuvres. ``instruments``
-    (N, ny, P) are what the residuals were made orthogonal to, where not the sensitivities themselves (least squares in
-    a band of frequencies: the sensitivities within that band).
+    (N, ny, P) are what the residuals were made orthogonal to, where these are not the sensitivities themselves (least
+    squares in a band of frequencies: the sensitivities within that band). ``iterations`` restore the noise that the fit
+    has absorbed; 0 is the paper's formula.
     """
     size = next_fast_len(2 * max(len(r) for r in residuals), real=True)
     width = _lag_width(max(len(r) for r in residuals))
@@ -64,7 +66,7 @@ def coloured_covariance(
     leverage = (
         np.sum([_projected(s, inverse_information, t) for s, t in zip(slopes, transforms, strict=True)], axis=0) / pairs
     )
-    for _ in range(_ROUNDS):
+    for _ in range(iterations):
         covariance = inverse_information @ _inner(transforms, spectrum, size) @ inverse_information
         absorbed = leverage @ spectrum
         absorbed = absorbed + np.conj(np.swapaxes(absorbed, 1, 2))
@@ -79,7 +81,7 @@ def _lag_width(samples: int) -> int:
 
 
 def _pair_counts(residuals: Sequence[Array]) -> Array:
-    """How often each pair of channels was measured together (ny, ny); at least 1."""
+    """The number of samples (ny, ny) at which each pair of channels was measured together; at least 1."""
     masks = [(residual != 0.0).astype(np.float64) for residual in residuals]
     counts: Array = np.maximum(np.sum([mask.T @ mask for mask in masks], axis=0), 1.0)
     return counts
@@ -99,7 +101,7 @@ def _projected(left: Complex, matrix: Array, right: Complex) -> Complex:
 
 
 def _smooth(periodogram: Complex, size: int, width: int) -> Complex:
-    """The spectrum seen through Parzen's lag window of ``width`` samples."""
+    """The spectrum smoothed by Parzen's lag window of ``width`` samples."""
     lag = np.minimum(np.arange(size), size - np.arange(size)) / width
     window = np.where(lag <= 0.5, 1.0 - 6.0 * lag**2 + 6.0 * lag**3, 2.0 * np.clip(1.0 - lag, 0.0, None) ** 3)
     smoothed: Complex = rfft(irfft(periodogram, size, axis=0) * window[:, None, None], axis=0)

@@ -1,7 +1,7 @@
-"""Whether flights are long enough: what moves no faster than a band's edge takes only so many independent values.
+"""The effective degrees of freedom of flights, and whether they suffice for a regression.
 
-A signal below B Hz is known by 2 B values a second (the sampling theorem), however often it was read. Where these are
-no more than the unknowns, any model passes through all of them, and what is left over says nothing of the errors.
+A signal below B Hz is determined by 2 B values a second (the sampling theorem), however fast it is sampled. Where these
+are no more than the unknowns, a model fits them all exactly, and the residuals say nothing of the errors.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from sysid_node.flight.record import Array
 
 
 def effective_degrees_of_freedom(names: Sequence[str], times: Sequence[Array], low_pass: float) -> float:
-    """How many independent values below ``low_pass`` Hz (0: all) flights sampled at ``times`` (N,) s hold beyond the
-    unknowns of one equation.
+    """The number of independent values of flights sampled at ``times`` (N,) s, less the unknowns ``names``.
+
+    Only what is below ``low_pass`` Hz counts; 0 counts every sample.
 
     Raises InputError where it is less than one.
     """

@@ -1,4 +1,4 @@
-"""Filters for measured signals: derivatives, low-pass, averages."""
+"""Filters for measured signals: derivatives, low-pass filtering, block averages."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from sysid_node.flight.record import Array, FlightRecord
 
 
 def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -> Array:
-    """Derivative (N,) of ``x`` (N,) at each time, s, by a polynomial fitted to the ``2 half_width + 1`` samples around.
+    """The derivative (N,) of ``x`` (N,) at each time, s, by local polynomials on ``2 half_width + 1`` samples.
 
-    Works at the samples' own times. Two samples either side and degree 4 give the fourth-order central difference
+    The samples may be unevenly spaced. Two samples either side and degree 4 give the fourth-order central difference
     (no smoothing, no bias in the band of flight); a wider window or a lower degree smooths (Savitzky & Golay, 1964;
-    Klein & Morelli, 2006, sec. 11.2). The ends are continued by point reflection.
+    Klein & Morelli, 2006, sec. 11.2). The ends are
+    extended by point reflection.
     """
     h = half_width
     t = np.concatenate([2.0 * time[0] - time[h:0:-1], time, 2.0 * time[-1] - time[-2 : -h - 2 : -1]])
@@ -29,10 +30,11 @@ def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -
 
 
 def lowpass(time: Array, X: Array, cutoff: float) -> Array:
-    """``X`` (N, p) without what is above ``cutoff`` Hz, undelayed (Butterworth, both ways: -6 dB there, 24 dB/octave).
+    """``X`` (N, p) low-pass filtered at ``cutoff`` Hz without delay.
 
-    The same filter on both sides of an equation changes none of its constants. Unchanged where ``cutoff`` is 0, or not
-    below half the sampling rate; the time steps are taken to be equal.
+    A Butterworth filter of second order runs forwards and backwards: -6 dB at ``cutoff``, 24 dB/octave above. The same
+    filter on both sides of an equation changes none of its parameters. ``X`` comes back unchanged where ``cutoff`` is 0
+    or not below half the sampling rate. The time steps are assumed to be equal.
     """
     rate = 1.0 / float(np.median(np.diff(time)))
     if not 0.0 < cutoff < 0.5 * rate:
@@ -42,24 +44,24 @@ def lowpass(time: Array, X: Array, cutoff: float) -> Array:
 
 
 def averaging_factor(record: FlightRecord, rate: float) -> int:
-    """How many samples make one at ``rate`` Hz or a little above; 1 where ``rate`` is 0 or the flight is slower."""
+    """The number of samples averaged into one for ``rate`` Hz or a little more; 1 where ``rate`` is 0 or not lower."""
     step = float(np.median(np.diff(record.time)))
     return max(1, int(1.0 / (rate * step) + 1e-6)) if rate > 0.0 else 1
 
 
 def block_averaged(record: FlightRecord, rate: float) -> FlightRecord:
-    """The record at ``rate`` Hz or a little above, each sample the mean of those it replaces; 0 leaves it as it is.
+    """The record at ``rate`` Hz or a little more, each sample the mean of those that it replaces; 0 changes nothing.
 
-    A mean over a missing value is missing. Means of states and inputs belong together only as far as both are nearly
-    straight lines for so long.
+    A mean over a missing value is missing. The means of states and inputs satisfy the equations of motion only as far
+    as both are nearly linear over a block.
     """
-    together = averaging_factor(record, rate)
-    if together < 2 or len(record) < 2 * together:
+    factor = averaging_factor(record, rate)
+    if factor < 2 or len(record) < 2 * factor:
         return record
-    whole = len(record) // together * together
+    whole = len(record) // factor * factor
 
     def mean(values: Array) -> Array:
-        return np.asarray(values[:whole].reshape(-1, together).mean(axis=1))
+        return np.asarray(values[:whole].reshape(-1, factor).mean(axis=1))
 
     columns = {name: mean(values) for name, values in record.columns.items()}
     return FlightRecord(mean(record.time), columns, record.name, record.start_ns, record.rejected)

@@ -1,4 +1,4 @@
-"""Covariance of an estimate by leaving out a stretch of the record at a time.
+"""The covariance of an estimate by the block jackknife: one stretch of the record is left out at a time.
 
 The delete-a-block jackknife (Kuensch, "The jackknife and the bootstrap for general stationary observations", Annals of
 Statistics 17, 1989), each estimate without a block being one Gauss-Newton step away (Bell & McCaffrey, "Bias reduction
@@ -6,9 +6,9 @@ in standard errors for linear regression with multi-stage samples", Survey Metho
 
     Cov = (B - 1) / B sum_b d_b d_b',   d_b = (I - I_b)^-1 g_b
 
-with g_b the score and I_b the information of block b. It supposes nothing of how residuals and sensitivities go
-together but that what they have in common is forgotten within a block: the sensitivities of a filter are made of the
-measurements, gusts and all, and a filter that is right on average only has residuals that grow where they do.
+with g_b the score and I_b the information of block b. Residuals and sensitivities may depend on each other, as long as
+that dependence dies out within a block. A filter needs this: its sensitivities are functions of the measurements, gusts
+included, and its residuals may be larger where the sensitivities are.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 
-#: Blocks that all records together are cut into: enough for the scatter to be known to a tenth or so.
+#: Number of blocks of all records together; the scatter is then known to about a tenth.
 BLOCKS = 40
 
 
 def jackknife(
     information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array], blocks: int = BLOCKS
 ) -> tuple[Array, float]:
-    """Covariance (P, P) and its degrees of freedom.
+    """The covariance (P, P) and its degrees of freedom.
 
     ``information`` (P, P), priors included; ``sensitivities`` (N, ny, P) and ``residuals`` (N, ny) of each manoeuvre,
     divided by the noise level of each output and zero where nothing was measured. No block spans two manoeuvres.

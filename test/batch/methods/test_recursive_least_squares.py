@@ -11,7 +11,7 @@ from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
-from sysid_node.batch.regression.sequential import recursion
+from sysid_node.batch.regression.sequential import recursive_estimate
 from sysid_node.errors import InputError
 
 WATCHED = ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
@@ -31,7 +31,7 @@ def test_one_pass_is_weighted_least_squares(forgetting):
     y = X @ [1.0, -2.0, 0.5, 3.0] + 0.1 * rng.normal(size=300)
     root = np.sqrt(forgetting ** np.arange(299, -1, -1.0))
     exact = np.linalg.lstsq(root[:, None] * X, root * y, rcond=None)[0]
-    values, covariance = recursion(y, X, forgetting, lambda error: error)
+    values, covariance = recursive_estimate(y, X, forgetting, lambda error: error)
     np.testing.assert_allclose(values, exact, rtol=1e-6)
     np.testing.assert_allclose(covariance, np.linalg.inv((X * root[:, None] ** 2).T @ X), rtol=1e-5, atol=1e-9)
 

@@ -64,7 +64,7 @@ def test_attenuation_is_undone(rng):
     with_, without = [], []
     for _ in range(60):
         y, X, noisy = noisy_line(rng, SIGMA**2)
-        with_.append(regress(["a"], [y], [X], noisy=[noisy]).estimates["a"].value)
+        with_.append(regress(["a"], [y], [X], sensor_errors=[noisy]).estimates["a"].value)
         without.append(regress(["a"], [y], [X]).estimates["a"].value)
     assert np.mean(without) == pytest.approx(2.0 / (1.0 + SIGMA**2), rel=0.02)
     assert np.mean(with_) == pytest.approx(2.0, rel=0.005)
@@ -84,7 +84,7 @@ def test_noise_that_multiplies_is_in_the_standard_error(rng):
     for _ in range(200):
         response = 2.0 * x * (1.0 + 0.05 * rng.normal(size=x.size))
         noisy = ErrorsInVariables(x[:, None], 1.0, [SensorNoise(0.05**2, 2.0 * x, np.zeros((x.size, 1)))])
-        with_ = regress(["a"], [response], [x[:, None]], noisy=[noisy]).estimates["a"]
+        with_ = regress(["a"], [response], [x[:, None]], sensor_errors=[noisy]).estimates["a"]
         without = regress(["a"], [response], [x[:, None]]).estimates["a"]
         found.append((with_.value, with_.standard_error, without.standard_error))
     values, errors, shorter = np.array(found).T

@@ -32,7 +32,7 @@ def test_flights_together_are_one_fit():
 def test_collinear_regressors_are_named_and_share_their_effect():
     ys, Xs = data(np.random.default_rng(3))
     fit = regress(["0", "a", "b", "c"], ys, [np.column_stack([X, 2.0 * X[:, 1]]) for X in Xs])
-    assert fit.lost == (("a", "c"),)
+    assert fit.unidentifiable == (("a", "c"),)
     assert fit.estimates["a"].status == "collinear with c"
     assert not fit.estimates["c"].valid
     assert fit.estimates["b"].valid
