@@ -1,7 +1,7 @@
-"""What the maximum-likelihood methods share.
+"""What the methods that integrate a model share.
 
-``rollout`` integrates a model with its exact Jacobian, ``kalman`` is the steady Kalman filter, and ``unknowns`` puts
-parameters, initial states and biases into one vector. ``maximum_likelihood`` alternates between the noise covariance
-and the unknowns; ``covariance`` turns a converged search into a fit. ``methods.output_error`` and
-``methods.filter_error`` call these.
+``rollout`` integrates a model and gives the exact Jacobian of its outputs; ``steady_kalman_filter`` predicts them one
+step ahead. ``unknowns`` puts parameters, initial states and biases into one vector, ``maximum_likelihood`` alternates
+between the noise covariance and the unknowns, and ``covariance`` makes a fit of a finished search.
+``joint_kalman_filter`` runs a Kalman filter of state and parameters along manoeuvres.
 """

@@ -1,4 +1,4 @@
-"""The unknowns of an estimation as one vector: parameters first, then each manoeuvre's initial states and biases."""
+"""The unknowns of an estimation as one vector: parameters, then initial states and biases of each manoeuvre."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Priors = tuple[NDArray[np.intp], Array, Array]
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Which of a model's constants are estimated, and where each stands in the vector of unknowns (n,).
+    """Which quantities of a model are estimated, and where each stands in the vector of unknowns (n,).
 
     Layout: free parameters (in the model's order), then for each manoeuvre its free initial states and its output
     biases. A bias is added to the modelled output.
@@ -53,22 +53,22 @@ class Unknowns:
     @property
     def size(self) -> int:
         """Length n of the vector."""
-        return len(self.free) + len(self.manoeuvres) * self.per_manoeuvre
+        return len(self.free) + len(self.manoeuvres) * self.nuisances_per_manoeuvre
 
     @property
-    def per_manoeuvre(self) -> int:
-        """Unknowns that each manoeuvre has to itself."""
+    def nuisances_per_manoeuvre(self) -> int:
+        """Number of unknowns that belong to one manoeuvre."""
         return len(self.states) + len(self.biases)
 
-    def own(self, index: int) -> slice:
-        """Where manoeuvre ``index`` keeps its own unknowns."""
-        first = len(self.free) + index * self.per_manoeuvre
-        return slice(first, first + self.per_manoeuvre)
+    def nuisances_of(self, index: int) -> slice:
+        """The slice of the vector that holds the unknowns of manoeuvre ``index``."""
+        first = len(self.free) + index * self.nuisances_per_manoeuvre
+        return slice(first, first + self.nuisances_per_manoeuvre)
 
     def start(self) -> Array:
         """Start values (n,); biases start at zero."""
-        own = [np.r_[m.initial_state[list(self.states)], np.zeros(len(self.biases))] for m in self.manoeuvres]
-        return np.concatenate([self.model.start[list(self.free)], *own])
+        nuisances = [np.r_[m.initial_state[list(self.states)], np.zeros(len(self.biases))] for m in self.manoeuvres]
+        return np.concatenate([self.model.start[list(self.free)], *nuisances])
 
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds (n,); initial states and biases have none."""
@@ -93,20 +93,23 @@ class Unknowns:
     def initial_state(self, z: Array, index: int) -> Array:
         """Initial state (nx,) of a manoeuvre at the unknowns ``z``."""
         state = self.manoeuvres[index].initial_state.copy()
-        state[list(self.states)] = z[self.own(index)][: len(self.states)]
+        state[list(self.states)] = z[self.nuisances_of(index)][: len(self.states)]
         return state
 
     def bias(self, z: Array, index: int) -> Array:
         """Output biases (ny,) of a manoeuvre at the unknowns ``z``."""
         bias = np.zeros(len(self.model.outputs))
-        bias[list(self.biases)] = z[self.own(index)][len(self.states) :]
+        bias[list(self.biases)] = z[self.nuisances_of(index)][len(self.states) :]
         return bias
 
     def nuisance(self, z: Array) -> list[dict[str, float]]:
-        """Each manoeuvre's own unknowns by name: ``alpha(0)``, ``bias_az``."""
+        """The unknowns of each manoeuvre by name: ``alpha(0)``, ``bias_az``."""
         names = [f"{self.model.states[i]}(0)" for i in self.states]
         names += [f"bias_{self.model.outputs[i]}" for i in self.biases]
-        return [dict(zip(names, (float(v) for v in z[self.own(i)]), strict=True)) for i in range(len(self.manoeuvres))]
+        return [
+            dict(zip(names, (float(v) for v in z[self.nuisances_of(i)]), strict=True))
+            for i in range(len(self.manoeuvres))
+        ]
 
 
 def _indices(wanted: Sequence[str], known: Sequence[str], complaint: str) -> tuple[int, ...]:

@@ -1,6 +1,8 @@
-"""The batch estimators, one file each, and what puts them on whole flights.
+"""The batch estimators, one file each; every method returns a ``results.batch_fit.BatchFit``.
 
-Regressions (``equation_error`` and others) solve for coefficients that were measured; ``output_error`` and
-``filter_error`` integrate a model (``integrated_models``); ``kalman_filters`` estimate states and parameters
-together. ``stepwise`` chooses regressors. Every method returns a ``results.result.Fit``.
+Six methods regress measured coefficients: ``equation_error``, ``frequency_equation_error``,
+``recursive_least_squares``, ``error_filtering``, ``constrained_least_squares`` and ``neural_gauss_newton``.
+``output_error`` and ``filter_error`` maximise the likelihood of a model; ``maximum_likelihood_estimation`` chooses the
+model for given flights, cuts them into pieces and finds start values. The extended, iterated and unscented Kalman
+filters estimate state and parameters together; ``joint_estimation`` sets them up for given flights.
 """

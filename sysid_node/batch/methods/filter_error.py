@@ -22,12 +22,11 @@ import numpy as np
 from sysid_node.batch.likelihood import steady_kalman_filter
 from sysid_node.batch.likelihood.covariance import assessed_fit
 from sysid_node.batch.likelihood.maximum_likelihood import (
-    LikelihoodProblem,
     SearchOptions,
-    in_noise_units,
     maximise_likelihood,
     responses_with_nuisances_estimated,
 )
+from sysid_node.batch.likelihood.problem import LikelihoodProblem, in_noise_units
 from sysid_node.batch.likelihood.unknowns import Priors, Unknowns
 from sysid_node.batch.models.model import (
     ManoeuvreData,
@@ -166,7 +165,7 @@ class _FilterError(LikelihoodProblem):
 
     def _columns(self, index: int, z: Array) -> list[int]:
         """Where in z the quantities stand that this manoeuvre depends on."""
-        own = self.unknowns.own(index)
+        own = self.unknowns.nuisances_of(index)
         noises = range(self.unknowns.size, z.size)
         return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
 

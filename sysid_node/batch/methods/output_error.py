@@ -17,11 +17,11 @@ from sysid_node.batch.likelihood import rollout
 from sysid_node.batch.likelihood.covariance import assessed_fit
 from sysid_node.batch.likelihood.maximum_likelihood import (
     DEFAULT_SEARCH,
-    LikelihoodProblem,
     SearchOptions,
     maximise_likelihood,
     responses_with_nuisances_estimated,
 )
+from sysid_node.batch.likelihood.problem import LikelihoodProblem
 from sysid_node.batch.likelihood.unknowns import Unknowns
 from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel, check_manoeuvres
 from sysid_node.batch.results.batch_fit import BatchFit
@@ -100,7 +100,7 @@ class _OutputError(LikelihoodProblem):
         blocks = []
         for i, manoeuvre in enumerate(u.manoeuvres):
             of_model = rollout.sensitivities(u.model, manoeuvre, theta, u.initial_state(z, i), u.free, u.states)
-            own = u.own(i).start
+            own = u.nuisances_of(i).start
             block = np.zeros((*manoeuvre.outputs.shape, u.size))
             block[:, :, :free] = of_model[:, :, :free]
             block[:, :, own : own + len(u.states)] = of_model[:, :, free:]

@@ -1,7 +1,8 @@
 """What the regression methods share.
 
-``equations`` forms coefficients and regressors of a flight, ``filtering`` differentiates and low-passes signals, and
-``linear_regression`` solves with standard errors for coloured residuals (``coloured_residuals``).
-``errors_in_variables`` corrects for noisy regressors, ``jackknife`` and ``effective_length`` say how much data there
-really is. The files in ``methods`` call these.
+``measured_coefficients`` forms both sides of the equations from a flight's signals (``filtering``), ``regressors``
+chooses the columns, and ``linear_regression`` solves them: with a correction for noisy regressors
+(``errors_in_variables``), and with standard errors for coloured residuals (``coloured_residuals``, ``jackknife``,
+``effective_length``). ``stepwise`` selects regressors, ``sequential`` estimates in one pass along the flights, and
+``combined_fit`` makes one fit of the regressions of all coefficients.
 """

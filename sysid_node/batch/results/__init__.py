@@ -1,5 +1,6 @@
 """What a batch method returns, and how it is checked.
 
-``result`` holds estimates with their intervals, ``identifiability`` says which parameters a flight cannot tell apart.
-``validation`` computes figures of merit on flights held out. ``identify`` hands both to the command.
+``estimate`` is one parameter with its interval, ``response`` a model's response beside the measurement, and
+``batch_fit`` the whole outcome; ``parameter_track`` holds estimates over time. ``identifiability`` says which
+parameters a flight does not distinguish, and ``validation`` computes figures of merit on flights held out.
 """

@@ -1,4 +1,4 @@
-"""What a batch estimator returns: estimates with honest intervals, and how well the model answers the flight."""
+"""The outcome of a batch method: estimates, their covariance, and the model's responses to the flights."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class BatchFit:
     """The outcome of one estimation.
 
     ``covariance`` (P, P) of the parameters in the order of ``estimates``, for coloured residuals. ``noise`` is the
-    residuals' standard deviation by output; ``log_det`` = ln det R, what maximum likelihood minimises (of equation
-    error: of the equations' residual variances). ``nuisance`` holds what was estimated besides for each manoeuvre
-    (initial states, biases). ``converged`` and ``message`` say plainly how it ended; ``remarks`` are sentences for
-    the reader: what cannot be told apart, what lies at a bound, what was left out.
+    residuals' standard deviation by output; ``log_det`` = ln det R, which maximum likelihood minimises (of equation
+    error: of the equations' residual variances). ``nuisance`` holds what else was estimated for each manoeuvre
+    (initial states, biases). ``converged`` and ``message`` say how the estimation ended; ``remarks`` are sentences for
+    the reader: which parameters are not distinguished, which lie at a bound, what was left out.
     """
 
     method: str
@@ -50,7 +50,7 @@ class BatchFit:
 
 
 def correlation_matrix(covariance: Array) -> Array:
-    """Correlation matrix of a covariance; zero where a variance is zero."""
+    """The correlation matrix of a covariance; zero where a variance is zero."""
     deviation = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     with np.errstate(divide="ignore", invalid="ignore"):
         scaled = covariance / np.outer(deviation, deviation)

@@ -9,7 +9,7 @@ from scipy import stats
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """One parameter: value, standard error for coloured residuals, 95 % interval, and whether to trust it.
+    """One parameter: its value, standard error for coloured residuals, 95 % interval, and whether it is valid.
 
     ``white_error`` is the Cramer-Rao bound, which holds for white residuals only. ``status`` is "ok", or says in
     words why the value is not valid.
@@ -30,6 +30,6 @@ class ParameterEstimate:
 
 
 def confidence_interval(value: float, standard_error: float, freedom: float) -> tuple[float, float]:
-    """95 % interval with Student's t for the degrees of freedom of the residuals' spectrum."""
+    """The 95 % interval, lower and upper end, of Student's t with ``freedom`` degrees of freedom."""
     half = float(stats.t.ppf(0.975, freedom)) * standard_error
     return value - half, value + half

@@ -33,7 +33,7 @@ class ModelResponse:
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """How well one output or coefficient is answered: R^2, the residual's root mean square in its unit, samples."""
+    """Coefficient of determination R^2 of one output, its residual's root mean square in its unit, and the samples."""
 
     r_squared: float
     residual_std: float
@@ -41,7 +41,7 @@ class GoodnessOfFit:
 
 
 def goodness_of_fit(responses: Sequence[ModelResponse]) -> dict[str, GoodnessOfFit]:
-    """R^2 and residual by output, over all answers together."""
+    """The goodness of fit of each output, over all responses together."""
     names = dict.fromkeys(name for response in responses for name in response.names)
     return {name: _goodness_of_fit([a.column(name) for a in responses if name in a.names]) for name in names}
 

@@ -1,7 +1,7 @@
-"""How well a model answers a flight: figures of merit for each output.
+"""Figures of merit of a model on a flight, output by output.
 
-Jategaonkar (2015), ch. 11; Klein & Morelli (2006), sec. 6.4. All are about the mean of the measurement, so that a large
-constant airspeed does not flatter them.
+Jategaonkar (2015), ch. 11; Klein & Morelli (2006), sec. 6.4. All refer to the measurement about its mean, so
+that a large constant airspeed does not improve them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from scipy.fft import irfft, next_fast_len, rfft
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.flight.record import Array
 
-#: Longest lag looked at, as a share of the flight.
+#: Longest lag of the correlations, as a share of the flight.
 _LAG_SHARE = 0.1
 
 
 def figures_of_merit(response: ModelResponse, inputs: Mapping[str, Array]) -> dict[str, dict[str, float]]:
-    """Output -> figure -> value, on the samples where the output was measured.
+    """The figures of each output by name, on the samples where the output was measured.
 
     ``normalised_error`` RMS of the residual over that of the measurement; ``theil`` Theil's inequality coefficient
     (0 equal, 1 unrelated); ``r_squared``; ``whiteness`` share of the residual's autocorrelations within the 95 % band
@@ -50,7 +50,7 @@ def _figures_of_output(measured: Array, modelled: Array, inputs: Mapping[str, Ar
 
 
 def _whiteness(residual: Array) -> float:
-    """Share of lags whose autocorrelation is within 1.96 / sqrt(N); an exact answer leaves nothing, which is white."""
+    """Share of lags whose autocorrelation is within 1.96 / sqrt(N); 1 for a residual of zero."""
     products = _correlation(residual, residual)
     if products[0] <= 0.0:
         return 1.0
