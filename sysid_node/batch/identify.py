@@ -1,4 +1,4 @@
-"""From flights to a fit, whichever the method: a model for what was measured, and held-out flights to check it on."""
+"""Identification of an aircraft from flights by any batch method, checked on flights held out."""
 
 from __future__ import annotations
 
@@ -50,9 +50,10 @@ FiguresByFlight = dict[str, dict[str, dict[str, float]]]
 
 @dataclass(frozen=True)
 class Identification:
-    """A fit, its coefficients on the flights it was made from, and how it answers others.
+    """A fit, the coefficients of the fitted flights, and figures of merit on the flights held out.
 
-    ``selections`` holds the stepwise choice of each coefficient's regressors, where one was made.
+    ``coefficients``: measured and modelled, below ``low_pass``. ``selections`` holds the stepwise selection of each
+    coefficient's regressors, where one was made.
     """
 
     fit: BatchFit
@@ -68,7 +69,7 @@ def identify(
     settings: BatchSettings,
     holdout: Sequence[FlightRecord] = (),
 ) -> Identification:
-    """Estimates the aircraft file's derivatives from ``records`` and checks them on ``holdout``.
+    """The derivatives of the aircraft file estimated from ``records``, and checked on ``holdout``.
 
     Raises InputError for an unknown method or no flight, and as the method does.
     """
@@ -86,25 +87,34 @@ def identify(
     if settings.stepwise:
         before = aircraft.derivatives
         aircraft, selections = supported_model(aircraft, records, settings.low_pass)
-        lost = [name for name in before if name not in aircraft.derivatives]
-        remarks.append(f"stepwise regression left out {', '.join(lost) or 'nothing'}")
-    integrated = None if method in _REGRESSIONS else _ESTIMATIONS[method].of(method, aircraft, records, settings)
-    fit = integrated.fit() if integrated else _REGRESSIONS[method](aircraft, records, settings)
-    answered: FiguresByFlight = {}
+        left_out = [name for name in before if name not in aircraft.derivatives]
+        remarks.append(f"stepwise regression left out {', '.join(left_out) or 'nothing'}")
+    fit, predict = _fitted(method, aircraft, records, settings)
+    figures: FiguresByFlight = {}
     for record in holdout:
-        responses = predicted_coefficients(aircraft, fit.values, [record], settings.low_pass)
-        responses += integrated.responses(fit, record) if integrated else []
-        answered[record.name] = _figures_of_flight(aircraft, record, responses)
+        responses = [*predicted_coefficients(aircraft, fit.values, [record], settings.low_pass), *predict(record)]
+        figures[record.name] = _figures_of_flight(aircraft, record, responses)
     return Identification(
         replace(fit, remarks=(*remarks, *fit.remarks)),
         predicted_coefficients(aircraft, fit.values, records, settings.low_pass),
-        answered,
+        figures,
         selections,
     )
 
 
+def _fitted(
+    method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
+) -> tuple[BatchFit, Callable[[FlightRecord], Sequence[ModelResponse]]]:
+    """The fit, and a function from a flight to the fitted model's outputs; regressions model no outputs."""
+    if method in _REGRESSIONS:
+        return _REGRESSIONS[method](aircraft, records, settings), lambda _: ()
+    estimation = _ESTIMATIONS[method].of(method, aircraft, records, settings)
+    fit = estimation.fit()
+    return fit, lambda record: estimation.responses(fit, record)
+
+
 def _named(records: Sequence[FlightRecord]) -> list[FlightRecord]:
-    """The records, each under a name of its own."""
+    """The records under unique names."""
     names: list[str] = []
     for record in records:
         name = record.name or "flight"
@@ -115,13 +125,13 @@ def _named(records: Sequence[FlightRecord]) -> list[FlightRecord]:
 def predicted_coefficients(
     aircraft: Aircraft, values: Mapping[str, float], records: Sequence[FlightRecord], low_pass: float
 ) -> list[ModelResponse]:
-    """Measured coefficients and what ``values`` make of them, below ``low_pass`` Hz, for each flight that allows it."""
+    """Measured coefficients and those modelled with ``values``, below ``low_pass`` Hz, of each flight that has them."""
     responses = []
     for record in records:
         try:
             flight = measured_coefficients(aircraft, record)
         except InputError:
-            continue  # a flight without, say, a sideslip vane can be integrated, but its coefficients cannot be formed
+            continue  # a flight without a sideslip vane, say, can be integrated, but has no measured coefficients
         modelled: dict[str, Array] = {}
         for coefficient, regressors in aircraft.model_structure.items():
             names = [f"{coefficient}_{name}" for name in regressors]
@@ -139,7 +149,7 @@ def predicted_coefficients(
 def _figures_of_flight(
     aircraft: Aircraft, record: FlightRecord, responses: Sequence[ModelResponse]
 ) -> dict[str, dict[str, float]]:
-    """Figures of merit of all answers to one flight."""
+    """The figures of merit of all responses to one flight."""
     table: dict[str, dict[str, float]] = {}
     for response in responses:
         inputs = {

@@ -1,14 +1,15 @@
-"""Maximum likelihood by filter error: output error for a flight in turbulence.
+"""Maximum likelihood by filter error, for flights in turbulence.
 
-A Kalman filter follows the aircraft through the gusts, and the constants are those for which its one-step predictions
-are best. Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 5; Maine & Iliff, NASA RP-1168.
+A steady Kalman filter estimates the states, gusts included, and the parameters are those for which its one-step
+predictions are best. Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 5; Maine & Iliff, NASA
+RP-1168.
 
 The criterion is the determinant of the innovations' covariance, diagonal and found by relaxation (Jategaonkar, eq.
-5.12). The filter's gain comes from process and measurement noise, both estimated: that always gives a stable filter,
-where Jategaonkar's gain from the innovations' covariance needs a constraint. Only the ratio of the two noises shapes
-the gain; their common size follows from the innovations. With no process noise this is output error.
+5.12). The filter's gain follows from process and measurement noise, both estimated. That always gives a stable filter,
+where Jategaonkar's gain from the innovations' covariance needs a constraint. Only the ratio of the two noises
+determines the gain; their common size follows from the innovations. Without process noise this is output error.
 
-Outputs must be measured independently: a pitch acceleration differentiated from the pitch rate predicts itself.
+Outputs must be measured independently: a pitch acceleration differentiated from the pitch rate would predict itself.
 """
 
 from __future__ import annotations
@@ -40,14 +41,14 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.flight.record import Array
 
-#: How far a noise may move from its start value, as a factor: beyond, the gain no longer changes.
+#: Largest factor between a noise and its start value; beyond it the gain hardly changes.
 _NOISE_RANGE = 1e3
 
-#: The noises' own small likelihood makes the last digits dear; a hundredth of a standard error is enough. A round that
-#: goes all the way to the best gain for the first, wrong, noise may end where the likelihood is highest only locally.
+#: The likelihood is flat in the noises, so that the last digits take long; a hundredth of a standard error is enough.
+#: Early rounds are short, because a full search with the first, wrong, noise may end at a local maximum.
 FILTER_SEARCH = SearchOptions(tolerance=1e-2, early=3)
 
-#: 1-sigma of the logarithm of a noise about its start value: a factor of twenty either way is no surprise.
+#: 1 sigma of the logarithm of a noise about its start value: a factor of twenty.
 _NOISE_PRIOR = 3.0
 
 
@@ -60,14 +61,14 @@ def filter_error(
     correlated: bool = False,
     search: SearchOptions = FILTER_SEARCH,
 ) -> BatchFit:
-    """Estimates the free parameters and the process noise from all manoeuvres together.
+    """The fit of the free parameters and the process noise to all manoeuvres together.
 
-    ``correlated``: whether what the outputs' innovations have in common counts; it should where a disturbance shows in
-    several outputs at once, as a gust does, and must not where one output is derived from another.
-    Each manoeuvre has the steady Kalman gain of its first sample's flight condition: cut a flight that changes speed
-    much. ``extras`` of the result holds the noises' standard deviations: ``process_<state>`` (unit of the state per
-    root second) and ``sensor_<output>``. Raises InputError as ``output_error`` does, and on outputs with gaps; a search
-    that does not converge is returned, and says so.
+    ``correlated``: whether the innovations' covariance is full. It should be where one disturbance, such as a gust,
+    acts on several outputs, and must not be where one output is derived from another. Each manoeuvre has the steady
+    Kalman gain of its first sample's flight condition: cut a flight that changes speed much. ``extras`` of the result
+    holds the noises' standard deviations: ``process_<state>`` (unit of the state per root second) and
+    ``sensor_<output>``. Raises InputError as ``output_error`` does, and on outputs with gaps. A search that does not
+    converge is returned, and its message says so.
     """
     check_manoeuvres(model, manoeuvres)
     problem = _FilterError(Unknowns.of(model, manoeuvres, initial_states, biases), correlated)
@@ -84,19 +85,19 @@ def predict_filter_error(
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
 ) -> list[ModelResponse]:
-    """One-step predictions on other manoeuvres, parameters and noises (a fit's ``extras``) held.
+    """One-step predictions of other manoeuvres with these parameters and noises (a fit's ``extras``).
 
-    Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
+    Initial states and biases belong to a manoeuvre, not to the aircraft. They are estimated.
     """
-    held = model.started_at(values)
-    check_manoeuvres(held, manoeuvres)
-    problem = _FilterError(Unknowns.of(held, manoeuvres, initial_states, biases))
+    fitted = model.started_at(values)
+    check_manoeuvres(fitted, manoeuvres)
+    problem = _FilterError(Unknowns.of(fitted, manoeuvres, initial_states, biases))
     logs = np.log([noises[name] for name in _noise_names(model)])
     return responses_with_nuisances_estimated(problem, np.concatenate([problem.unknowns.start(), logs]))
 
 
 class _FilterError(LikelihoodProblem):
-    """One-step predictions; z ends with the logarithms of process and measurement noise, 1 sigma."""
+    """The problem whose responses are one-step predictions; z ends with the logarithms of the noises' 1 sigma."""
 
     def __init__(self, unknowns: Unknowns, correlated: bool = False) -> None:
         super().__init__(unknowns)
@@ -115,7 +116,7 @@ class _FilterError(LikelihoodProblem):
     def responses(self, z: Array) -> list[ModelResponse]:
         return [
             ModelResponse(
-                m.name, m.time, self.unknowns.model.outputs, m.outputs, np.asarray(_predict_jit(*self._of(i, z)))
+                m.name, m.time, self.unknowns.model.outputs, m.outputs, np.asarray(_predict_jit(*self._arguments(i, z)))
             )
             for i, m in enumerate(self.unknowns.manoeuvres)
         ]
@@ -124,19 +125,19 @@ class _FilterError(LikelihoodProblem):
         blocks = []
         for i, manoeuvre in enumerate(self.unknowns.manoeuvres):
             block = np.zeros((*manoeuvre.outputs.shape, z.size))
-            block[:, :, self._columns(i, z)] = np.asarray(_predict_jacobian(*self._of(i, z)))
+            block[:, :, self._columns(i, z)] = np.asarray(_predict_jacobian(*self._arguments(i, z)))
             blocks.append(block)
         return blocks
 
     def priors(self) -> Priors:
-        """Besides the parameters': noises of about the start values, so that one that does not matter stays put."""
+        """The parameters' priors, and those of the noises about their start values, so that each is determined."""
         index, mean, sigma = super().priors()
         noises = self.unknowns.size + np.arange(self._noise_start.size)
-        vague = np.full(noises.size, _NOISE_PRIOR)
-        return np.r_[index, noises], np.r_[mean, self._noise_start], np.r_[sigma, vague]
+        noise_sigma = np.full(noises.size, _NOISE_PRIOR)
+        return np.r_[index, noises], np.r_[mean, self._noise_start], np.r_[sigma, noise_sigma]
 
     def noise(self, z: Array) -> Array:
-        """Of the innovations; where they may be ``correlated``, their whole covariance, kept regular."""
+        """The Cholesky factor (ny, ny) of the innovations' covariance, which is full where ``correlated``."""
         independent = super().noise(z)
         if not self._correlated:
             return independent
@@ -147,11 +148,11 @@ class _FilterError(LikelihoodProblem):
     def covariance(
         self, information: Array, sensitivities: Sequence[Array], residuals: Sequence[Array]
     ) -> tuple[Array, float]:
-        """By the jackknife: a filter's sensitivities are made of the noise, too."""
+        """By the jackknife, because a filter's sensitivities depend on the noise."""
         return jackknife(information, sensitivities, residuals)
 
     def noises(self, z: Array) -> dict[str, float]:
-        """Standard deviations of process and measurement noise, scaled so that the filter expects its innovations."""
+        """Standard deviations of process and sensor noise, scaled to the size of the innovations."""
         model, manoeuvre = self.unknowns.model, self.unknowns.manoeuvres[0]
         logs = z[self.unknowns.size :]
         q = np.zeros(len(model.states))
@@ -164,12 +165,14 @@ class _FilterError(LikelihoodProblem):
         return dict(zip(_noise_names(model), (float(v) for v in scale * np.exp(logs)), strict=True))
 
     def _columns(self, index: int, z: Array) -> list[int]:
-        """Where in z the quantities stand that this manoeuvre depends on."""
-        own = self.unknowns.nuisances_of(index)
+        """The indices into z of the quantities that this manoeuvre depends on."""
+        nuisances = self.unknowns.nuisances_of(index)
         noises = range(self.unknowns.size, z.size)
-        return [*range(len(self.unknowns.free)), *range(own.start, own.stop), *noises]
+        return [*range(len(self.unknowns.free)), *range(nuisances.start, nuisances.stop), *noises]
 
-    def _of(self, index: int, z: Array) -> tuple[ModelEquations, Chosen, Array, Array, Array, Array, Array, Array]:
+    def _arguments(
+        self, index: int, z: Array
+    ) -> tuple[ModelEquations, Chosen, Array, Array, Array, Array, Array, Array]:
         u, m = self.unknowns, self.unknowns.manoeuvres[index]
         chosen = (u.free, u.states, u.biases, _driven(u.model))
         local = z[self._columns(index, z)]
@@ -189,7 +192,7 @@ def _predict(
     theta: jax.Array,
     local: jax.Array,
 ) -> jax.Array:
-    """Predicted outputs (N, ny) for what of z concerns this manoeuvre: parameters, its own unknowns, log noises.
+    """Predicted outputs (N, ny) from this manoeuvre's part of z: parameters, initial states, biases, log noises.
 
     ``chosen``: indices of the free parameters, free initial states, biased outputs and driven states.
     """
@@ -197,7 +200,7 @@ def _predict(
     theta = theta.at[jnp.array(chosen[0], dtype=int)].set(values)
     x0 = x0.at[jnp.array(chosen[1], dtype=int)].set(states)
     offset = jnp.zeros(outputs.shape[1]).at[jnp.array(chosen[2], dtype=int)].set(bias)
-    q = jnp.eye(x0.size)[:, np.array(chosen[3])] @ jnp.exp(2.0 * log_q)  # XLA does not survive this as a scatter
+    q = jnp.eye(x0.size)[:, np.array(chosen[3])] @ jnp.exp(2.0 * log_q)  # a product: XLA crashes on the scatter
     return (
         steady_kalman_filter.predictions(dynamics, time, inputs, outputs - offset, x0, theta, q, jnp.exp(2.0 * log_r))
         + offset
@@ -213,10 +216,10 @@ def _noise_names(model: StateSpaceModel) -> list[str]:
 
 
 def _rough_noise(unknowns: Unknowns) -> Array:
-    """Logarithms of noise start values (nx + ny,) from how rough the measured signals are.
+    """Logarithms of the noises' start values (nx + ny,), from the second differences of the measured signals.
 
-    Second differences of white noise have six times its variance. A state of whose process noise nothing is known is
-    given one that moves it by as much as its sensor's noise from one sample to the next.
+    Second differences of white noise have six times its variance. Where the model states no process noise, it starts at
+    one that moves the state from sample to sample by as much as its sensor's noise.
     """
     model, first = unknowns.model, unknowns.manoeuvres[0]
     second = np.concatenate([np.diff(m.outputs, 2, axis=0) for m in unknowns.manoeuvres])

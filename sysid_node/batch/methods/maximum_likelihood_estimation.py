@@ -1,4 +1,4 @@
-"""Output error and filter error on whole flights: the model that was measured for, the pieces, the start values."""
+"""Output error and filter error on whole flights: the model for them, the pieces, the start values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sysid_node.flight.record import FlightRecord
 
 @dataclass(frozen=True)
 class MaximumLikelihoodEstimation:
-    """One estimation by a method that integrates the equations of motion."""
+    """One estimation by output error or filter error, set up for given flights."""
 
     method: str
     aircraft: Aircraft
@@ -37,7 +37,7 @@ class MaximumLikelihoodEstimation:
     def of(
         cls, method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
     ) -> MaximumLikelihoodEstimation:
-        """Raises InputError where the model needs what was not measured."""
+        """The estimation set up for these flights. Raises InputError where the model needs what was not measured."""
         model, remarks = model_for_flights(aircraft, records, settings, gusts=method == "filter_error")
         return cls(method, aircraft, settings, model, (), remarks).on(records)
 
@@ -53,7 +53,7 @@ class MaximumLikelihoodEstimation:
         return replace(self, model=started, pieces=flat, remarks=(*self.remarks, *remark))
 
     def fit(self) -> BatchFit:
-        """The estimation."""
+        """The fit, with the responses to the pieces of each flight joined. Raises InputError as the method does."""
         states, biases = self.model.states, self.settings.biases
         if self.method == "filter_error":
             fit = filter_error(self.model, self.pieces, initial_states=states, biases=biases, correlated=True)
@@ -62,12 +62,12 @@ class MaximumLikelihoodEstimation:
         return replace(fit, responses=_joined(fit.responses), remarks=(*self.remarks, *fit.remarks))
 
     def responses(self, fit: BatchFit, record: FlightRecord) -> list[ModelResponse]:
-        """The fit's answer to another flight: open loop with its own initial states, or one sample ahead."""
+        """The fitted model's response to another flight; of filter error, its one-step predictions."""
         pieces = _pieces(self.method, self.model, self.aircraft, record, self.settings)
-        own = {"initial_states": self.model.states, "biases": self.settings.biases}
+        nuisances = {"initial_states": self.model.states, "biases": self.settings.biases}
         if self.method == "filter_error":
-            return _joined(predict_filter_error(self.model, pieces, fit.values, fit.extras, **own))
-        return _joined(predict_output_error(self.model, pieces, fit.values, **own))
+            return _joined(predict_filter_error(self.model, pieces, fit.values, fit.extras, **nuisances))
+        return _joined(predict_output_error(self.model, pieces, fit.values, **nuisances))
 
 
 def _started(
@@ -84,8 +84,10 @@ def _started(
 def _pieces(
     method: str, model: StateSpaceModel, aircraft: Aircraft, record: FlightRecord, settings: BatchSettings
 ) -> list[ManoeuvreData]:
-    """The flight in pieces. Output error integrates at the full rate and averages the outputs, measured and modelled;
-    a filter, which must correct the state at every output, gets averaged inputs as well.
+    """The flight in pieces.
+
+    Output error integrates at the full rate and averages the outputs, measured and modelled. A filter corrects the
+    state at every output, so that its inputs are averaged as well.
     """
     record = record_for_model(model, aircraft, record)
     if method == "filter_error":
@@ -98,7 +100,7 @@ def _pieces(
 
 
 def _joined(responses: Sequence[ModelResponse]) -> list[ModelResponse]:
-    """The answers to the pieces of each flight as one."""
+    """The responses to the pieces of each flight as one."""
     flights: dict[str, list[ModelResponse]] = {}
     for response in responses:
         flights.setdefault(response.name.partition(" [")[0], []).append(response)

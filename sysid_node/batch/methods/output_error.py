@@ -1,8 +1,9 @@
-"""Maximum likelihood by output error: the constants with which the model's own flight is nearest to the measured one.
+"""Maximum likelihood by output error: the model is integrated without the measurements, and fitted to them.
 
 Maine & Iliff, "Application of Parameter Estimation to Aircraft Stability and Control", NASA RP-1168 (1986), ch. 6;
-Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 4. The flight must be free of turbulence: what
-the wind does is taken for an answer to the controls, and the estimates are biased (``filter_error`` knows better).
+Jategaonkar, "Flight Vehicle System Identification", 2nd ed. (2015), ch. 4. The flight must be free of turbulence: the
+method takes the response to gusts for a response to the controls, which biases the estimates. ``filter_error`` models
+the turbulence.
 
 The noise covariance is diagonal and found by relaxation; the sensitivities are exact (JAX).
 """
@@ -37,11 +38,11 @@ def output_error(
     biases: Sequence[str] = (),
     search: SearchOptions = DEFAULT_SEARCH,
 ) -> BatchFit:
-    """Estimates the free parameters of ``model`` from all manoeuvres together.
+    """The fit of the free parameters of ``model`` to all manoeuvres together.
 
     ``initial_states`` are estimated for each manoeuvre (the others stay as given), and so are ``biases``, constants
     added to the outputs of these names. Raises InputError where the data do not fit the model, are too few, or the
-    model diverges from its start values; a search that does not converge is returned, and says so.
+    model diverges from its start values. A search that does not converge is returned, and its message says so.
     """
     check_manoeuvres(model, manoeuvres)
     problem = _OutputError(Unknowns.of(model, manoeuvres, initial_states, biases))
@@ -57,18 +58,18 @@ def predict_output_error(
     initial_states: Sequence[str] = (),
     biases: Sequence[str] = (),
 ) -> list[ModelResponse]:
-    """The model's answers on other manoeuvres with the parameters held at ``values``.
+    """The model's responses to other manoeuvres with the parameters at ``values``.
 
-    Initial states and biases belong to a manoeuvre, not to the aircraft: they are estimated, if any.
+    Initial states and biases belong to a manoeuvre, not to the aircraft. They are estimated.
     """
-    held = model.started_at(values)
-    check_manoeuvres(held, manoeuvres)
-    problem = _OutputError(Unknowns.of(held, manoeuvres, initial_states, biases))
+    fitted = model.started_at(values)
+    check_manoeuvres(fitted, manoeuvres)
+    problem = _OutputError(Unknowns.of(fitted, manoeuvres, initial_states, biases))
     return responses_with_nuisances_estimated(problem, problem.start())
 
 
 class _OutputError(LikelihoodProblem):
-    """Open-loop rollouts."""
+    """The problem whose responses are the model's trajectories, integrated from the initial states alone."""
 
     def __init__(self, unknowns: Unknowns) -> None:
         super().__init__(unknowns)
@@ -99,13 +100,13 @@ class _OutputError(LikelihoodProblem):
         theta, free = u.theta(z), len(u.free)
         blocks = []
         for i, manoeuvre in enumerate(u.manoeuvres):
-            of_model = rollout.sensitivities(u.model, manoeuvre, theta, u.initial_state(z, i), u.free, u.states)
-            own = u.nuisances_of(i).start
+            model_block = rollout.sensitivities(u.model, manoeuvre, theta, u.initial_state(z, i), u.free, u.states)
+            first = u.nuisances_of(i).start
             block = np.zeros((*manoeuvre.outputs.shape, u.size))
-            block[:, :, :free] = of_model[:, :, :free]
-            block[:, :, own : own + len(u.states)] = of_model[:, :, free:]
+            block[:, :, :free] = model_block[:, :, :free]
+            block[:, :, first : first + len(u.states)] = model_block[:, :, free:]
             for k, output in enumerate(u.biases):
-                block[:, output, own + len(u.states) + k] = 1.0
+                block[:, output, first + len(u.states) + k] = 1.0
             block[~self._measured[i]] = 0.0
             blocks.append(block)
         return blocks
