@@ -1,8 +1,9 @@
-"""Kinematic consistency: errors of IMU and air data from the kinematics alone, before any aerodynamics.
+"""Data compatibility: errors of IMU and air data from the kinematics alone, without aerodynamics.
 
-Integrating what the IMU felt must give what the air data and the attitude saw. Klein & Morelli (2006), ch. 10; solved
-by filter error on the kinematic model, because the IMU's noise and the gusts drive it at random, each piece of the
-flight with its own initial state, all with the same errors.
+The integrated accelerations and rates of the IMU must agree with the air data and the attitude: Klein & Morelli,
+"Aircraft System Identification" (2006), ch. 10. The sensor errors are estimated by filter error on the kinematic model,
+because the IMU's noise and the gusts are its process noise. Each piece of the flight has its own initial state; the
+errors are common to all.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 
-#: Hz to which flights are averaged for this: the kinematics have no fast modes of their own.
+#: Hz to which flights are averaged here: the kinematics have no fast modes.
 _RATE = 50.0
 _IMU = ("ax", "ay", "az", "p", "q", "r")
 
 
 @dataclass(frozen=True)
 class Compatibility:
-    """The sensor errors found, and the flights with them taken out."""
+    """The estimated sensor errors, and the flights corrected for them."""
 
     fit: BatchFit
     corrected: list[FlightRecord]
@@ -36,7 +37,7 @@ class Compatibility:
 
 
 def check_sensors(aircraft: Aircraft, records: Sequence[FlightRecord], segment: float = 10.0) -> Compatibility:
-    """Sensor errors common to all flights, each cut into pieces of ``segment`` s.
+    """The sensor errors common to all flights, each of which is cut into pieces of ``segment`` s.
 
     Raises InputError where a flight lacks the IMU or all of airspeed, flow angles and attitude.
     """
@@ -51,7 +52,7 @@ def check_sensors(aircraft: Aircraft, records: Sequence[FlightRecord], segment: 
 
 
 def corrected(record: FlightRecord, errors: dict[str, float]) -> FlightRecord:
-    """The record with these sensor errors taken out."""
+    """The record corrected for these sensor errors."""
     columns = dict(record.columns)
     for name in set(columns) & {*_IMU, *STATES}:
         bias, scale = errors.get(f"bias_{name}", 0.0), errors.get(f"scale_{name}", 0.0)
@@ -71,9 +72,9 @@ def _pieces(aircraft: Aircraft, record: FlightRecord, segment: float) -> list[Fl
 
 
 def _remarks(fit: BatchFit) -> tuple[str, ...]:
-    """The errors that matter, in words."""
-    found = [e for e in fit.estimates.values() if abs(e.value) > 2.0 * e.standard_error]
-    if not found:
+    """A sentence with the errors that are larger than two standard errors."""
+    significant = [e for e in fit.estimates.values() if abs(e.value) > 2.0 * e.standard_error]
+    if not significant:
         return ("the sensors agree with one another: no error of IMU or air data stands out",)
-    said = ", ".join(f"{e.name} {e.value:+.4g} +- {e.standard_error:.2g}" for e in found)
-    return (f"sensor errors taken out: {said}",)
+    listed = ", ".join(f"{e.name} {e.value:+.4g} +- {e.standard_error:.2g}" for e in significant)
+    return (f"sensor errors taken out: {listed}",)

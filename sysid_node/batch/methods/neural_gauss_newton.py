@@ -1,10 +1,10 @@
-"""Neural-Gauss-Newton: a network learns how the aircraft moves, then the derivatives are found through it.
+"""Neural-Gauss-Newton: a network is trained on the aircraft's motion, and the derivatives are fitted through it.
 
 Peyada & Ghosh, "Aircraft Parameter Estimation Using a New Filtering Technique Based upon a Neural Network and
-Gauss-Newton Method", Aeronautical Journal 113, 2009. A feed-forward network learns how fast the motion changes from the
-motion and the aerodynamic coefficients as measured. Then the coefficients that enter it become those of the model, and
-Gauss-Newton moves the derivatives until the network's answer is the measured one. No equations of motion are
-integrated, no start values needed. What the network learnt of noise it hands on: it is no better than its training.
+Gauss-Newton Method", Aeronautical Journal 113, 2009. A feed-forward network is trained to give the rates of the motion
+from the motion and the measured aerodynamic coefficients. Then its coefficient inputs become those of the model, and
+Gauss-Newton changes the derivatives until the network's output is the measured one. No equations of motion are
+integrated, and no start values are needed. Noise that the network has fitted passes on to the derivatives.
 
 Longitudinal (CL CD Cm) and lateral (CY Cl Cn) motion each have a network.
 """
@@ -35,21 +35,25 @@ from sysid_node.batch.settings import DEFAULT_LOW_PASS
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
-#: Motion, what changes of it, and the coefficients that change it.
+#: States of the motion, the states whose rates are fitted, and the coefficients that cause these.
 _GROUPS = (
     (("V", "alpha", "theta", "q"), ("V", "alpha", "q"), LONGITUDINAL),
     (("beta", "p", "r", "phi"), ("beta", "p", "r"), LATERAL),
 )
 _HIDDEN = 6
-_RATE = 25.0  # Hz: enough for what the low-pass leaves
-_DECAY = 1e-4  # what a weight of one costs, as a share of the outputs' variance
+_RATE = 25.0  # Hz: well above twice the low-pass
+_DECAY = 1e-4  # weight decay: penalty of a weight of one, as a share of the outputs' variance
 _SEED = 1
+
+
+#: Matrix into the hidden layer, its bias, matrix out of it, matrix past it.
+Weights = tuple[jax.Array, jax.Array, jax.Array, jax.Array]
 
 
 @dataclass(frozen=True)
 class _TrainingData:
-    """One group, all flights together: motion (N, m), its rates (N, k), measured coefficients (N, c), the regressors
-    of each coefficient; all below the low-pass."""
+    """Low-passed data of one group: motion (N, m), its rates (N, k), measured coefficients (N, c), and the regressors
+    (N, p) of each coefficient."""
 
     motion: Array
     rates: Array
@@ -109,7 +113,7 @@ def _data(
 def _group(
     structure: dict[str, tuple[str, ...]], parts: Sequence[_TrainingData], flights: Sequence[MeasuredCoefficients]
 ) -> dict[str, Regression]:
-    """Trains the group's network, then finds the derivatives through it."""
+    """The regressions of one group's coefficients, through a network trained on all flights."""
     motion, rates, measured = (
         np.concatenate([getattr(p, n) for p in parts]) for n in ("motion", "rates", "coefficients")
     )
@@ -117,79 +121,94 @@ def _group(
     state, inner, target = ((x - m) / s for x, (m, s) in zip((motion, measured, rates), scales, strict=True))
     weights = _train(np.column_stack([state, inner]), target)
     Xs = [np.concatenate([p.regressors[name] for p in parts]) for name in structure]
-    (mean, spread) = scales[1]
     start = np.concatenate([np.linalg.lstsq(X, y, rcond=None)[0] for X, y in zip(Xs, measured.T, strict=True)])
-    edges = np.cumsum([X.shape[1] for X in Xs])[:-1]
+    through = _ThroughNetwork(weights, state, target, Xs, scales[1])
+    theta = least_squares(through.misfit, start, through.jacobian, x_scale="jac", max_nfev=30).x
+    return _regressions(structure, theta, through, flights)
 
-    def modelled(theta: Array) -> Array:
-        return np.column_stack([X @ part for X, part in zip(Xs, np.split(theta, edges), strict=True)])
 
-    def residual(theta: Array) -> Array:
-        return np.asarray(target - _answer(weights, state, (modelled(theta) - mean) / spread))
+class _ThroughNetwork:
+    """The network's output as a function of the derivatives theta (p,), which enter through the coefficients."""
 
-    def slopes(theta: Array) -> Array:
-        by_coefficient = np.asarray(_slope(weights, state, (modelled(theta) - mean) / spread)) / spread
-        return np.concatenate([by_coefficient[:, :, i, None] * X[:, None, :] for i, X in enumerate(Xs)], axis=2)
+    def __init__(
+        self, weights: Weights, state: Array, target: Array, Xs: Sequence[Array], scale: tuple[Array, Array]
+    ) -> None:
+        """``scale``: mean and standard deviation of the coefficients (c,) in training."""
+        self.weights, self.state, self.target, self.Xs = weights, state, target, Xs
+        self.mean, self.spread = scale
+        self.edges = np.cumsum([X.shape[1] for X in Xs])[:-1]
 
-    def misses(theta: Array) -> Array:
-        return residual(theta).ravel()
+    def _inputs(self, theta: Array) -> Array:
+        """The modelled coefficients (N, c) in the network's units."""
+        parts = np.split(theta, self.edges)
+        modelled = np.column_stack([X @ part for X, part in zip(self.Xs, parts, strict=True)])
+        return np.asarray((modelled - self.mean) / self.spread)
 
-    def falls(theta: Array) -> Array:
-        return -slopes(theta).reshape(-1, theta.size)
+    def residual(self, theta: Array) -> Array:
+        """Measured rates less the network's (N, k), in the network's units."""
+        return np.asarray(self.target - _output(self.weights, self.state, self._inputs(theta)))
 
-    found = least_squares(misses, start, falls, x_scale="jac", max_nfev=30).x
-    return _regressions(structure, found, edges, slopes(found), residual(found), flights)
+    def slopes(self, theta: Array) -> Array:
+        """The sensitivities (N, k, p) of the network's output to theta."""
+        by_coefficient = np.asarray(_slope(self.weights, self.state, self._inputs(theta))) / self.spread
+        return np.concatenate([by_coefficient[:, :, i, None] * X[:, None, :] for i, X in enumerate(self.Xs)], axis=2)
+
+    def misfit(self, theta: Array) -> Array:
+        """``residual`` as one vector."""
+        return self.residual(theta).ravel()
+
+    def jacobian(self, theta: Array) -> Array:
+        """The Jacobian of ``misfit``."""
+        return -self.slopes(theta).reshape(-1, theta.size)
 
 
 def _regressions(
     structure: dict[str, tuple[str, ...]],
-    found: Array,
-    edges: Array,
-    slopes: Array,
-    residual: Array,
+    theta: Array,
+    through: _ThroughNetwork,
     flights: Sequence[MeasuredCoefficients],
 ) -> dict[str, Regression]:
-    """The derivatives with errors for the colour of what the network leaves."""
+    """The derivatives ``theta`` (p,) with standard errors for coloured residuals of the network."""
+    residual, slopes = through.residual(theta), through.slopes(theta)
     noise = np.maximum(residual.std(axis=0), 1e-12)
     ends = np.cumsum([len(flight.time) for flight in flights])[:-1]
     S, v = slopes / noise[None, :, None], residual / noise
     inverse = np.linalg.pinv(np.tensordot(S, S, axes=([0, 1], [0, 1])), rcond=1e-12, hermitian=True)
     covariance = coloured_covariance(inverse, np.split(S, ends), np.split(v, ends))
-    fits = {}
-    for (name, regressors), index in zip(structure.items(), np.split(np.arange(found.size), edges), strict=True):
+    regressions = {}
+    for (name, regressors), index in zip(
+        structure.items(), np.split(np.arange(theta.size), through.edges), strict=True
+    ):
         Xs = [regressor_matrix(flight, regressors) for flight in flights]
         ys = [flight.coefficients[name] for flight in flights]
         names = [f"{name}_{regressor}" for regressor in regressors]
-        own = covariance[np.ix_(index, index)]
-        spread = float(np.mean(np.concatenate([y - X @ found[index] for y, X in zip(ys, Xs, strict=True)]) ** 2))
-        fits[name] = regression_from_values(names, found[index], own / spread, ys, Xs)
-    return fits
-
-
-Weights = tuple[jax.Array, jax.Array, jax.Array, jax.Array]  # into the hidden layer, its bias, out of it, straight
+        variance = float(np.mean(np.concatenate([y - X @ theta[index] for y, X in zip(ys, Xs, strict=True)]) ** 2))
+        block = covariance[np.ix_(index, index)] / variance
+        regressions[name] = regression_from_values(names, theta[index], block, ys, Xs)
+    return regressions
 
 
 def _network(weights: Weights, inputs: jax.Array) -> jax.Array:
-    """One hidden layer beside a straight path; inputs and outputs in units of their spread."""
-    into, bias, out, straight = weights
-    return jnp.tanh(inputs @ into + bias) @ out + inputs @ straight
+    """One hidden layer with a linear path past it; inputs and outputs are standardised."""
+    into, bias, out, linear = weights
+    return jnp.tanh(inputs @ into + bias) @ out + inputs @ linear
 
 
 @jax.jit
-def _answer(weights: Weights, state: jax.Array, coefficients: jax.Array) -> jax.Array:
+def _output(weights: Weights, state: jax.Array, coefficients: jax.Array) -> jax.Array:
     return _network(weights, jnp.concatenate([state, coefficients], axis=1))
 
 
 @jax.jit
 def _slope(weights: Weights, state: jax.Array, coefficients: jax.Array) -> jax.Array:
-    """d answer / d coefficients (N, k, c)."""
+    """The sensitivities (N, k, c) of the network's output to the coefficients."""
     single = lambda x, c: _network(weights, jnp.concatenate([x, c]))  # noqa: E731
     slope: jax.Array = jax.vmap(jax.jacfwd(single, argnums=1))(state, coefficients)
     return slope
 
 
 def _train(inputs: Array, target: Array) -> Weights:
-    """Weights by least squares with weight decay on all but the straight path, from a seeded start."""
+    """The weights by least squares with weight decay on all but the linear path, from a seeded start."""
     n, k = inputs.shape[1], target.shape[1]
     shapes = ((n, _HIDDEN), (_HIDDEN,), (_HIDDEN, k), (n, k))
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
@@ -203,15 +222,15 @@ def _train(inputs: Array, target: Array) -> Weights:
         return jnp.concatenate([rest, np.sqrt(_DECAY * len(target)) * flat[: ends[2]]])
 
     rng = np.random.default_rng(_SEED)
-    straight = np.linalg.lstsq(inputs, target, rcond=None)[0]
-    start = np.concatenate([0.3 * rng.standard_normal(ends[2]), straight.ravel()])
+    linear = np.linalg.lstsq(inputs, target, rcond=None)[0]
+    start = np.concatenate([0.3 * rng.standard_normal(ends[2]), linear.ravel()])
     value, slope = jax.jit(residual), jax.jit(jax.jacfwd(residual))
 
-    def misses(w: Array) -> Array:
+    def misfit(w: Array) -> Array:
         return np.asarray(value(w))
 
-    def falls(w: Array) -> Array:
+    def jacobian(w: Array) -> Array:
         return np.asarray(slope(w))
 
-    found = least_squares(misses, start, falls, method="lm", max_nfev=60)
-    return unpack(jnp.asarray(found.x))
+    solution = least_squares(misfit, start, jacobian, method="lm", max_nfev=60)
+    return unpack(jnp.asarray(solution.x))

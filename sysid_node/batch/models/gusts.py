@@ -1,11 +1,11 @@
-"""Turbulence as further states, for filters that follow the aircraft through it.
+"""Turbulence as further states of a model, for filter error.
 
 Each gust is white noise through a first-order filter, after the Dryden spectra of MIL-F-8785C (1980), sec. 3.7: the
-air's velocity along the body axes, and its rolling. Vertical and lateral gusts that change along the body act
-like a pitching and a yawing motion of the air (frozen turbulence), low-passed by the size of the aircraft. How much of
-that turning there is, the flight must say: it depends on how the gusts lie to the body, and on what the air is like.
-Small eddies drift with the large ones, so that what counts is the speed relative to the gusting air (Tennekes,
-"Eulerian and Lagrangian time microscales in isotropic turbulence", J. Fluid Mech. 67, 1975).
+air's velocity along the body axes, and its roll rate. Vertical and lateral gusts that change along the body act like a
+pitch rate and a yaw rate of the air (frozen turbulence), low-passed by the size of the aircraft. The size of these
+rates depends on the gusts' direction to the body and on the air, so that it is estimated. Small eddies drift with the
+large ones, so that the gusts pass at the speed relative to the gusting air (Tennekes, "Eulerian and Lagrangian time
+microscales in isotropic turbulence", J. Fluid Mech. 67, 1975).
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ Signals = Mapping[str, jax.Array]
 #: of the aircraft sees it, m/s; its roll rate, rad/s.
 GUSTS = {"V": ("gust_u",), "alpha": ("gust_w", "seen_w"), "beta": ("gust_v", "seen_v"), "p": ("gust_p",)}
 
-#: The states that random noise drives, with its size in light turbulence (unit per root second; 0: unknown); the others
-#: follow. Pitch and yaw are driven beside the gusts by what moments the gusts' model leaves over.
+#: The states with process noise, and its 1 sigma in light turbulence (unit per root second; 0: not known). Pitch and
+#: yaw rate have process noise besides the gusts, for the moments that the model of the gusts does not explain.
 DRIVEN = {"q": 0.0, "r": 0.0, "gust_u": 0.5, "gust_v": 0.5, "gust_w": 0.5, "gust_p": 0.5}
 
-#: s: memory of the gusts. Dryden's is length over airspeed, 1 to 30 s, but height and air decide it: with a long one,
-#: what a gust does within a manoeuvre is free, and nothing is claimed of the mean of minutes.
-_MEMORY = 20.0
+#: s: correlation time of the gusts. Dryden's is scale length over airspeed, 1 to 30 s, depending on height and air. A
+#: long one leaves a gust free within a manoeuvre and says nothing of means over minutes.
+_CORRELATION_TIME = 20.0
 
-#: Shares of the turning that frozen turbulence would have, by the state that brings it about.
-_TURNING = {"seen_w": "gust_pitching", "seen_v": "gust_yawing"}
+#: Parameters: the air's rotation as a share of that of frozen turbulence, by the state that it follows from.
+_ROTATION = {"seen_w": "gust_pitching", "seen_v": "gust_yawing"}
 
 
 def gust_states(states: Sequence[str]) -> tuple[str, ...]:
@@ -42,14 +42,14 @@ def gust_states(states: Sequence[str]) -> tuple[str, ...]:
 
 
 def gust_parameters(states: Sequence[str]) -> tuple[Parameter, ...]:
-    """How much the gusts turn the air: 1 as frozen turbulence does, 0 not at all; estimated, and not the aircraft's."""
-    return tuple(Parameter(name, 1.0, prior=(1.0, 1.0)) for state, name in _TURNING.items() if state in states)
+    """The parameters of the air's rotation: 1 as in frozen turbulence, 0 none; not derivatives of the aircraft."""
+    return tuple(Parameter(name, 1.0, prior=(1.0, 1.0)) for state, name in _ROTATION.items() if state in states)
 
 
 def air_relative(s: Signals, span: float) -> dict[str, jax.Array]:
-    """V, alpha, beta, p, q, r relative to the gusting air; signals without gusts come back as they are.
+    """The signals with V, alpha, beta, p, q, r relative to the gusting air; without gust states they are unchanged.
 
-    ``s`` holds the states and the shares of turning; ``span`` m.
+    ``s`` holds the states and the parameters of the air's rotation; ``span`` m.
     """
     flow = _flow(s)
     relative = dict(s) | {name: flow[name] for name in flow if GUSTS[name][0] in s}
@@ -65,9 +65,9 @@ def air_relative(s: Signals, span: float) -> dict[str, jax.Array]:
 
 
 def gust_rates(s: Signals, span: float) -> dict[str, jax.Array]:
-    """Derivatives of the gust states without their driving noise."""
+    """The time derivatives of the gust states without their process noise."""
     flow = _flow(s)
-    rates = {name: -s[name] / _MEMORY for name in ("gust_u", "gust_v", "gust_w") if name in s}
+    rates = {name: -s[name] / _CORRELATION_TIME for name in ("gust_u", "gust_v", "gust_w") if name in s}
     if "gust_p" in s:
         rates["gust_p"] = -s["gust_p"] / _pitch_time(flow, span)
     if "seen_w" in s:
@@ -88,10 +88,10 @@ def _flow(s: Signals) -> dict[str, jax.Array]:
 
 
 def _pitch_time(flow: Signals, span: float) -> jax.Array:
-    """Time constant, s, of pitching and rolling gusts: 4 b / (pi V)."""
+    """Time constant, s, of the air's pitch and roll rates: 4 b / (pi V)."""
     return 4.0 * span / (math.pi * flow["V"])
 
 
 def _yaw_time(flow: Signals, span: float) -> jax.Array:
-    """Time constant, s, of yawing gusts: 3 b / (pi V)."""
+    """Time constant, s, of the air's yaw rate: 3 b / (pi V)."""
     return 3.0 * span / (math.pi * flow["V"])

@@ -1,4 +1,4 @@
-"""From flight records to what a model sees of them."""
+"""Flight records as the data of a model, whole or cut into segments."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def manoeuvre_data(
 ) -> ManoeuvreData:
     """The record's columns as inputs, outputs and initial state of ``model``.
 
-    Columns are found by name; pdot, qdot and rdot are differentiated where the record lacks them. The initial state
-    is the first sample where ``initial_state`` does not give it; a state that was never measured starts at zero.
+    Columns are found by name; pdot, qdot and rdot are differentiated where the record lacks them. The initial state is
+    the first measured value, unless ``initial_state`` gives it; a state that was never measured starts at zero.
     Outputs are averaged over ``every`` samples. Raises InputError where an input was not measured.
     """
     missing = [name for name in model.inputs if not record.measured(name)]
@@ -66,8 +66,9 @@ def with_forces_at_cg(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
 def cut_into_segments(record: FlightRecord, seconds: float) -> list[FlightRecord]:
     """The record in pieces of equal length, none longer than ``seconds``; 0 leaves it whole.
 
-    A long open-loop rollout drifts away on small errors of trim and wind; pieces with an initial state each do not.
-    Fewer samples than there are pieces are left over at the end: equal pieces run through the same compiled program.
+    A long open-loop rollout drifts because of small errors of trim and wind; pieces with initial states of their own do
+    not. Pieces of equal length share one compiled program, so that some samples at the end may be left over. Raises
+    InputError where a piece would have too few samples.
     """
     if len(record) < _FEWEST:
         raise InputError(f"flight {record.name!r}: {len(record)} samples; give at least {_FEWEST}, better some seconds")

@@ -1,4 +1,4 @@
-"""A model that every estimator understands: x' = f(x, u, theta), y = g(x, u, theta), all of it named."""
+"""State-space models with unknown parameters, x' = f(x, u, theta), y = g(x, u, theta), and a manoeuvre's data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EquationFunction = Callable[[Scalars, Scalars, Scalars], Scalars]
 
 
 class ModelEquations(NamedTuple):
-    """A model's equations alone: what compiled code belongs to, whatever the parameters' values and bounds."""
+    """A model's equations without its parameters' values and bounds; compiled programs depend on these alone."""
 
     derivative: EquationFunction
     output: EquationFunction
@@ -29,9 +29,9 @@ class ModelEquations(NamedTuple):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One constant of a model: where its estimation starts and what is known of it beforehand.
+    """One parameter of a model: its start value, its bounds, and what is known of it beforehand.
 
-    ``prior`` is what is known from elsewhere, a value and its 1-sigma uncertainty (None: nothing); ``fixed`` keeps the
+    ``prior`` is a value known from elsewhere and its 1-sigma uncertainty (None: nothing is known); ``fixed`` keeps the
     parameter at ``start``. Raises InputError where ``start`` is not finite or outside the bounds.
     """
 
@@ -62,10 +62,10 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class StateSpaceModel:
-    """A dynamic system with unknown constants.
+    """A dynamic system with unknown parameters.
 
-    ``derivative`` gives the states' derivatives and ``output`` the outputs, from states, inputs and parameters one by
-    one, each in the order of the names given here; units are those of the names (SI, radians, body axes FRD).
+    ``derivative`` returns the states' derivatives and ``output`` the outputs, from states, inputs and parameters, each
+    a sequence of scalars in the order of the names given here (SI, radians, body axes FRD).
     """
 
     name: str
@@ -76,8 +76,8 @@ class StateSpaceModel:
     derivative: EquationFunction
     output: EquationFunction
     units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
-    driven: Mapping[str, float] | None = None  # the states that process noise moves (None: all), with its rough size:
-    # unit per root second, 0 where nothing is known of it
+    driven: Mapping[str, float] | None = None  # states with process noise (None: all) and its approximate 1 sigma, in
+    # the state's unit per root second; 0: not known
 
     def __post_init__(self) -> None:
         for kind in ("states", "inputs", "outputs", "names"):
@@ -88,7 +88,7 @@ class StateSpaceModel:
 
     @property
     def dynamics(self) -> ModelEquations:
-        """The equations alone."""
+        """The equations without the parameters' values."""
         return ModelEquations(self.derivative, self.output)
 
     @property
@@ -98,7 +98,7 @@ class StateSpaceModel:
 
     @property
     def driven_states(self) -> tuple[str, ...]:
-        """The states that process noise moves."""
+        """The states with process noise."""
         return self.states if self.driven is None else tuple(self.driven)
 
     @property
@@ -130,7 +130,7 @@ class StateSpaceModel:
 
 @dataclass(frozen=True)
 class ManoeuvreData:
-    """One stretch of flight as a model sees it.
+    """The data of one manoeuvre in the order of a model's inputs, outputs and states.
 
     ``time`` (N,) s, increasing; ``inputs`` (N, nu), complete; ``outputs`` (N // every, ny) as measured, each the mean
     over ``every`` samples, NaN = not measured; ``initial_state`` (nx,) at ``time[0]``. Raises InputError on too few
@@ -162,7 +162,7 @@ class ManoeuvreData:
 
     @property
     def output_time(self) -> Array:
-        """When the outputs were measured, on average (N // every,), s."""
+        """The mean time (N // every,), s, of the samples of each output."""
         return block_means(self.time, self.every)
 
     @property
@@ -172,7 +172,7 @@ class ManoeuvreData:
 
 
 def block_means(values: Array, every: int) -> Array:
-    """Means (N // every, ...) over ``every`` rows each; what is left at the end is dropped."""
+    """Means (N // every, ...) over ``every`` rows each; an incomplete block at the end is dropped."""
     rows = len(values) // every
     return np.asarray(values[: rows * every].reshape(rows, every, *values.shape[1:]).mean(axis=1))
 

@@ -24,9 +24,10 @@ _MODELLED_BY = {"ax": "CD", "ay": "CY", "az": "CL"}
 def model_for_flights(
     aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings, gusts: bool = False
 ) -> tuple[StateSpaceModel, tuple[str, ...]]:
-    """The rigid-body model that the aircraft file and the measurements allow, and what had to be left out.
+    """The rigid-body model that the aircraft file and the measurements allow, and remarks on what it leaves out.
 
-    ``gusts``: with states for turbulence.
+    ``gusts``: with states for turbulence. Raises InputError where the derivatives make no complete motion, or where the
+    airspeed was not measured.
     """
     remarks = []
     thrust = aircraft.throttle is None or all(record.measured("thrust") for record in records)
@@ -35,8 +36,8 @@ def model_for_flights(
         remarks.append("thrust was not measured: the airspeed is taken as measured, and CD is left out")
     if not states:
         raise InputError(
-            f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.model_structure)}) make no complete "
-            "motion; an equation-error method estimates each coefficient alone"
+            f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.model_structure)}) make no complete motion; an "
+            "equation-error method estimates each coefficient alone"
         )
     unflown = [record.name for record in records if not record.measured("V")]
     if unflown:
@@ -51,16 +52,17 @@ def model_for_flights(
     measured = [name for name in candidates if all(record.measured(name) for record in records)]
     outputs = [name for name in measured if name in OUTPUTS]
     model = rigid_body(aircraft, states, outputs, use_prior=settings.use_prior, thrust=needs_thrust, gusts=gusts)
-    lost = [name for name in states if name not in outputs]
-    if lost:
-        remarks.append(f"{', '.join(lost)} not measured: known through the other outputs alone")
+    unmeasured = [name for name in states if name not in outputs]
+    if unmeasured:
+        remarks.append(f"{', '.join(unmeasured)} not measured: known through the other outputs alone")
     return model, tuple(remarks)
 
 
 def require_length(model: StateSpaceModel, aircraft: Aircraft, records: Sequence[FlightRecord]) -> None:
     """Raises InputError where the flights are too short for one of the model's coefficients.
 
-    Outputs and states tell of the same few motions: they do not make up for a flight that ends before it has begun.
+    Each equation must be determined by the flight alone: several outputs respond to the same few motions, so that more
+    of them do not make up for a short flight.
     """
     for coefficient, regressors in aircraft.model_structure.items():
         names = [name for name in (f"{coefficient}_{r}" for r in regressors) if name in model.names]
@@ -69,6 +71,7 @@ def require_length(model: StateSpaceModel, aircraft: Aircraft, records: Sequence
 
 
 def _possible_states(aircraft: Aircraft, thrust: bool) -> tuple[str, ...]:
+    """The states whose coefficients have derivatives in the aircraft file; ``thrust``: whether it is known."""
     structure = set(aircraft.model_structure)
     possible = {state for needed, states in _AXES.items() if structure.issuperset(needed) for state in states}
     if thrust and {"CL", "CD"} <= structure and "alpha" in possible:

@@ -1,9 +1,9 @@
-"""The rigid aircraft, as many of its states as are wanted; the others are taken from what was measured.
+"""The rigid aircraft with any of its states; the other states are inputs, as measured.
 
 Flat earth, still air, rigid body, body axes FRD: Klein & Morelli (2006), eqs. 3.33 to 3.37. A state that is not
-integrated enters as an input, and so does the specific force of a coefficient that is not modelled: then a
-longitudinal or lateral model needs nothing of the other axes, and a measured airspeed makes thrust unnecessary
-(Morelli's SIDPAC does the same). All eight states make it the six-degree-of-freedom flight of the nominal aircraft.
+integrated enters as an input, and so does the specific force of a coefficient that is not modelled. A longitudinal or
+lateral model therefore needs no coefficients of the other axes, and a measured airspeed makes thrust unnecessary
+(Morelli's SIDPAC does the same). With all eight states it is the six-degree-of-freedom motion of the aircraft.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ OUTPUTS = {
     },
     **{"ax": "m/s^2", "ay": "m/s^2", "az": "m/s^2", "pdot": "rad/s^2", "qdot": "rad/s^2", "rdot": "rad/s^2"},
 }
-#: What a force that is not modelled is called as an input: the specific force at the CG, m/s^2.
+#: Inputs for the forces that are not modelled: the specific force at the CG, m/s^2.
 AT_CG = ("ax_cg", "ay_cg", "az_cg")
 
 Signals = Mapping[str, jax.Array]
@@ -73,24 +73,21 @@ def rigid_body(
     through the mean air. Raises InputError on unknown names and on states whose coefficient has no derivatives.
     """
     modelled = _coefficients_needed(aircraft, states)
-    parameters = derivative_parameters(aircraft, modelled, use_prior)
-    names = tuple(parameter.name for parameter in parameters)
-    given = [name for name in STATES if name not in states]
-    forces = _measured_forces(modelled)
-    controls = [symbol for symbol in aircraft.control_symbols if any(name.endswith(f"_{symbol}") for name in names)]
-    inputs = (*given, *controls, "rho", *(["thrust"] if thrust else []), *forces)
     unknown = [name for name in outputs if name not in OUTPUTS]
     if unknown:
         raise InputError(f"outputs {', '.join(unknown)} are not known; known: {', '.join(OUTPUTS)}")
+    derivatives = derivative_parameters(aircraft, modelled, use_prior)
+    names = tuple(parameter.name for parameter in derivatives)
     all_states = (*states, *(gust_states(states) if gusts else ()))
-    turning = gust_parameters(all_states)
-    motion = _Motion(aircraft, all_states, inputs, (names, tuple(p.name for p in turning)), reference_rates)
+    inputs = _inputs(aircraft, states, names, modelled, thrust)
+    rotation = gust_parameters(all_states)
+    motion = _Motion(aircraft, all_states, inputs, (names, tuple(p.name for p in rotation)), reference_rates)
     return StateSpaceModel(
         name="rigid_body",
         states=all_states,
         inputs=inputs,
         outputs=tuple(outputs),
-        parameters=(*parameters, *turning),
+        parameters=(*derivatives, *rotation),
         derivative=motion.derivative,
         output=lambda x, u, theta: motion.output(outputs, x, u, theta),
         units=dict(OUTPUTS),
@@ -98,8 +95,17 @@ def rigid_body(
     )
 
 
+def _inputs(
+    aircraft: Aircraft, states: Sequence[str], names: Sequence[str], modelled: Sequence[str], thrust: bool
+) -> tuple[str, ...]:
+    """The model's inputs; ``names`` are those of the derivatives, ``modelled`` the coefficients."""
+    given = [name for name in STATES if name not in states]
+    controls = [symbol for symbol in aircraft.control_symbols if any(name.endswith(f"_{symbol}") for name in names)]
+    return (*given, *controls, "rho", *(["thrust"] if thrust else []), *_measured_forces(modelled))
+
+
 def _coefficients_needed(aircraft: Aircraft, states: Sequence[str]) -> tuple[str, ...]:
-    """Coefficients that these states need. Raises InputError where the aircraft file has no derivatives of one."""
+    """The coefficients that these states need. Raises InputError where the aircraft file has no derivatives of one."""
     needed: list[str] = []
     for state in states:
         if state not in STATES:
@@ -121,7 +127,7 @@ def _coefficients_needed(aircraft: Aircraft, states: Sequence[str]) -> tuple[str
 
 
 def _measured_forces(modelled: Sequence[str]) -> list[str]:
-    """Specific forces that enter as inputs; lift and drag share two axes, so that both are needed for either."""
+    """The specific forces that are inputs; lift and drag share two axes, so that each needs the other."""
     ax_cg, ay_cg, az_cg = AT_CG
     longitudinal = [] if {"CL", "CD"} <= set(modelled) else [ax_cg, az_cg]
     return longitudinal + ([] if "CY" in modelled else [ay_cg])
@@ -138,11 +144,11 @@ class _Motion:
         names: tuple[tuple[str, ...], tuple[str, ...]],
         reference_rates: bool,
     ) -> None:
-        """``names`` of the derivatives, then of the gusts' parameters: together the order of theta."""
+        """``names`` of the derivatives, then of the gusts' parameters; theta is in this order."""
         self.aircraft = aircraft
         self.states = states
         self.inputs = inputs
-        self.names, self.turning = names
+        self.names, self.rotation = names
         self._coefficients = coefficient_function(aircraft, self.names, reference_rates)
 
     def derivative(self, x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
@@ -168,7 +174,7 @@ class _Motion:
         """All signals, the same relative to the gusting air, and the coefficients that follow."""
         values = dict(zip(self.states, x, strict=True)) | dict(zip(self.inputs, u, strict=True))
         count = len(self.names)
-        s = {"thrust": jnp.zeros_like(u[0])} | values | dict(zip(self.turning, theta[count:], strict=True))
+        s = {"thrust": jnp.zeros_like(u[0])} | values | dict(zip(self.rotation, theta[count:], strict=True))
         air = air_relative(s, self.aircraft.geometry.b)
         return s, air, self._coefficients(air, theta[:count])
 
