@@ -11,7 +11,7 @@ from scipy.optimize import fsolve
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.model import ManoeuvreData
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.rigid_body import OUTPUTS, STATES, rigid_body
 from sysid_node.flight.record import FlightRecord
 

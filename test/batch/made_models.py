@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.model import ManoeuvreData, Parameter, Scalars, StateSpaceModel
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
+from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
 from sysid_node.flight.record import Array
 
 #: Short period of a small aircraft at 18 m/s, dimensional: alpha' = q + Za alpha + Zd de, q' = Ma alpha + Mq q + Md de.

@@ -12,8 +12,9 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
 from sysid_node.batch.models.lateral_rates import lateral_rates
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.manoeuvres import manoeuvre_data, with_forces_at_cg
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.models.rigid_body import rigid_body
 from sysid_node.batch.models.short_period import short_period
 from sysid_node.batch.regression.filtering import differentiate, lowpass

@@ -18,13 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from sysid_node.batch.likelihood.rollout import output, rk4_step
-from sysid_node.batch.models.model import (
-    ManoeuvreData,
-    ModelEquations,
-    StateSpaceModel,
-    check_every_output_measured,
-    check_manoeuvres,
-)
+from sysid_node.batch.models.manoeuvre import ManoeuvreData, check_every_output_measured, check_manoeuvres
+from sysid_node.batch.models.model import ModelEquations, StateSpaceModel
 from sysid_node.batch.results.parameter_track import ParameterTrack
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.errors import InputError

@@ -12,7 +12,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sysid_node.batch.models.model import ManoeuvreData, ModelEquations, StateSpaceModel
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
+from sysid_node.batch.models.model import ModelEquations, StateSpaceModel
 from sysid_node.flight.record import Array
 
 #: Where in the step each stage looks, and its share in the result.

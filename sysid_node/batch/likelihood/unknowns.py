@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 

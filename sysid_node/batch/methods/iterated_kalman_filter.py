@@ -20,7 +20,8 @@ from sysid_node.batch.likelihood.joint_kalman_filter import (
     linearised_gain,
     predict_linearised,
 )
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.results.parameter_track import ParameterTrack
 
 #: Gauss-Newton steps of each correction.

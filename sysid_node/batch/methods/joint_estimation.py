@@ -16,8 +16,9 @@ from sysid_node.batch.likelihood.joint_kalman_filter import FilterNoise, FilterS
 from sysid_node.batch.methods.extended_kalman_filter import EXTENDED
 from sysid_node.batch.methods.iterated_kalman_filter import ITERATED
 from sysid_node.batch.methods.unscented_kalman_filter import UNSCENTED
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.manoeuvres import manoeuvre_data, record_for_model
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.models.model_for_flights import model_for_flights, require_length
 from sysid_node.batch.regression.filtering import averaging_factor, block_averaged
 from sysid_node.batch.regression.prior import tolerance_of

@@ -11,8 +11,9 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.filter_error import filter_error, predict_filter_error
 from sysid_node.batch.methods.output_error import output_error, predict_output_error
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.manoeuvres import cut_into_segments, manoeuvre_data, record_for_model
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.models.model_for_flights import model_for_flights, require_length
 from sysid_node.batch.regression.filtering import averaging_factor, block_averaged
 from sysid_node.batch.results.batch_fit import BatchFit

@@ -15,8 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -25,6 +23,7 @@ from sysid_node.aircraft.names import LATERAL, LONGITUDINAL
 from sysid_node.batch.regression.coloured_residuals import coloured_covariance
 from sysid_node.batch.regression.combined_fit import combined_fit
 from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
+from sysid_node.batch.regression.feedforward_network import Weights, network_output, network_slope, train_network
 from sysid_node.batch.regression.filtering import block_averaged, differentiate, lowpass
 from sysid_node.batch.regression.linear_regression import Regression
 from sysid_node.batch.regression.measured_coefficients import MeasuredCoefficients, at_cg, measured_coefficients
@@ -40,14 +39,7 @@ _GROUPS = (
     (("V", "alpha", "theta", "q"), ("V", "alpha", "q"), LONGITUDINAL),
     (("beta", "p", "r", "phi"), ("beta", "p", "r"), LATERAL),
 )
-_HIDDEN = 6
 _RATE = 25.0  # Hz: well above twice the low-pass
-_DECAY = 1e-4  # weight decay: penalty of a weight of one, as a share of the outputs' variance
-_SEED = 1
-
-
-#: Matrix into the hidden layer, its bias, matrix out of it, matrix past it.
-Weights = tuple[jax.Array, jax.Array, jax.Array, jax.Array]
 
 
 @dataclass(frozen=True)
@@ -119,7 +111,7 @@ def _group(
     )
     scales = [(x.mean(axis=0), np.maximum(x.std(axis=0), 1e-9)) for x in (motion, measured, rates)]
     state, inner, target = ((x - m) / s for x, (m, s) in zip((motion, measured, rates), scales, strict=True))
-    weights = _train(np.column_stack([state, inner]), target)
+    weights = train_network(np.column_stack([state, inner]), target)
     Xs = [np.concatenate([p.regressors[name] for p in parts]) for name in structure]
     start = np.concatenate([np.linalg.lstsq(X, y, rcond=None)[0] for X, y in zip(Xs, measured.T, strict=True)])
     through = _ThroughNetwork(weights, state, target, Xs, scales[1])
@@ -146,11 +138,11 @@ class _ThroughNetwork:
 
     def residual(self, theta: Array) -> Array:
         """Measured rates less the network's (N, k), in the network's units."""
-        return np.asarray(self.target - _output(self.weights, self.state, self._inputs(theta)))
+        return np.asarray(self.target - network_output(self.weights, self.state, self._inputs(theta)))
 
     def slopes(self, theta: Array) -> Array:
         """The sensitivities (N, k, p) of the network's output to theta."""
-        by_coefficient = np.asarray(_slope(self.weights, self.state, self._inputs(theta))) / self.spread
+        by_coefficient = np.asarray(network_slope(self.weights, self.state, self._inputs(theta))) / self.spread
         return np.concatenate([by_coefficient[:, :, i, None] * X[:, None, :] for i, X in enumerate(self.Xs)], axis=2)
 
     def misfit(self, theta: Array) -> Array:
@@ -186,51 +178,3 @@ def _regressions(
         block = covariance[np.ix_(index, index)] / variance
         regressions[name] = regression_from_values(names, theta[index], block, ys, Xs)
     return regressions
-
-
-def _network(weights: Weights, inputs: jax.Array) -> jax.Array:
-    """One hidden layer with a linear path past it; inputs and outputs are standardised."""
-    into, bias, out, linear = weights
-    return jnp.tanh(inputs @ into + bias) @ out + inputs @ linear
-
-
-@jax.jit
-def _output(weights: Weights, state: jax.Array, coefficients: jax.Array) -> jax.Array:
-    return _network(weights, jnp.concatenate([state, coefficients], axis=1))
-
-
-@jax.jit
-def _slope(weights: Weights, state: jax.Array, coefficients: jax.Array) -> jax.Array:
-    """The sensitivities (N, k, c) of the network's output to the coefficients."""
-    single = lambda x, c: _network(weights, jnp.concatenate([x, c]))  # noqa: E731
-    slope: jax.Array = jax.vmap(jax.jacfwd(single, argnums=1))(state, coefficients)
-    return slope
-
-
-def _train(inputs: Array, target: Array) -> Weights:
-    """The weights by least squares with weight decay on all but the linear path, from a seeded start."""
-    n, k = inputs.shape[1], target.shape[1]
-    shapes = ((n, _HIDDEN), (_HIDDEN,), (_HIDDEN, k), (n, k))
-    ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
-
-    def unpack(flat: jax.Array) -> Weights:
-        a, b, c, d = (part.reshape(s) for part, s in zip(jnp.split(flat, ends[:-1]), shapes, strict=True))
-        return a, b, c, d
-
-    def residual(flat: jax.Array) -> jax.Array:
-        rest = (target - _network(unpack(flat), jnp.asarray(inputs))).ravel()
-        return jnp.concatenate([rest, np.sqrt(_DECAY * len(target)) * flat[: ends[2]]])
-
-    rng = np.random.default_rng(_SEED)
-    linear = np.linalg.lstsq(inputs, target, rcond=None)[0]
-    start = np.concatenate([0.3 * rng.standard_normal(ends[2]), linear.ravel()])
-    value, slope = jax.jit(residual), jax.jit(jax.jacfwd(residual))
-
-    def misfit(w: Array) -> Array:
-        return np.asarray(value(w))
-
-    def jacobian(w: Array) -> Array:
-        return np.asarray(slope(w))
-
-    solution = least_squares(misfit, start, jacobian, method="lm", max_nfev=60)
-    return unpack(jnp.asarray(solution.x))

@@ -24,7 +24,8 @@ from sysid_node.batch.likelihood.maximum_likelihood import (
 )
 from sysid_node.batch.likelihood.problem import LikelihoodProblem
 from sysid_node.batch.likelihood.unknowns import Unknowns
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel, check_manoeuvres
+from sysid_node.batch.models.manoeuvre import ManoeuvreData, check_manoeuvres
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.flight.record import Array

@@ -18,7 +18,8 @@ from sysid_node.batch.likelihood.joint_kalman_filter import (
     VectorFunction,
     filter_along,
 )
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel
+from sysid_node.batch.models.manoeuvre import ManoeuvreData
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.results.parameter_track import ParameterTrack
 
 #: alpha and beta of the scaled transformation: how far the points spread, and the distribution's shape (2: Gaussian).

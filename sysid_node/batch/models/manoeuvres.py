@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.models.model import ManoeuvreData, StateSpaceModel, block_means
+from sysid_node.batch.models.manoeuvre import ManoeuvreData, block_means
+from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.models.rigid_body import AT_CG
 from sysid_node.batch.regression.filtering import differentiate
 from sysid_node.batch.regression.measured_coefficients import at_cg

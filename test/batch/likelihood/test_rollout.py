@@ -7,7 +7,7 @@ from made_models import SHORT_PERIOD, flown, short_period_model
 from scipy.linalg import expm
 
 from sysid_node.batch.likelihood import rollout
-from sysid_node.batch.models.model import ManoeuvreData, block_means
+from sysid_node.batch.models.manoeuvre import ManoeuvreData, block_means
 
 MODEL = short_period_model()
 SYSTEM = np.array([[SHORT_PERIOD["Za"], 1.0], [SHORT_PERIOD["Ma"], SHORT_PERIOD["Mq"]]])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from made_models import SHORT_PERIOD, flown, short_period_model, with_outputs
 
-from sysid_node.batch.models.model import ManoeuvreData, Parameter, check_manoeuvres
+from sysid_node.batch.models.manoeuvre import ManoeuvreData, check_manoeuvres
+from sysid_node.batch.models.model import Parameter
 from sysid_node.errors import InputError
 
 
