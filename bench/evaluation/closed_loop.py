@@ -16,7 +16,7 @@ from sysid_node.control.estimates import identified_derivatives
 from sysid_node.control.settings import ControllerSettings as Control
 from sysid_node.control.types import Measurements, SetPoints
 from sysid_node.excite import exciter
-from sysid_node.excite.exciter import ExcitationSettings as Excitation
+from sysid_node.excite.exciter_settings import ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
 from sysid_node.online.settings import Settings as Estimation
 from sysid_node.ros.session import Session
@@ -31,7 +31,7 @@ ESTIMATES = 20.0  # Hz
 BEGIN = 3.0  # s, when excitation begins
 ACTUATORS = "actuator_lag:time_constant=0.05"
 #: Known well enough to fly on; what is lost later is excited again.
-EXCITATION = Excitation(accuracy=0.15, watch=True)
+EXCITATION = ExcitationSettings(accuracy=0.15, watch=True)
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Sortie:
     seconds: float = 60.0
     air: Air = field(default_factory=Air)
     adapt: bool = True
-    excitation: Excitation = EXCITATION
+    excitation: ExcitationSettings = EXCITATION
     asked: float = 1.0  # size of the set-points
     aircraft: str = "cdrw"
     method: str = "sls_rft"  # least squares: instruments are made of the file's aircraft, which a failed one is not

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
     from sysid_node.excite.optimise import FlightEnvelope
     from sysid_node.excite.prediction import Predictor
-    from sysid_node.excite.spec import Segment
+    from sysid_node.excite.segment import Segment
     from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -57,7 +57,8 @@ def run(args: argparse.Namespace) -> None:
 def design(args: argparse.Namespace) -> ManoeuvreResult:
     """The manoeuvre with its prediction. Raises InputError."""
     from sysid_node.excite.prediction import Predictor  # noqa: PLC0415  # JAX takes its time
-    from sysid_node.excite.spec import draw_manoeuvre, parse_segments  # noqa: PLC0415
+    from sysid_node.excite.segment import draw_manoeuvre  # noqa: PLC0415
+    from sysid_node.excite.spec import parse_segments  # noqa: PLC0415
     from sysid_node.report.results.manoeuvre_result import ManoeuvreResult  # noqa: PLC0415
 
     if not 10 <= args.evaluations <= 10_000:

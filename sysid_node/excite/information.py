@@ -1,4 +1,4 @@
-"""What a flight can tell about parameters: Fisher information, the least standard errors, correlations.
+"""The information of a flight about parameters: Fisher information, Cramer-Rao bounds, correlations.
 
 For outputs with white Gaussian noise of covariance R the information is M = sum over samples of S' R^-1 S, with S the
 outputs' sensitivities; no unbiased estimator has a covariance below M^-1 (Cramer & Rao; Maine & Iliff, NASA RP-1168
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: A direction in (scaled) parameter space with less than this share of the largest information counts as unseen.
-_UNSEEN = 1e-12
+#: A direction in (scaled) parameter space with less than this share of the largest information counts as unobservable.
+_UNOBSERVABLE = 1e-12
 
 
 @dataclass(frozen=True)
 class FisherInformation:
-    """Information on ``names`` (P,) once the nuisances are estimated too.
+    """The information on ``names`` (P,) where the nuisance parameters are estimated as well.
 
     ``matrix`` (P, P) is the Fisher information, ``values`` (P,) where it holds; SI units of the parameters.
     """
@@ -31,12 +31,12 @@ class FisherInformation:
 
     @property
     def covariance(self) -> Array:
-        """The Cramer-Rao bound (P, P); infinite on the diagonal for a parameter that the flight does not show."""
+        """The Cramer-Rao bound (P, P); infinite on the diagonal for an unobservable parameter."""
         size = np.sqrt(np.diag(self.matrix))
-        seen = size > 0
+        excited = size > 0
         covariance = np.zeros_like(self.matrix)
         np.fill_diagonal(covariance, np.inf)
-        covariance[np.ix_(seen, seen)] = _inverse(self.matrix[np.ix_(seen, seen)], size[seen])
+        covariance[np.ix_(excited, excited)] = _inverse(self.matrix[np.ix_(excited, excited)], size[excited])
         return covariance
 
     @property
@@ -46,7 +46,7 @@ class FisherInformation:
 
     @property
     def correlations(self) -> Array:
-        """Correlations (P, P) of the estimates' errors; zero with a parameter that is not seen."""
+        """Correlations (P, P) of the estimates' errors; zero with an unobservable parameter."""
         covariance = self.covariance
         size = np.sqrt(np.diag(covariance))
         with np.errstate(invalid="ignore"):
@@ -55,7 +55,7 @@ class FisherInformation:
         return np.asarray(correlations)
 
     def pairs(self, threshold: float = 0.9) -> list[tuple[str, str, float]]:
-        """Pairs whose errors are correlated beyond ``threshold``, worst first: hardly told apart in this flight."""
+        """Pairs whose errors are correlated beyond ``threshold``, worst first; the flight hardly distinguishes them."""
         correlations = np.triu(self.correlations, 1)
         rows, columns = np.nonzero(np.abs(correlations) > threshold)
         found = [(self.names[i], self.names[j], float(correlations[i, j])) for i, j in zip(rows, columns, strict=True)]
@@ -72,18 +72,18 @@ def eliminate(matrix: Array, count: int) -> Array:
     """Information on the first ``count`` parameters when the others are unknown as well: the Schur complement."""
     A, B, C = matrix[:count, :count], matrix[:count, count:], matrix[count:, count:]
     size = np.sqrt(np.diag(C))
-    seen = size > 0
-    if not seen.any():
+    excited = size > 0
+    if not excited.any():
         return A
-    return np.asarray(A - B[:, seen] @ _inverse(C[np.ix_(seen, seen)], size[seen]) @ B[:, seen].T)
+    return np.asarray(A - B[:, excited] @ _inverse(C[np.ix_(excited, excited)], size[excited]) @ B[:, excited].T)
 
 
 def _inverse(matrix: Array, size: Array) -> Array:
     """Inverse of a positive matrix with diagonal size^2; directions without information get an infinite variance."""
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    poor = values < _UNSEEN * values[-1]
+    poor = values < _UNOBSERVABLE * values[-1]
     inverse = (vectors[:, ~poor] / values[~poor]) @ vectors[:, ~poor].T
-    # whoever has a part in a direction that is not seen is not known
-    hidden = (np.abs(vectors[:, poor]) > 1e-6).any(axis=1)
-    inverse[hidden, hidden] = np.inf
+    # a parameter with a component in an unobservable direction has an infinite variance
+    unknown = (np.abs(vectors[:, poor]) > 1e-6).any(axis=1)
+    inverse[unknown, unknown] = np.inf
     return np.asarray(inverse / np.outer(size, size))

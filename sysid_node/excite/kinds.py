@@ -1,4 +1,4 @@
-"""The kinds of manoeuvre that a spec can name, their keys, and what each draws."""
+"""The kinds of manoeuvre that a spec can name, with their keys and the inputs that they give."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class ManoeuvreKey:
-    """A number that shapes a manoeuvre: default, unit, what it means, and whether it must be above zero."""
+    """A number of a manoeuvre: its default, unit and meaning, and whether it must be above zero."""
 
     default: float
     unit: str
@@ -27,13 +27,17 @@ class ManoeuvreKey:
 
 @dataclass(frozen=True)
 class ManoeuvreKind:
-    """One kind. ``draw(time, values, count)`` gives (count, N), peak one, zero outside 0 to ``length(values)`` s."""
+    """One kind of manoeuvre.
+
+    ``draw(time, values, count)`` gives the inputs (count, N) with a peak of one, zero outside 0 to ``length(values)``
+    s.
+    """
 
     meaning: str
     keys: Mapping[str, ManoeuvreKey]
     length: Callable[[Values], float]
     draw: Callable[[Array, Values, int], Array]
-    apart: bool = False  # whether controls that move at once can be told apart
+    orthogonal: bool = False  # whether the inputs of several controls that move at once are uncorrelated
 
 
 #: Keys of every kind, besides ``amplitude`` (rad; one for all controls of the segment, or one each).
@@ -67,7 +71,7 @@ def _sweep(time: Array, values: Values, count: int) -> Array:
 
 
 def _random(time: Array, values: Values, count: int) -> Array:
-    """Each control its own noise."""
+    """Independent noise for each control."""
     length, low, high, seed = values["length"], values["low"], values["high"], int(values["seed"])
     return np.array([shapes.random(time, length, low, high, seed + i) for i in range(count)])
 
@@ -92,9 +96,9 @@ KINDS: Mapping[str, ManoeuvreKind] = {
         {**_BAND, "seed": ManoeuvreKey(1.0, "", "of the random numbers", positive=False)},
         _length,
         _random,
-        apart=True,
+        orthogonal=True,
     ),
     "multisine": ManoeuvreKind(
-        "orthogonal multisines on all its controls at once", _BAND, _length, _multisine, apart=True
+        "orthogonal multisines on all its controls at once", _BAND, _length, _multisine, orthogonal=True
     ),
 }

@@ -1,9 +1,9 @@
-"""Shape a manoeuvre's amplitudes and timing for the least predicted error, within limits.
+"""The amplitudes and the timing of a manoeuvre with the least predicted errors, within limits.
 
 The cost is Bayesian A-optimal (Mehra, IEEE Trans. Autom. Control 19 (1974); Chaloner & Verdinelli, Statist. Sci. 10
-(1995)): the root mean square of what is left of each derivative's tolerance once the flight is known. Search by COBYQA
-(Ragonneau & Zhang 2022), which needs no derivatives and keeps constraints: where a step begins and ends moves the cost
-in small jumps.
+(1995)): the root mean square, over the derivatives, of the posterior standard deviation divided by the prior one (the
+tolerance). The search is by COBYQA (Ragonneau & Zhang 2022), which needs no derivatives and respects constraints: the
+cost changes in small jumps with the start and the end of a step.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation
 from sysid_node.excite.prediction import Prediction, Predictor, tolerances_of
 from sysid_node.excite.search_space import SearchSpace
-from sysid_node.excite.spec import Segment
+from sysid_node.excite.segment import Segment
 from sysid_node.flight.record import FlightRecord
 
 Array = NDArray[np.float64]
 
-#: Excess where a flight cannot be predicted: far worse than any that can.
-_HOPELESS = 1e6
-#: A derivative counts where the start leaves less than this share of its tolerance.
-_SHOWN = 0.9
+#: Excess of a flight that cannot be predicted: far larger than that of any other.
+_INFEASIBLE = 1e6
+#: A derivative counts where the start reduces its standard deviation to less than this share of its tolerance.
+_OBSERVED = 0.9
 
 
 @dataclass(frozen=True)
 class FlightEnvelope:
-    """How far a flight may stray from trim: angles rad, any angular rate rad/s, airspeed as a share of trim's."""
+    """The largest departures from trim: angles in rad, any angular rate in rad/s, airspeed as a share of trim's."""
 
     alpha: float = 0.10
     beta: float = 0.15
@@ -42,7 +42,7 @@ class FlightEnvelope:
     airspeed: float = 0.25
 
     def excess(self, y: FlightRecord) -> dict[str, float]:
-        """Largest departure over its limit, less one, by limit; not above zero inside."""
+        """The largest departure over its limit, less one, by limit; at most zero inside the envelope."""
         departures = {
             "alpha": y["alpha"] - y["alpha"][0],
             "beta": y["beta"] - y["beta"][0],
@@ -56,18 +56,18 @@ class FlightEnvelope:
 
 @dataclass(frozen=True)
 class Optimum:
-    """What an optimisation found. ``cost_*`` are the share of the tolerances that is left, over ``counted``."""
+    """The outcome. ``cost_*`` are root mean squares of posterior over prior standard deviation, over ``counted``."""
 
     start: Prediction
     best: Prediction
-    counted: tuple[str, ...]  # derivatives that the start shows at all: whose errors are to fall
+    counted: tuple[str, ...]  # derivatives that the start observes at all
     cost_start: float
     cost_best: float
     evaluations: int
 
 
 def posterior_to_prior_ratios(information: FisherInformation, tolerances: Array) -> Array:
-    """Standard error over tolerance (P,) once the flight and the aircraft file are both known: 1, nothing learnt."""
+    """Posterior over prior standard deviation (P,): flight and aircraft file together, over the file; 1: no gain."""
     scaled = tolerances[:, None] * information.matrix * tolerances
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(scaled + np.eye(len(tolerances))))))
 
@@ -97,12 +97,12 @@ def optimise(
     )
     assert search.best is not None
     counted = tuple(name for name, counts in zip(predictor.names, search.counted, strict=True) if counts)
-    cost_start = search.left(start)
+    cost_start = search.posterior_ratio(start)
     return Optimum(start, search.best, counted, cost_start, search.best_cost, search.count)
 
 
 class _Search:
-    """The cost and the constraints as functions of a point in the unit cube, and the best flight so far."""
+    """Cost and constraints as functions of a point in the unit cube, with the best flight so far."""
 
     def __init__(
         self,
@@ -116,15 +116,15 @@ class _Search:
         self.space = SearchSpace(predictor, segments, duration)
         self.envelope, self.progress = envelope, progress
         self._tolerances = tolerances_of(predictor.aircraft)
-        shown = posterior_to_prior_ratios(start.information, self._tolerances) < _SHOWN
-        self.counted = shown if shown.any() else np.ones(len(shown), dtype=bool)
+        observed = posterior_to_prior_ratios(start.information, self._tolerances) < _OBSERVED
+        self.counted = observed if observed.any() else np.ones(len(observed), dtype=bool)
         self.best: Prediction | None = None
         self.best_cost = np.inf
         self.count = 0
-        self._known: dict[bytes, tuple[float, Array]] = {}
+        self._cache: dict[bytes, tuple[float, Array]] = {}
 
-    def left(self, prediction: Prediction) -> float:
-        """Root mean square share of the counted tolerances that this flight leaves."""
+    def posterior_ratio(self, prediction: Prediction) -> float:
+        """The root mean square of posterior over prior standard deviation, over the derivatives that count."""
         return float(
             np.sqrt(np.mean(posterior_to_prior_ratios(prediction.information, self._tolerances)[self.counted] ** 2))
         )
@@ -141,7 +141,7 @@ class _Search:
         raise InputError(f"manoeuvre {spec!r}: leaves the envelope however small its amplitudes; allow a wider one")
 
     def cost(self, point: Array) -> float:
-        """Logarithm of what is left: smoother."""
+        """The logarithm of ``posterior_ratio``, which is smoother."""
         return self._evaluate(point)[0]
 
     def excess(self, point: Array) -> Array:
@@ -149,20 +149,20 @@ class _Search:
         return self._evaluate(point)[1]
 
     def _evaluate(self, point: Array) -> tuple[float, Array]:
-        """Cost and excess; both are asked for at each point, and at some points again, so answers are kept."""
+        """Cost and excess, cached: the optimiser asks for both at each point, and for some points again."""
         key = np.asarray(point).tobytes()
-        if key not in self._known:
-            self._known[key] = self._fly(point)
-        return self._known[key]
+        if key not in self._cache:
+            self._cache[key] = self._fly(point)
+        return self._cache[key]
 
     def _fly(self, point: Array) -> tuple[float, Array]:
         self.count += 1
         predictor = self.space.predictor
         try:
             prediction = predictor.predict(predictor.draw(self.space.decode(point), self.space.duration))
-        except InputError:  # beyond the travel, or diverged: worse than any that can be flown
-            return 0.0, np.full(6, _HOPELESS)
-        cost = self.left(prediction)
+        except InputError:  # beyond the travel, or diverged
+            return 0.0, np.full(6, _INFEASIBLE)
+        cost = self.posterior_ratio(prediction)
         excess = np.array(list(self.envelope.excess(prediction.flight).values()))
         if excess.max() <= 0 and cost < self.best_cost:
             self.best, self.best_cost = prediction, cost

@@ -1,4 +1,7 @@
-"""What a manoeuvre would tell about an aircraft before anyone flies it, from the simulator's own Jacobian."""
+"""The predicted information of a manoeuvre about an aircraft, from the simulator's Jacobian.
+
+Klein & Morelli, "Aircraft System Identification" (2006), sect. 9.2.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
-from sysid_node.excite.spec import Segment, draw_manoeuvre
+from sysid_node.excite.segment import Segment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Flight, Inputs, Simulator
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
@@ -26,23 +29,23 @@ from sysid_node.sim.model.layout import OUTPUTS, Layout, Model
 
 Array = NDArray[np.float64]
 
-#: Outputs that a prediction counts on: all but the heading, which the derivatives hardly move.
+#: Outputs used in a prediction: all but the heading, on which the derivatives have little effect.
 MEASURED = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
 
 #: States of the simulator whose initial values count as unknown: all but position and one part of the attitude, which
 #: a heading that is not measured leaves open.
 _INITIAL = (3, 4, 5, 7, 8, 10, 11, 12)
 
-#: Flights are computed in multiples of so many samples.
+#: Flights are computed in multiples of this number of samples.
 _BLOCK = 1000
 
-#: A derivative that moves no output by so many sigmas when it changes by one is not seen.
+#: Smallest effect on an output, in its sigmas for a unit change, that is not taken for a rounding error.
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """A manoeuvre, the flight that it gives (free of noise; controls as flown, autopilot included), what it tells."""
+    """A manoeuvre, its simulated flight (no noise; controls as flown, autopilot included), and its information."""
 
     manoeuvre: Manoeuvre
     flight: FlightRecord
@@ -50,15 +53,15 @@ class Prediction:
 
 
 def tolerances_of(aircraft: Aircraft) -> Array:
-    """How far each derivative may be off (P,): the file's tolerance, else a tenth of its value, else one."""
+    """The uncertainty of each derivative (P,), 1 sigma: the file's tolerance, else a tenth of its value, else one."""
     return np.array([d.tolerance or 0.1 * abs(d.value) or 1.0 for d in aircraft.derivatives.values()])
 
 
 class Predictor:
     """Predictions for one aircraft from one trim.
 
-    With ``autopilot`` the simulator's attitude hold flies along. What it does to the controls is part of the input
-    then: the estimator is taken to know the controls that were flown, not the plan.
+    With ``autopilot`` the simulator's attitude hold is in the loop. Its deflections are part of the input then: the
+    estimator is assumed to know the controls as flown, not the plan.
     """
 
     def __init__(
@@ -90,7 +93,7 @@ class Predictor:
         return draw_manoeuvre(segments, self.aircraft, self.simulator.rate, duration)
 
     def predict(self, manoeuvre: Manoeuvre) -> Prediction:
-        """Fly it from trim. Raises InputError where a control saturates or the flight diverges."""
+        """The prediction for a manoeuvre from trim. Raises InputError where a control saturates or it diverges."""
         flight = self._fly(self.commands(manoeuvre))
         matrix = fisher(self._slopes(np.asarray(flight.commands)), self._sigma)
         information = FisherInformation(self.names, self.values, eliminate(matrix, len(self.names)))
@@ -104,7 +107,7 @@ class Predictor:
         return FlightRecord(manoeuvre.time, columns, f"{self.aircraft.name} {manoeuvre.spec}")
 
     def commands(self, manoeuvre: Manoeuvre) -> Array:
-        """The manoeuvre upon trim, (N, controls + 1): rad, and thrust in N."""
+        """Trim plus manoeuvre, (N, controls + 1): rad, and thrust in N."""
         still = np.zeros(manoeuvre.time.size)
         thrust = self.full_thrust * manoeuvre.deflections.get(THROTTLE, still)
         commands = np.asarray(self.trim.command + np.column_stack([manoeuvre.surfaces(), thrust]))
@@ -120,7 +123,7 @@ class Predictor:
         return simulator.check(Flight(*(series[: len(commands)] for series in flight)))
 
     def _slopes(self, commands: Array) -> Array:
-        """Slopes (N, m, derivatives + initial states) of what is measured; what only rounding moves is zero."""
+        """Sensitivities (N, m, derivatives + initial states) of the measured outputs; rounding errors become zero."""
         simulator, unknowns = self.simulator, np.zeros(len(self.names) + len(_INITIAL))
         arguments = (simulator.layout, simulator.model, unknowns, self.trim.initial, _padded(commands), simulator.step)
         slopes = np.asarray(slopes_of(*arguments))[: len(commands), self._columns]
@@ -129,7 +132,7 @@ class Predictor:
 
 
 def _padded(commands: Array) -> Array:
-    """The commands with the last held up to a round number of samples: each length is another program to compile."""
+    """The commands, the last one repeated up to a multiple of ``_BLOCK``, so that few programs are compiled."""
     return np.pad(commands, ((0, -len(commands) % _BLOCK), (0, 0)), mode="edge")
 
 

@@ -1,4 +1,4 @@
-"""The numbers of a manoeuvre that may be shaped, as a point in the unit cube."""
+"""The free numbers of a manoeuvre as a point in the unit cube, for the optimiser."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from sysid_node.excite.manoeuvre import THROTTLE, control_limits
 from sysid_node.excite.prediction import Predictor
-from sysid_node.excite.spec import Segment
+from sysid_node.excite.segment import Segment
 
 Array = NDArray[np.float64]
 
-#: Steps last between these (s); amplitudes lie between these shares of the control's travel. Both are searched in
-#: logarithms.
+#: Shortest and longest step (s); smallest and largest amplitude as a share of the control's travel. Both are searched
+#: in logarithms.
 _WIDTHS = (0.1, 2.0)
 _SHARES = (0.01, 0.95)
-#: Trim is flown for so long first (s).
+#: Seconds of trimmed flight before the manoeuvre.
 _LEAD = 1.0
 
 
@@ -33,12 +33,12 @@ class SearchSpace:
 
     @property
     def size(self) -> int:
-        """How many numbers are free."""
+        """The number of free numbers."""
         return sum(len(segment.controls) + 1 + ("width" in segment.values) for segment in self.segments)
 
     @property
     def travel(self) -> dict[str, float]:
-        """How far each control may move from trim either way; half a radian where nothing limits it."""
+        """How far each control may move from trim to either side; half a radian where nothing limits it."""
         trim = dict(zip(self.predictor.simulator.commands, self.predictor.trim.command.tolist(), strict=True))
         room: dict[str, float] = {}
         for name, limit in control_limits(self.predictor.aircraft).items():
@@ -62,7 +62,7 @@ class SearchSpace:
         return np.clip(point, 0.0, 1.0)
 
     def decode(self, point: Array) -> list[Segment]:
-        """The segments of a point, in numbers of four decimals: what is flown is what the spec says."""
+        """The segments of a point. Their numbers have four decimals, so that the spec in text is what is flown."""
         values, travel = iter(np.clip(point, 0.0, 1.0).tolist()), self.travel
         found: list[Segment] = []
         for segment in self.segments:
@@ -80,7 +80,7 @@ class SearchSpace:
         return found
 
     def _room(self, segment: Segment) -> float:
-        """How much later (s) than the lead the segment may begin to end in time."""
+        """The latest start of the segment (s after the lead) with which it still ends in time."""
         return max(self.duration - _span(segment) - _LEAD, 0.0)
 
     def _widths(self, segment: Segment) -> tuple[float, float]:
@@ -93,12 +93,12 @@ class SearchSpace:
 
 
 def _span(segment: Segment) -> float:
-    """Seconds from its first beginning to its last end."""
+    """Seconds from the start of the first repetition to the end of the last."""
     return segment.end - segment.values["start"]
 
 
 def _place(value: float, low: float, high: float) -> float:
-    """Where a value lies between low and high, in logarithms: 0 to 1."""
+    """The position of a value between low and high on a logarithmic scale, 0 to 1."""
     return float(np.log(max(value, low) / low) / np.log(high / low))
 
 
@@ -108,5 +108,5 @@ def _value(place: float, low: float, high: float) -> float:
 
 
 def _round(value: float) -> float:
-    """Towards zero to four decimals, so that what just fits still does; the slack is for rounding errors."""
+    """The value with four decimals, rounded towards zero so that it stays within its limit; up to rounding errors."""
     return math.trunc(value * 1e4 + math.copysign(1e-6, value)) / 1e4

@@ -1,11 +1,11 @@
-"""The text that describes a manoeuvre: ``kind[:control,...][:key=value...]``, several joined by ``+``."""
+"""Manoeuvres from text: ``kind[:control,...][:key=value...]``, several of these joined by ``+``."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,64 +14,18 @@ from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.kinds import COMMON_KEYS, KINDS, ManoeuvreKey
-from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, check_limits, control_limits
+from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, control_limits
+from sysid_node.excite.segment import Segment, draw_manoeuvre
 
 Array = NDArray[np.float64]
 
-#: Seconds of free response after the last segment, where the caller gives no duration.
-TAIL = 3.0
 #: Seconds between controls that are moved in turn.
 PAUSE = 2.0
 #: Share of a control's limit that is its amplitude, where none is given.
 DEFAULT_SHARE = 0.15
 
-_MOST_SAMPLES = 5_000_000
-
 #: A plus sign joins segments where a kind follows it; in a number such as 1e+1 it does not.
 _JOIN = re.compile(rf"\+(?=\s*(?:{'|'.join(KINDS)})\s*(?::|\+|$))")
-
-
-@dataclass(frozen=True)
-class Segment:
-    """One term of a spec: a kind on some controls, with an amplitude each and its other numbers."""
-
-    kind: str
-    controls: tuple[str, ...]
-    amplitude: tuple[float, ...]  # one per control
-    values: Mapping[str, float]  # every key of the kind and of COMMON_KEYS
-
-    @property
-    def length(self) -> float:
-        """Seconds that one flight of it lasts."""
-        return KINDS[self.kind].length(self.values)
-
-    @property
-    def period(self) -> float:
-        """Seconds from one repetition to the next."""
-        return self.values["every"] or self.length + 1.0
-
-    @property
-    def end(self) -> float:
-        """When the last repetition is over, s."""
-        return self.values["start"] + (int(self.values["repeat"]) - 1) * self.period + self.length
-
-    def draw(self, time: Array) -> Array:
-        """Deflections (controls, N) at the times."""
-        total = np.zeros((len(self.controls), time.size))
-        for i in range(int(self.values["repeat"])):
-            local = time - self.values["start"] - i * self.period
-            try:
-                total += KINDS[self.kind].draw(local, self.values, len(self.controls))
-            except InputError as error:
-                raise InputError(f"manoeuvre {self.text()!r}: {error}") from error
-        return np.array(self.amplitude)[:, None] * total
-
-    def text(self) -> str:
-        """The segment as a spec that gives it back."""
-        amplitude = ",".join(f"{value:g}" for value in self.amplitude)
-        known = {**KINDS[self.kind].keys, **COMMON_KEYS}
-        rest = [f"{key}={value:g}" for key, value in self.values.items() if value != known[key].default]
-        return ":".join([self.kind, ",".join(self.controls), f"amplitude={amplitude}", *rest])
 
 
 def parse_manoeuvre(
@@ -85,38 +39,6 @@ def parse_manoeuvre(
     return draw_manoeuvre(parse_segments(spec, aircraft), aircraft, rate, duration)
 
 
-def draw_manoeuvre(
-    segments: Sequence[Segment], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
-) -> Manoeuvre:
-    """Sample segments into a manoeuvre; see ``parse_manoeuvre``."""
-    spec = "+".join(segment.text() for segment in segments)
-    time = _time_base(spec, segments, rate, duration)
-    deflections = {name: np.zeros(time.size) for name in control_limits(aircraft)}
-    for segment in segments:
-        for control, values in zip(segment.controls, segment.draw(time), strict=True):
-            deflections[control] += values
-    manoeuvre = Manoeuvre(time, deflections, spec)
-    check_limits(manoeuvre, aircraft)
-    return manoeuvre
-
-
-def _time_base(spec: str, segments: Sequence[Segment], rate: float, duration: float | None) -> Array:
-    end = max(segment.end for segment in segments)
-    total = end + TAIL if duration is None else duration
-    if total < end - 1e-9:
-        raise InputError(f"manoeuvre {spec!r}: lasts until {end:g} s, but the flight {total:g} s; fly longer")
-    if not 1.0 <= rate <= 10_000.0 or total * rate > _MOST_SAMPLES:
-        raise InputError(
-            f"manoeuvre {spec!r}: {total:g} s at {rate:g} Hz; expected 1 to 10000 Hz, at most {_MOST_SAMPLES} samples"
-        )
-    highest = max(segment.values.get("high", 0.0) for segment in segments)
-    if highest > rate / 2:
-        raise InputError(
-            f"manoeuvre {spec!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice as fast"
-        )
-    return np.asarray(np.arange(round(total * rate) + 1) / rate)
-
-
 def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[Segment, ...]:
     """The segments of a spec or of several, checked. Raises InputError."""
     texts = [spec] if isinstance(spec, str) else list(spec)
@@ -124,20 +46,15 @@ def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[Segme
     return tuple(segment for part in parts for segment in _term(part, aircraft))
 
 
-def moved(segment: Segment, start: float) -> Segment:
-    """The same segment at another time (s)."""
-    return replace(segment, values={**segment.values, "start": start})
-
-
 def _term(text: str, aircraft: Aircraft) -> list[Segment]:
-    """Of one term: without controls it is of all surfaces, in turn where they cannot be told apart otherwise."""
+    """The segments of one term; without controls it moves all surfaces, in turn unless its inputs are orthogonal."""
     kind, _, rest = text.partition(":")
     kind = kind.strip()
     if kind not in KINDS:
         raise _error(text, f"{kind!r} is no kind of manoeuvre; expected one of {', '.join(KINDS)}", kind, KINDS)
     names, _, settings = ("", "", rest) if "=" in rest.partition(":")[0] else rest.partition(":")
     segment = _segment(text, kind, _controls(text, names, aircraft), settings, aircraft)
-    return [segment] if names or KINDS[kind].apart else _in_turn(segment)
+    return [segment] if names or KINDS[kind].orthogonal else _in_turn(segment)
 
 
 def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, aircraft: Aircraft) -> Segment:
@@ -153,7 +70,7 @@ def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, air
 
 
 def _in_turn(segment: Segment) -> list[Segment]:
-    """One control after the other, and all of them before it is repeated."""
+    """A segment for each control, one after the other; all come before the first is repeated."""
     step = segment.length + PAUSE
     every = segment.values["every"] or step * len(segment.controls)
     return [

@@ -16,7 +16,8 @@ from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.errors import InputError
 from sysid_node.excite import exciter
-from sysid_node.excite.exciter import RANGES, ExcitationSettings, FlightCondition
+from sysid_node.excite.exciter import FlightCondition
+from sysid_node.excite.exciter_settings import RANGES, ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts

@@ -8,7 +8,8 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite import exciter
-from sysid_node.excite.exciter import ExcitationSettings, FlightCondition
+from sysid_node.excite.exciter import FlightCondition
+from sysid_node.excite.exciter_settings import ExcitationSettings
 
 AIRCRAFT = load_aircraft("cdrw")
 LEVEL = FlightCondition(0.0, 0.08, 18.0, 1.0)
@@ -82,14 +83,14 @@ def test_it_begins_again_when_told_to_watch_and_has_the_estimates_begun_anew() -
     lost = {**KNOWN, "Cm_de": math.inf}
     exciter.receive_estimates(state, 20.0, lost)
     assert not state.active  # a moment's doubt is none
-    exciter.receive_estimates(state, 20.0 + exciter.AGAIN, lost)
+    exciter.receive_estimates(state, 20.0 + exciter.INVALID_TIME, lost)
     assert state.active
     assert "Cm_de no longer known" in last(state)
     begun = state.begun
     exciter.receive_estimates(state, begun + 0.5, KNOWN)
     assert state.active  # what is known now is of before
-    assert exciter.receive_estimates(state, begun + exciter.CALM, lost)
-    assert not exciter.receive_estimates(state, begun + exciter.CALM + 0.1, lost)
+    assert exciter.receive_estimates(state, begun + exciter.RESET_DELAY, lost)
+    assert not exciter.receive_estimates(state, begun + exciter.RESET_DELAY + 0.1, lost)
     exciter.receive_estimates(state, begun + 5.0, KNOWN)
     assert not state.active
 

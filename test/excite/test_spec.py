@@ -12,8 +12,9 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.kinds import KINDS
 from sysid_node.excite.manoeuvre import control_limits
+from sysid_node.excite.segment import draw_manoeuvre, moved
 from sysid_node.excite.shapes import multistep
-from sysid_node.excite.spec import draw_manoeuvre, moved, parse_manoeuvre, parse_segments
+from sysid_node.excite.spec import parse_manoeuvre, parse_segments
 
 CDRW = load_aircraft("cdrw")
 

@@ -8,7 +8,7 @@ import yaml
 from harness import ROOT
 
 from sysid_node.control.settings import ControllerSettings as Control
-from sysid_node.excite.exciter import ExcitationSettings as Excitation
+from sysid_node.excite.exciter_settings import ExcitationSettings
 from sysid_node.faults.settings import FaultMonitorSettings as Faults
 from sysid_node.parameter import annotated_yaml, check_each
 from sysid_node.ros import adaptive_controller, exciter, fault_monitor, flight_simulator
@@ -39,5 +39,5 @@ def test_every_setting_is_a_parameter_with_the_same_default() -> None:
     assert {field.name for field in fields(Control)} <= values.keys()
     assert Control.from_mapping(values) == Control()
     names = {parameter.name for parameter in exciter.PARAMETERS}
-    assert {field.name for field in fields(Excitation)} <= names
+    assert {field.name for field in fields(ExcitationSettings)} <= names
     assert {field.name for field in fields(Faults)} <= {parameter.name for parameter in fault_monitor.PARAMETERS}

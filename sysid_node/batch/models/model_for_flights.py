@@ -34,17 +34,7 @@ def model_for_flights(
     states = settings.states or _possible_states(aircraft, thrust)
     if not settings.states and "CD" in aircraft.model_structure and not thrust:
         remarks.append("thrust was not measured: the airspeed is taken as measured, and CD is left out")
-    if not states:
-        raise InputError(
-            f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.model_structure)}) make no complete motion; an "
-            "equation-error method estimates each coefficient alone"
-        )
-    unflown = [record.name for record in records if not record.measured("V")]
-    if unflown:
-        raise InputError(
-            f"flight {unflown[0]!r}: its airspeed was never measured, and without it no coefficient makes a force; "
-            "record air_data, or leave the flight out"
-        )
+    _check_modellable(aircraft, records, states)
     needs_thrust = aircraft.throttle is not None and thrust
     first = rigid_body(aircraft, states, (), thrust=needs_thrust)
     modelled = {name.partition("_")[0] for name in first.names}
@@ -56,6 +46,21 @@ def model_for_flights(
     if unmeasured:
         remarks.append(f"{', '.join(unmeasured)} not measured: known through the other outputs alone")
     return model, tuple(remarks)
+
+
+def _check_modellable(aircraft: Aircraft, records: Sequence[FlightRecord], states: Sequence[str]) -> None:
+    """Raises InputError where there are no states to integrate, or no airspeed."""
+    if not states:
+        raise InputError(
+            f"aircraft {aircraft.name}: its derivatives ({', '.join(aircraft.model_structure)}) make no complete "
+            "motion; an equation-error method estimates each coefficient alone"
+        )
+    unmeasured = [record.name for record in records if not record.measured("V")]
+    if unmeasured:
+        raise InputError(
+            f"flight {unmeasured[0]!r}: its airspeed was never measured, and without it no coefficient makes a force; "
+            "record air_data, or leave the flight out"
+        )
 
 
 def require_length(model: StateSpaceModel, aircraft: Aircraft, records: Sequence[FlightRecord]) -> None:

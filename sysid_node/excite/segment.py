@@ -1,0 +1,105 @@
+"""Segments, each one kind of input on some controls, and the manoeuvre that several of them make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.excite.kinds import COMMON_KEYS, KINDS
+from sysid_node.excite.manoeuvre import Manoeuvre, check_limits, control_limits
+
+Array = NDArray[np.float64]
+
+#: Seconds of free response after the last segment, where the caller gives no duration.
+TAIL = 3.0
+
+
+_MOST_SAMPLES = 5_000_000
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One term of a spec: a kind on some controls, with an amplitude each and its other numbers."""
+
+    kind: str
+    controls: tuple[str, ...]
+    amplitude: tuple[float, ...]  # one per control
+    values: Mapping[str, float]  # every key of the kind and of COMMON_KEYS
+
+    @property
+    def length(self) -> float:
+        """Seconds that one flight of it lasts."""
+        return KINDS[self.kind].length(self.values)
+
+    @property
+    def period(self) -> float:
+        """Seconds from one repetition to the next."""
+        return self.values["every"] or self.length + 1.0
+
+    @property
+    def end(self) -> float:
+        """The end of the last repetition, s."""
+        return self.values["start"] + (int(self.values["repeat"]) - 1) * self.period + self.length
+
+    def draw(self, time: Array) -> Array:
+        """Deflections (controls, N) at the times."""
+        total = np.zeros((len(self.controls), time.size))
+        for i in range(int(self.values["repeat"])):
+            local = time - self.values["start"] - i * self.period
+            try:
+                total += KINDS[self.kind].draw(local, self.values, len(self.controls))
+            except InputError as error:
+                raise InputError(f"manoeuvre {self.text()!r}: {error}") from error
+        return np.array(self.amplitude)[:, None] * total
+
+    def text(self) -> str:
+        """The spec of the segment, from which ``parse_segments`` makes it again."""
+        amplitude = ",".join(f"{value:g}" for value in self.amplitude)
+        known = {**KINDS[self.kind].keys, **COMMON_KEYS}
+        rest = [f"{key}={value:g}" for key, value in self.values.items() if value != known[key].default]
+        return ":".join([self.kind, ",".join(self.controls), f"amplitude={amplitude}", *rest])
+
+
+def moved(segment: Segment, start: float) -> Segment:
+    """The same segment at another time (s)."""
+    return replace(segment, values={**segment.values, "start": start})
+
+
+def draw_manoeuvre(
+    segments: Sequence[Segment], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
+) -> Manoeuvre:
+    """The segments as one manoeuvre, sampled at ``rate`` (Hz) for ``duration`` (s); see ``parse_manoeuvre``.
+
+    Raises InputError where the flight is too short for them, or a deflection passes its control's limit.
+    """
+    spec = "+".join(segment.text() for segment in segments)
+    time = _time_base(spec, segments, rate, duration)
+    deflections = {name: np.zeros(time.size) for name in control_limits(aircraft)}
+    for segment in segments:
+        for control, values in zip(segment.controls, segment.draw(time), strict=True):
+            deflections[control] += values
+    manoeuvre = Manoeuvre(time, deflections, spec)
+    check_limits(manoeuvre, aircraft)
+    return manoeuvre
+
+
+def _time_base(spec: str, segments: Sequence[Segment], rate: float, duration: float | None) -> Array:
+    end = max(segment.end for segment in segments)
+    total = end + TAIL if duration is None else duration
+    if total < end - 1e-9:
+        raise InputError(f"manoeuvre {spec!r}: lasts until {end:g} s, but the flight {total:g} s; fly longer")
+    if not 1.0 <= rate <= 10_000.0 or total * rate > _MOST_SAMPLES:
+        raise InputError(
+            f"manoeuvre {spec!r}: {total:g} s at {rate:g} Hz; expected 1 to 10000 Hz, at most {_MOST_SAMPLES} samples"
+        )
+    highest = max(segment.values.get("high", 0.0) for segment in segments)
+    if highest > rate / 2:
+        raise InputError(
+            f"manoeuvre {spec!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice as fast"
+        )
+    return np.asarray(np.arange(round(total * rate) + 1) / rate)
