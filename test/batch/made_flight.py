@@ -76,3 +76,15 @@ def flight(seed: int, scale: float = 1.0, **kwargs: float) -> FlightRecord:
 def scores(estimates) -> np.ndarray:  # type: ignore[no-untyped-def]
     """Errors in standard errors."""
     return np.array([(e.value - TRUTH[name]) / e.standard_error for name, e in estimates.items() if name in TRUTH])
+
+
+#: Derivatives that 3-2-1-1s on all surfaces determine well.
+WATCHED = ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
+
+#: Largest error of unfiltered equation error: differentiation smears the kinks that stepped inputs leave in the rates.
+KINKS = 0.08
+
+
+def largest_error(fit) -> float:  # type: ignore[no-untyped-def]
+    """The largest error of the watched derivatives, as a share of the truth."""
+    return max(abs(fit.values[name] / TRUTH[name] - 1.0) for name in WATCHED)

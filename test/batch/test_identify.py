@@ -7,8 +7,6 @@ import pytest
 from made_flight import KESTREL, TRUTH, clean, flight, scores
 
 from sysid_node.batch.identify import METHODS, identify
-from sysid_node.batch.models.manoeuvres import cut_into_segments
-from sysid_node.batch.models.model_for_flights import model_for_flights
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
@@ -59,22 +57,6 @@ def test_output_error_is_the_sharpest_on_still_air():
     assert errors["output_error"] < 0.5 * errors["equation_error"]
 
 
-def test_the_model_follows_what_was_measured():
-    record = clean()
-    model, remarks = model_for_flights(KESTREL, [record], BatchSettings())
-    assert model.states == ("V", "alpha", "beta", "p", "q", "r", "phi", "theta")
-    assert not remarks
-    gliding, remarks = model_for_flights(KESTREL, [without(record, "thrust")], BatchSettings())
-    assert "V" not in gliding.states
-    assert "V" in gliding.inputs
-    assert not any(name.startswith("CD") for name in gliding.names)
-    assert "thrust was not measured" in remarks[0]
-    blind, remarks = model_for_flights(KESTREL, [without(record, "beta")], BatchSettings())
-    assert "beta" in blind.states
-    assert "beta" not in blind.outputs
-    assert "beta not measured: known through the other outputs alone" in remarks
-
-
 def test_a_flight_without_a_sideslip_vane_can_still_be_integrated():
     found = identify("output_error", KESTREL, [without(flight(1), "beta")], QUICK)
     assert any("started from the aircraft file's values" in remark for remark in found.fit.remarks)
@@ -95,18 +77,6 @@ def test_stepwise_and_sensor_correction_are_told():
     assert any(remark.startswith("stepwise regression left out") for remark in found.fit.remarks)
     assert any("sensor" in remark for remark in found.fit.remarks)
     assert set(found.selections) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
-
-
-def test_pieces_cover_the_flight():
-    record = clean()
-    pieces = cut_into_segments(record, 5.0)
-    assert len(pieces) == 3
-    assert sum(map(len, pieces)) == len(record)
-    assert max(piece.duration for piece in pieces) <= 5.0
-    assert pieces[1].name == "kestrel +1 [2/3]"
-    assert cut_into_segments(record, 0.0) == [record]
-    with pytest.raises(InputError, match=r"cannot be cut into segments of 0\.01 s"):
-        cut_into_segments(record, 0.01)
 
 
 def test_flights_of_one_name_are_kept_apart():

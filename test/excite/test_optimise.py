@@ -10,7 +10,6 @@ from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation
 from sysid_node.excite.optimise import FlightEnvelope, optimise, posterior_to_prior_ratios
 from sysid_node.excite.prediction import Predictor, tolerances_of
-from sysid_node.excite.search_space import SearchSpace
 from sysid_node.excite.spec import parse_manoeuvre, parse_segments
 
 CDRW = load_aircraft("cdrw")
@@ -68,19 +67,6 @@ def test_a_narrower_envelope_costs(predictor, optimum):
     other = optimise(predictor, parse_segments(START, CDRW), DURATION, narrow, evaluations=40)
     assert max(narrow.excess(other.best.flight).values()) <= 0
     assert other.cost_best > optimum.cost_best
-
-
-def test_points_and_segments_are_each_others_image(predictor):
-    segments = parse_segments(
-        ("3211:elevator,rudder:amplitude=0.05,-0.1:start=2.5", "sweep:throttle:amplitude=0.05:length=4:start=3"), CDRW
-    )
-    space = SearchSpace(predictor, segments, 12.0)
-    point = space.encode(segments)
-    assert point.shape == (space.size,)
-    assert np.all((point > 0) & (point < 1))
-    assert tuple(space.decode(point)) == segments
-    for corner in (np.zeros(space.size), np.ones(space.size)):
-        predictor.commands(predictor.draw(space.decode(corner), 12.0))  # within travel and time, or it would raise
 
 
 def test_an_impossible_envelope_is_an_error(predictor):

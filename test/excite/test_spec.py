@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.kinds import KINDS
-from sysid_node.excite.manoeuvre import control_limits
-from sysid_node.excite.segment import draw_manoeuvre, moved
 from sysid_node.excite.shapes import multistep
 from sysid_node.excite.spec import parse_manoeuvre, parse_segments
 
@@ -41,39 +39,11 @@ def test_segments_add_up_joined_or_given_one_by_one():
         assert np.allclose(joined.deflections[name], sum(one.deflections[name] for one in alone))
 
 
-def test_repeats():
-    manoeuvre = parse_manoeuvre("doublet:aileron:amplitude=0.1:width=0.5:start=1:repeat=3:every=4", CDRW)
-    rises = np.flatnonzero(np.diff(manoeuvre.deflections["aileron"]) > 0.15 - 1e-9)
-    starts = np.flatnonzero((manoeuvre.deflections["aileron"][1:] > 0) & (manoeuvre.deflections["aileron"][:-1] == 0))
-    assert rises.size == 0
-    assert np.allclose(manoeuvre.time[starts + 1], [1, 5, 9])
-    unsaid = parse_manoeuvre("doublet:aileron:amplitude=0.1:width=0.5:start=1:repeat=3", CDRW)
-    assert unsaid.duration == pytest.approx(1 + 2 * 2 + 1 + 3)  # one second after each end
-
-
 def test_an_amplitude_each():
     manoeuvre = parse_manoeuvre("multisine:elevator,aileron,rudder:amplitude=0.05,0.04,0.03", CDRW)
     peaks = np.abs(manoeuvre.surfaces()).max(axis=0)
     assert np.all(peaks <= [0.05, 0.04, 0.03])
     assert np.allclose(peaks, [0.05, 0.04, 0.03], rtol=0.01)
-
-
-def test_duration_pads():
-    manoeuvre = parse_manoeuvre("doublet:elevator:amplitude=0.1", CDRW, rate=50.0, duration=60.0)
-    assert manoeuvre.duration == 60.0
-    assert manoeuvre.time.size == 3001
-
-
-def test_limits_are_the_aircrafts():
-    assert control_limits(CDRW) == {"elevator": 0.35, "aileron": 0.35, "rudder": 0.35, "throttle": 1.0}
-    parse_manoeuvre("pulse:elevator:amplitude=0.35", CDRW)
-    with pytest.raises(InputError, match=r"elevator moves 0.36 from trim at 1.00 s, but cdrw's limit is 0.35"):
-        parse_manoeuvre("pulse:elevator:amplitude=0.36", CDRW)
-    with pytest.raises(InputError, match=r"elevator moves 0.4 from trim"):
-        parse_manoeuvre("pulse:elevator:amplitude=0.2+doublet:elevator:amplitude=0.2", CDRW)
-    without = replace(CDRW, throttle=None)
-    with pytest.raises(InputError, match="no control 'throttle'"):
-        parse_manoeuvre("pulse:throttle:amplitude=0.1", without)
 
 
 MISTAKES = [
@@ -134,20 +104,6 @@ def test_kinds_that_keep_controls_apart_move_all_surfaces_at_once(spec):
 
 def test_terms_without_controls_are_joined():
     assert len(parse_segments("3211 + multisine+doublet:rudder", CDRW)) == 5
-
-
-def test_too_short_a_flight():
-    with pytest.raises(InputError, match=r"lasts until 2 s, but the flight 1.5 s"):
-        parse_manoeuvre("doublet:elevator:amplitude=0.1", CDRW, duration=1.5)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_text_gives_the_segment_back(kind):
-    (segment,) = parse_segments(f"{kind}:elevator,rudder:amplitude=0.1,0.05:start=2.5:repeat=2", CDRW)
-    assert parse_segments(segment.text(), CDRW) == (segment,)
-    later = moved(segment, 7.25)
-    assert later.values["start"] == 7.25
-    assert draw_manoeuvre([later], CDRW).spec == later.text()
 
 
 @given(st.text(alphabet="3211doubletsweepelevator:,=+.-0123456789amplitudestart ", max_size=60))

@@ -1,20 +1,18 @@
-"""Both equation-error methods, and the coefficients they stand on."""
+"""Equation error in the time domain against SIDPAC, and what both equation-error methods have in common."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 from made_flight import KESTREL, TRUTH, clean, flight, scores
-from reference_flights import TWIN_OTTER_EQUATION_ERROR, TWIN_OTTER_FREQUENCY, twin_otter
+from reference_flights import TWIN_OTTER_EQUATION_ERROR, twin_otter
 
 from sysid_node.batch.methods.equation_error import equation_error
-from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error, regress_in_band
+from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error
 from sysid_node.batch.regression.linear_regression import regress
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
-
-BAND = (0.1, 0.04, 1.5)
 
 
 @pytest.fixture(scope="module")
@@ -36,25 +34,6 @@ def test_time_domain_figures_are_sidpacs(otter, coefficient):
         assert fit.estimates[name].standard_error == pytest.approx(error, rel=0.3), name
 
 
-@pytest.mark.parametrize("coefficient", ["CZ", "Cm"])
-def test_frequency_domain_figures_are_sidpacs(otter, coefficient):
-    found, X = otter
-    fit = regress_in_band(["alpha", "q", "de"], [found.time], [found.coefficients[coefficient]], [X[:, :3]], BAND)
-    for name, (value, error) in TWIN_OTTER_FREQUENCY[coefficient].items():
-        assert abs(fit.estimates[name].value - value) < error, name
-
-
-def test_errors_do_not_depend_on_how_dense_the_frequencies_are(otter):
-    found, X = otter
-    coarse, dense = (
-        regress_in_band(["alpha", "q", "de"], [found.time], [found.coefficients["Cm"]], [X[:, :3]], (0.1, step, 1.5))
-        for step in (0.04, 0.005)
-    )
-    for name in ("alpha", "q", "de"):
-        ratio = dense.estimates[name].standard_error / coarse.estimates[name].standard_error
-        assert ratio == pytest.approx(1.0, abs=0.05), name
-
-
 @pytest.mark.parametrize("method", [equation_error, frequency_equation_error])
 def test_clean_flights_give_the_truth(method):
     fit = method(KESTREL, [clean()])
@@ -72,12 +51,6 @@ def test_noisy_flights_are_within_their_intervals(method):
     assert {"CL", "CD", "CY", "Cl", "Cm", "Cn"} == set(fit.responses[0].names)
 
 
-def test_forces_and_air_data_are_moved_to_the_cg():
-    moved = measured_coefficients(KESTREL, clean()).coefficients["CL"]
-    ignored = dataclasses.replace(KESTREL, sensors=type(KESTREL.sensors)())
-    assert np.abs(measured_coefficients(ignored, clean()).coefficients["CL"] - moved).max() > 0.02
-
-
 def test_gaps_are_left_out_and_counted():
     record = flight(3)
     alpha = record["alpha"].copy()
@@ -85,16 +58,6 @@ def test_gaps_are_left_out_and_counted():
     fit = equation_error(KESTREL, [dataclasses.replace(record, columns={**record.columns, "alpha": alpha})])
     assert any("30 of 1200 samples lack a value" in remark for remark in fit.remarks)
     assert np.isfinite(list(fit.values.values())).all()
-
-
-def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
-    record = flight(5)
-    parked = {**record.columns, "V": np.where(record.time < 2.0, 0.1, record["V"])}
-    found = measured_coefficients(KESTREL, FlightRecord(record.time, parked, "taxi"))
-    assert found.left_out == np.count_nonzero(record.time < 2.0)
-    assert any("slower than" in remark for remark in found.remarks)
-    with pytest.raises(InputError, match=r"only 0 of \d+ samples .* in which the aircraft flies"):
-        measured_coefficients(KESTREL, FlightRecord(record.time, {**record.columns, "V": 0.0 * record["V"]}, "parked"))
 
 
 def test_a_signal_never_measured_is_named():
@@ -127,19 +90,6 @@ def test_a_still_control_is_not_excited():
     assert fit.estimates["Cn_dr"].status == "not excited"
     assert not fit.estimates["Cn_dr"].valid
     assert fit.estimates["Cm_de"].valid
-
-
-@pytest.mark.parametrize(
-    ("frequencies", "said"),
-    [
-        ((2.0, 0.1, 1.0), "expected 0 < start < stop"),
-        ((0.1, 0.1, 60.0), "sampled at 100 Hz shows only up to 50 Hz"),
-        ((0.5, 0.01, 0.6), "holds 2 independent values in these flights, too few for 3 regressors"),
-    ],
-)
-def test_impossible_bands_are_refused(frequencies, said):
-    with pytest.raises(InputError, match=said):
-        frequency_equation_error(KESTREL, [clean()], frequencies)
 
 
 @pytest.mark.parametrize("method", [equation_error, frequency_equation_error])
