@@ -1,4 +1,4 @@
-"""``sysid convert``: a log, or a bag of an autopilot's topics, as a bag on those that the identifier listens to."""
+"""``sysid convert``: turns a log, or a bag of an autopilot's own topics, into a bag of the identifier's topics."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Converts the log."""
+    """Converts the log and prints what was written."""
     streams = _recorded(args) if args.autopilot else _logged(args)
     write_streams(args.out, streams, args.storage, args.body_frame)
     if not args.quiet:

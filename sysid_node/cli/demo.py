@@ -1,4 +1,4 @@
-"""``sysid demo``: a recorded flight on real topics, identified live in another process, watched in the terminal."""
+"""``sysid demo``: plays a recorded flight on ROS topics, identifies it live, and shows the estimates."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 PUBLISH_RATE = 10.0  # Hz
 AFTERWARDS = 0.2  # s to listen after the flight's end, before its estimates are called stale
-DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics says how it went in all
-#: A played bag comes faster than a flight does; nothing of it may be lost to a busy processor.
+DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics sends its last totals
+#: A bag may be played faster than it was flown; no message may be lost on a busy computer.
 RELIABLE = [
     f"qos_overrides./{topic}.subscription.{policy}"
     for topic in INPUT_TOPICS
@@ -46,7 +46,7 @@ RELIABLE = [
 
 @dataclass(frozen=True)
 class DemoFlight:
-    """What is played, and what is believed and true of the aircraft."""
+    """The flight that is played, its aircraft, and the true derivatives."""
 
     bag: Path
     aircraft: Aircraft
@@ -78,7 +78,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Plays, identifies, watches; then writes the report and says how it went."""
+    """Plays and identifies the flight, then writes the report and prints a summary."""
     if not args.rate > 0.0:
         raise InputError(f"--rate {args.rate:g}: expected a number over zero")
     flight = _read(args.bag, load_aircraft(args.aircraft))
@@ -111,9 +111,9 @@ def _read(bag: Path, aircraft: Aircraft) -> DemoFlight:
 
 
 def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Follower, list[Estimates]]:
-    """Run player and identifier in processes of their own, and show what comes until the flight is over.
+    """The follower of the flight and the estimates over time; player and identifier run as processes.
 
-    Returns who listened, and the estimates over time.
+    The live table is shown until the flight is over.
     """
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
 
@@ -140,7 +140,7 @@ def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Fol
 def _watch(
     flight: DemoFlight, follower: Follower, identifying: subprocess.Popen[bytes], playing: subprocess.Popen[bytes]
 ) -> None:
-    """Show the live table until the flight is over, or one of the nodes is."""
+    """Show the live table until the flight is over or a node ends."""
     console = Console()
     with Live(console=console, auto_refresh=False) as live:
         while playing.poll() is None and identifying.poll() is None:
@@ -164,20 +164,20 @@ def _picture(flight: DemoFlight, follower: Follower, width: int, height: int | N
 
 
 def _rejected(follower: Follower) -> dict[str, int]:
-    """Messages that the identifier left out, as it last said on /diagnostics."""
+    """Messages that the identifier rejected, as it last reported on /diagnostics."""
     values = follower.words["input"].values if "input" in follower.words else ()
     prefix = "rejected, "
     return {pair.key.removeprefix(prefix): int(pair.value) for pair in values if pair.key.startswith(prefix)}
 
 
 def _lost(flight: DemoFlight, follower: Follower) -> int:
-    """Messages that the player sent and the identifier did not receive."""
+    """The number of messages that the player sent and the identifier did not receive."""
     sent = sum(len(stream.arrival) for stream in flight.streams.by_topic.values())
     return sent - sum(int(follower.word("input", f"{topic}: received") or 0) for topic in INPUT_TOPICS)
 
 
 def _summary(flight: DemoFlight, final: Estimates, out: Path) -> str:
-    """How it went, in three lines."""
+    """Three lines: valid derivatives, intervals that contain the reference, and the report."""
     valid = [d for d in final.derivatives.values() if d.valid]
     expected = flight.reference.values
     inside = sum(d.lower <= expected[d.name] <= d.upper for d in valid)

@@ -1,4 +1,4 @@
-"""``sysid excite``: draw a manoeuvre, say what it would tell about an aircraft, and shape it to tell more."""
+"""``sysid excite``: designs a manoeuvre, predicts the standard errors that it allows, and optimises it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
-    parser = commands.add_parser("excite", help="design a manoeuvre and tell what it would show", description=__doc__)
+    parser = commands.add_parser("excite", help="design a manoeuvre and predict its accuracy", description=__doc__)
     add = parser.add_argument
     add("--aircraft", required=True, metavar="FILE|NAME", help="aircraft file, or name as in cdrw")
     add(
@@ -36,7 +36,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre)")
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
     add("--open-loop", action="store_true", help="without the autopilot that holds attitude and airspeed")
-    add("--optimise", action="store_true", help="shape amplitudes and timing for the least predicted error")
+    add("--optimise", action="store_true", help="optimise amplitudes and timing for the smallest predicted errors")
     add("--evaluations", type=int, default=200, help="trials of the optimiser (default: 200)")
     add("--envelope", action="append", default=[], metavar="NAME=VALUE", help="limit of a departure from trim")
     add("--quiet", action="store_true", help="print nothing")
@@ -44,7 +44,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Predicts, optimises where asked to, and writes."""
+    """Predicts, optimises with ``--optimise``, and writes the results."""
     from sysid_node.report.files.manoeuvre_folder import write_manoeuvre  # noqa: PLC0415  # JAX takes its time
 
     result = design(args)
@@ -90,7 +90,7 @@ def _optimised(
 
 
 def parse_envelope(texts: Iterable[str]) -> FlightEnvelope:
-    """Limits from ``name=value`` texts, the rest as they are by default. Raises InputError."""
+    """The envelope from ``name=value`` texts; other limits have their defaults. Raises InputError."""
     from sysid_node.excite.optimise import FlightEnvelope  # noqa: PLC0415
 
     known = tuple(FlightEnvelope.__dataclass_fields__)

@@ -27,13 +27,19 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("--aircraft", help="file or name (default: the one that the estimate names)")
     parser.add_argument("--format", choices=FORMATS, required=True, help="whose model")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME:KEY=VALUE", help="where it can be told")
-    parser.add_argument("--quiet", action="store_true", help="say nothing")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:KEY=VALUE",
+        help="an effect to include, where the format can express it",
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
     return parser
 
 
 def run(args: argparse.Namespace) -> None:
-    """Reads the estimate, writes the model."""
+    """Reads the estimate and writes the model."""
     summary = _summary(args.estimate)
     aircraft = load_aircraft(args.aircraft or (summary["aircraft"] if summary else args.estimate))
     left: list[str] = []

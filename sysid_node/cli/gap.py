@@ -30,7 +30,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Diagnoses and writes."""
+    """Diagnoses the flights and writes the results."""
     from sysid_node.api.gap_diagnosis import diagnose  # noqa: PLC0415  # JAX takes its time
 
     flights, holdout = (

@@ -1,4 +1,4 @@
-"""``sysid identify``: bags or logs through a batch method to summary.json, tables and report.html."""
+"""``sysid identify``: identifies an aircraft from whole flights by a batch method."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Identifies from bags."""
+    """Identifies from the flights and writes the results."""
     flights, holdout = (
         [load(path, args.aircraft, topics=args.topic, body_frame=args.body_frame) for path in paths]
         for paths in (args.bag, args.holdout)

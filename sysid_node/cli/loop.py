@@ -1,4 +1,4 @@
-"""``sysid loop``: an aircraft in closed loop over DDS: it fails, is identified anew, and flies on adapted gains.
+"""``sysid loop``: an aircraft in closed loop over DDS; a control fails, the model is identified again, the gains adapt.
 
 Simulator, identifier, exciter and controller run in processes of their own, this one watches. At 30 s something fails.
 """
@@ -26,7 +26,8 @@ from sysid_node.cli.live.processes import node_process
 from sysid_node.cli.live.ros_domain import make_folder, own_domain
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
-from sysid_node.report.pages.closed_loop_page import ClosedLoopFlight, Event, write_loop
+from sysid_node.report.pages.closed_loop_page import write_loop
+from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 
 if TYPE_CHECKING:
     from sysid_node.ros.support.loop_watch import LoopWatch
@@ -34,8 +35,12 @@ if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 ACTUATORS = "actuator_lag:time_constant=0.05"
-ONSET, EXCITE_AT, SETTLED = 30.0, 3.0, 10.0  # s: failure, first excitation, and after the failure
-PAUSE = 3.0  # s from an abort of the excitation until it is asked for again
+ONSET, EXCITE_AT, SETTLED = (
+    30.0,
+    3.0,
+    10.0,
+)  # s: failure; first excitation; time after the failure until its effects are judged
+PAUSE = 3.0  # s from an abort of the excitation until it is requested again
 START_UP = 60.0  # s in which the first command must come
 WATCHED = ("Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
 NODES: Mapping[str, tuple[str, ...]] = {
@@ -49,11 +54,11 @@ NODES: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class LoopScenario:
-    """What is flown."""
+    """The flight to simulate, and how it is controlled and identified."""
 
     aircraft: Aircraft
-    name: str  # or file, as the nodes are told
-    fail: str  # the effect that sets in
+    name: str  # name or file of the aircraft, as the nodes receive it
+    fail: str  # the effect that begins at ONSET; "" = none
     seconds: float
     adapt: bool
     turbulence: str
@@ -76,7 +81,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Flies, watches, writes the report and says how it went."""
+    """Flies, shows the flight, writes the report and prints a summary."""
     if not 5.0 <= args.seconds <= 36000.0:
         raise InputError(f"--seconds {args.seconds:g}: expected 5 to 36000")
     aircraft = load_aircraft(args.aircraft)
@@ -107,10 +112,10 @@ def _fly(plan: LoopScenario) -> ClosedLoopFlight:
         rclpy.try_shutdown()
     times = [time for time, _ in watch.tracking]
     errors = {axis: [row[f"{axis} error"] for _, row in watch.tracking] for axis in ("pitch", "roll", "sideslip")}
-    asked = {axis: [row[axis] for _, row in watch.tracking] for axis in ("pitch", "roll")}
+    commanded = {axis: [row[axis] for _, row in watch.tracking] for axis in ("pitch", "roll")}
     estimates = dict(watch.estimates.derivatives) if watch.estimates else {}
     return ClosedLoopFlight(
-        plan.aircraft.name, plan.fail, ONSET, plan.adapt, times, errors, asked, estimates, events, watch.troubles()
+        plan.aircraft.name, plan.fail, ONSET, plan.adapt, times, errors, commanded, estimates, events, watch.troubles()
     )
 
 
@@ -127,7 +132,7 @@ def _effects(plan: LoopScenario, failed: bool) -> str:
 
 
 def _arguments(plan: LoopScenario, name: str) -> list[str]:
-    """What a node is started with."""
+    """The command-line arguments of a node."""
     own = [f"aircraft:={plan.name}", *NODES[name]]
     if name == "flight_simulator":
         own.append(f"turbulence:={plan.turbulence}")
@@ -139,7 +144,7 @@ def _arguments(plan: LoopScenario, name: str) -> list[str]:
 
 
 def _watch(plan: LoopScenario, watch: LoopWatch, processes: Sequence[subprocess.Popen[bytes]]) -> list[Event]:
-    """Ask for set-points, begin excitation, let something fail, show it all; returns what happened when."""
+    """The events of the flight: sends set-points, starts excitation and the failure, and shows the live table."""
     console = Console()
     events: list[Event] = []
     news: dict[str, str] = {}
@@ -181,7 +186,7 @@ def set_points(time: float) -> dict[str, float]:
 
 
 def _picture(plan: LoopScenario, watch: LoopWatch) -> RenderableType:
-    """What the terminal shows."""
+    """The live table with the flight's state and tracking errors."""
     table = Table(box=None, padding=(0, 1), header_style="bold")
     for heading in ("derivative", "file", "estimate", "95 % interval", "status"):
         table.add_column(heading, justify="left" if heading in ("derivative", "status") else "right")
@@ -210,7 +215,7 @@ def _rms(rows: Sequence[tuple[float, Mapping[str, float]]], axis: str) -> float:
 
 
 def _summary(plan: LoopScenario, episode: ClosedLoopFlight) -> str:
-    """How it went, in three lines."""
+    """Tracking errors before and after the failure, and the faults found; writes summary.json, too."""
     (plan.out / "summary.json").write_text(json.dumps(episode.summary(), indent=2) + "\n", encoding="utf-8")
     lines = [f"{'adaptive' if plan.adapt else 'fixed'} gains; tracking error (pitch, roll), rms:"]
     for name, start, stop in episode.spans(SETTLED):

@@ -1,4 +1,4 @@
-"""``sysid``: finds the command, runs it, and turns what goes wrong into one line and an exit code.
+"""``sysid``: finds the command, runs it, and turns an error into one line and an exit code.
 
 A command is the module of its name beside this one. It has ``add_parser(commands)``, which adds its parser to
 argparse's ``commands`` and returns it, and ``run(args)``. Only the module of the command that is run is imported.
@@ -21,7 +21,7 @@ COMMANDS = {
     "replay": "identify an aircraft from a bag, as the live node does",
     "identify": "identify an aircraft from bags with a batch method",
     "simulate": "fly a simulated aircraft into a bag",
-    "excite": "design a manoeuvre and tell what it would show",
+    "excite": "design a manoeuvre and predict its accuracy",
     "gap": "find why the simulator does not fly like the aircraft",
     "convert": "turn a flight log into a bag",
     "export": "write an estimate as another simulator's model",
@@ -37,7 +37,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Says what is wrong and where help is, and exits with 2."""
+        """Print what is wrong and how to get help, and exit with code 2."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

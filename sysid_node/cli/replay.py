@@ -1,4 +1,4 @@
-"""``sysid replay``: identifies an aircraft from a bag with the live node's functions, message for message."""
+"""``sysid replay``: identifies an aircraft from a bag with the functions of the live node, message for message."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Replays a bag."""
+    """Replays the bag and writes the results."""
     flight = load(args.bag, args.aircraft, topics=args.topic, body_frame=args.body_frame)
     settings = options.settings_of(args.set, args.frequencies, "window=20")
     with progress_bar(f"replay {args.bag.name}", quiet=args.quiet) as progress:

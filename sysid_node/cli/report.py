@@ -1,4 +1,4 @@
-"""``sysid report``: report.html drawn again from the files of a run."""
+"""``sysid report``: writes report.html again from the files of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``sysid simulate``: fly a simulated aircraft into a bag, and write the truth beside it."""
+"""``sysid simulate``: records a simulated flight as a bag, and writes the truth beside it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 #: Rate of the integration, Hz; raised to the IMU's where that is higher.
 _RATE = 200.0
-#: Failures that take a surface's effect away, the second one by what is commanded.
+#: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.
 LOSSES = ("control_effectiveness_loss", "stuck_surface")
 
 
@@ -38,7 +38,13 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--aircraft", required=True, help="file or name")
     add("--manoeuvre", action="append", default=[], metavar="SPEC", help="e.g. 3211, or 3211:elevator:amplitude=0.05")
-    add("--effect", action="append", default=[], metavar="NAME:KEY=VALUE", help="by which the aircraft differs")
+    add(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:KEY=VALUE",
+        help="an effect of the aircraft flown",
+    )
     add("--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist")
     add("--seed", type=int, default=0, help="of turbulence, noise and jitter (default: 0)")
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre; 60 s without one)")
@@ -52,15 +58,15 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--rate", type=float, default=200.0, help="of the IMU, Hz (default: 200)")
     add("--air-data-rate", type=float, default=100.0, help="Hz (default: 100)")
     add("--actuator-rate", type=float, default=100.0, help="Hz (default: 100)")
-    add("--surfaces", choices=["commanded", "measured"], default="commanded", help="what is recorded of them")
+    add("--surfaces", choices=["commanded", "measured"], default="commanded", help="which deflections are recorded")
     add("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
     add("--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu, REP-103)")
-    add("--quiet", action="store_true", help="say nothing")
+    add("--quiet", action="store_true", help="print nothing")
     return parser
 
 
 def run(args: argparse.Namespace) -> None:
-    """Flies, writes the bag, then the truth."""
+    """Flies, then writes the bag and the truth."""
     from sysid_node.sim.flying.recording import Recorder  # noqa: PLC0415  # JAX takes its time
     from sysid_node.sim.flying.sortie import Conditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
@@ -110,7 +116,7 @@ def _thrust(simulator: Simulator, manoeuvre: Manoeuvre) -> NDArray[np.float64]:
 
 
 def _truth(args: argparse.Namespace, sortie: Sortie) -> dict[str, Any]:
-    """What was flown, apart from the bag."""
+    """The content of ``BAG.truth.json``: derivatives, effects, trim and the command."""
     derivatives, changes = _derivatives(args.surfaces, sortie)
     return {
         "aircraft": sortie.simulator.aircraft.name,
@@ -152,7 +158,7 @@ def _derivatives(surfaces: str, sortie: Sortie) -> tuple[dict[str, float], list[
 
 
 def _left(sortie: Sortie, effect: str, derivatives: Mapping[str, float]) -> dict[str, float]:
-    """What a failure leaves of the derivatives that it touches."""
+    """The derivatives that a failure changes, as they are after it."""
     lost = sortie.effects[effect]
     share = {c.symbol: 1.0 - lost[n] for n, c in sortie.simulator.aircraft.controls.items() if lost.get(n)}
     of = {name: name.partition("_")[2] for name in derivatives}
@@ -160,7 +166,7 @@ def _left(sortie: Sortie, effect: str, derivatives: Mapping[str, float]) -> dict
 
 
 def _command(args: argparse.Namespace) -> str:
-    """The command that flies this again, defaults spelled out; the bag by its name only."""
+    """The command that repeats this flight, with all defaults; the bag is named without its folder."""
     words = ["sysid", "simulate"]
     for name, value in {**vars(args), "out": args.out.name}.items():
         option = f"--{name.replace('_', '-')}"
@@ -175,7 +181,7 @@ def _command(args: argparse.Namespace) -> str:
 
 
 def _summary(bag: Path, sortie: Sortie, streams: Streams) -> str:
-    """What was written, in one line."""
+    """One line: the bag, its duration, its messages and the range of the angle of attack."""
     outputs = np.asarray(sortie.flight.outputs)
     alpha = np.rad2deg(outputs[:, sortie.simulator.outputs.index("alpha")])
     counts = ", ".join(f"{len(stream.arrival)} on {topic}" for topic, stream in streams.by_topic.items())

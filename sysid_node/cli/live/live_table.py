@@ -1,4 +1,4 @@
-"""The live table: every derivative with its estimate, 95 % interval, status and what it should be."""
+"""The live table: every derivative with its estimate, 95 % interval, status and reference value."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rich.text import Text
 from sysid_node.aircraft.names import LONGITUDINAL
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
-SIDE_BY_SIDE = 170  # columns of a terminal from which on the two halves stand side by side
-HEADS = 5  # lines that are no derivative's: headline, remark, the tables' headings, and the cursor's
-TURN = 3.0  # s of flight for which each half is shown where there is no room for both
+SIDE_BY_SIDE = 170  # width of a terminal, in columns, from which the two halves stand side by side
+HEADS = 5  # lines besides the derivatives: headline, remark, headings of the tables, cursor
+TURN = 3.0  # s of flight for which each half is shown if there is no room for both
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class ReferenceValues:
 
 @dataclass(frozen=True)
 class LiveStatus:
-    """What the table shows at one time."""
+    """The content of the live table at one time."""
 
     title: str
     seconds: float  # of flight so far
@@ -41,7 +41,7 @@ class LiveStatus:
 def live_table(
     moment: LiveStatus, names: Sequence[str], reference: ReferenceValues, width: int, height: int | None = None
 ) -> RenderableType:
-    """The whole picture for a terminal ``width`` columns wide.
+    """The table for a terminal that is ``width`` columns wide.
 
     Where it is too high for a terminal of ``height`` lines, its halves are shown by turns.
     """

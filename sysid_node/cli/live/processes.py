@@ -1,4 +1,4 @@
-"""Nodes in processes of their own."""
+"""Nodes of this package as processes."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ def node_process(name: str, arguments: Sequence[str], folder: Path) -> Iterator[
             process.send_signal(signal.SIGINT)
             process.wait()
     if process.returncode:
-        lines = log.read_text(encoding="utf-8").splitlines() or ["no word of why"]
+        lines = log.read_text(encoding="utf-8").splitlines() or ["the log is empty"]
         raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")

@@ -1,4 +1,4 @@
-"""What commands that run nodes do first: a folder for what they write, and a ROS domain of their own."""
+"""A folder for results and a ROS domain of its own: what a command that runs nodes needs first."""
 
 from __future__ import annotations
 
@@ -17,6 +17,6 @@ def make_folder(out: Path) -> None:
 
 
 def own_domain() -> None:
-    """Neither hear nor disturb other ROS programs, here or on the network; before rclpy is imported."""
+    """Choose a ROS domain that no other program uses, on this computer only; call it before rclpy is imported."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

@@ -27,7 +27,7 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
 
 
 def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[str, float] | None = None) -> None:
-    """The final estimates as a table: value, 95 % interval, status, and the truth where it is known.
+    """Print the final estimates as a table: value, 95 % interval, status, and the truth where it is known.
 
     ``since``: s from which on it is that, of those that have changed.
     """
@@ -51,7 +51,7 @@ def _true(name: str, truth: Mapping[str, float], since: Mapping[str, float]) -> 
 
 
 def show_faults(verdict: FaultVerdict) -> None:
-    """What the fault monitor would have said of the flight."""
+    """Print the faults that the fault monitor would have reported in flight."""
     style = "bold yellow" if verdict.episodes else "dim"
     for sentence in verdict.sentences:
         Console().print(f"faults: {sentence}", style=style, highlight=False, soft_wrap=True)

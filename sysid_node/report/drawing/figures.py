@@ -1,4 +1,4 @@
-"""Plotly figures as plain values: one quiet style, arrays packed as 32-bit floats.
+"""Plotly figures as plain values: one style, arrays packed as 32-bit floats.
 
 The page needs plotly.js only (its basic bundle lies in ``templates/vendor``); nothing here imports Plotly.
 Colours are Okabe and Ito's (2008), told apart by colour-blind readers and in grey print by dashes.
@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Figure:
-    """One plot: Plotly traces and layout, a sentence for who cannot see it, its height in pixels."""
+    """One plot: Plotly traces and layout, a sentence for readers who cannot see it, its height in pixels."""
 
     label: str
     traces: Sequence[Trace]

@@ -60,7 +60,7 @@ def _heading(title: str, left: float, top: float) -> dict[str, Any]:
 
 
 def _placed(shape: Mapping[str, Any], number: str) -> dict[str, Any]:
-    """A line or an area of one panel; what spanned the whole plot spans the panel."""
+    """A line or an area on its panel's axes; one that spanned the whole plot spans the panel."""
     return {**shape, **{f"{axis}ref": _reference(axis, number, shape.get(f"{axis}ref", axis)) for axis in "xy"}}
 
 

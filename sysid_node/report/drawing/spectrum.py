@@ -8,10 +8,10 @@ from sysid_node.flight.record import Array
 
 
 def amplitude_spectrum(time: Array, signals: Array, frequency: Array) -> Array:
-    """Root mean square, over stretches of the record, of the amplitude at each frequency (Welch 1967).
+    """Root mean square, over segments of the record, of the amplitude at each frequency (Welch 1967).
 
     ``time`` (N,) s, increasing; ``signals`` (N, M), finite; ``frequency`` (F,) Hz, evenly spaced. Returns (F, M) in the
-    signals' units: a sinusoid midway through every stretch shows its peak amplitude. Stretches overlap by half, are
+    signals' units: a sinusoid in the middle of every segment shows its peak amplitude. Segments overlap by half, are
     Hann-windowed, and last one period of the frequencies' spacing (the whole record where that is shorter), so that
     neighbouring frequencies hold different information whatever the length of the record.
     """
@@ -31,7 +31,7 @@ def amplitude_spectrum(time: Array, signals: Array, frequency: Array) -> Array:
 
 
 def _power(time: Array, signals: Array, frequency: Array, start: float, length: float) -> Array:
-    """Squared amplitudes (F, M) of one stretch, each sample weighted by the window and by the time it stands for."""
+    """Squared amplitudes (F, M) of one segment, each sample weighted by the window and its time step."""
     window = np.sin(np.pi * (time - start) / length) ** 2
     weight = window * np.gradient(time)
     total = weight.sum()

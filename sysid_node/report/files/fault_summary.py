@@ -12,7 +12,7 @@ from sysid_node.faults.types import Change, Fault
 
 
 def as_summary(verdict: FaultVerdict | None) -> dict[str, Any] | None:
-    """``{judged_seconds, found: [{kind, part, size, ..., until}, ...]}``; null where nothing was judged."""
+    """``{judged_seconds, found: [{kind, part, size, ..., until}, ...]}``; null if no faults were looked for."""
     if verdict is None:
         return None
     found = [_row(episode.fault) | {"until": episode.until} for episode in verdict.episodes]
@@ -20,7 +20,7 @@ def as_summary(verdict: FaultVerdict | None) -> dict[str, Any] | None:
 
 
 def from_summary(found: Mapping[str, Any] | None) -> FaultVerdict | None:
-    """The way back; what was said from moment to moment is in the bag."""
+    """The faults from ``summary.json``; the reports over time are in the bag."""
     if not found:
         return None
     return FaultVerdict(found["judged_seconds"], episodes=[_episode(row) for row in found["found"]])

@@ -117,7 +117,7 @@ def _thin_response(response: Response) -> Response:
 
 @contextmanager
 def _writing(folder: Path) -> Iterator[None]:
-    """What the system says where a file cannot be written, in one line."""
+    """Turns an error of the file system into an InputError of one line."""
     try:
         yield
     except OSError as error:

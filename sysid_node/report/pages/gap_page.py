@@ -1,4 +1,4 @@
-"""The page of ``sysid gap``: how far off the simulator is, where, why, and how far that can be mended."""
+"""The page of ``sysid gap``: the size of the gap, where it lies, its causes, and their correction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sysid_node.report.sections.section import Section
 
 
 def write_gap_report(path: Path, found: Diagnosis) -> None:
-    """The page as one HTML file."""
+    """Write the page as one HTML file."""
     title = f"The simulator against the flight: {found.aircraft.name}"
     path.write_text(render_page(title, SECTIONS, found), encoding="utf-8")
 

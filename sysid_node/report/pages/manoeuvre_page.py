@@ -1,4 +1,4 @@
-"""The page of ``sysid excite``: a manoeuvre, the flight that it gives, and what it would tell about the aircraft."""
+"""The page of ``sysid excite``: a manoeuvre, its predicted standard errors, and its predicted flight."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FREQUENCIES = np.arange(0.05, 5.0, 0.05)
 
 
 def write_manoeuvre_report(path: Path, result: ManoeuvreResult) -> None:
-    """The page as one HTML file."""
+    """Write the page as one HTML file."""
     path.write_text(render_page(f"Manoeuvre for {result.aircraft.name}", SECTIONS, result), encoding="utf-8")
 
 

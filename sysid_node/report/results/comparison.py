@@ -1,4 +1,4 @@
-"""An estimate against what was believed of it and what is true."""
+"""An estimate compared with its prior and its true value."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ def half_width(d: DerivativeEstimate) -> float:
 
 
 def covers(d: DerivativeEstimate, truth: float) -> bool:
-    """Whether the 95 % interval holds the true value."""
+    """Whether the 95 % interval contains the true value."""
     return d.lower <= truth <= d.upper
 
 
 def agrees(d: DerivativeEstimate, prior: Prior) -> bool:
-    """Whether estimate and prior differ by no more than both their 95 % intervals explain, as independent errors."""
+    """Whether the two 95 % intervals explain the difference of estimate and prior, if their errors are independent."""
     tolerance = 0.0 if math.isnan(prior.tolerance) else NORMAL_95 * prior.tolerance
     return abs(d.value - prior.value) <= math.hypot(half_width(d), tolerance)
 
 
 def changes(history: Sequence[Estimates], name: str) -> list[float]:
-    """Times (s) at which a derivative was first announced as changed, each spell once."""
+    """Times (s) at which the status of a derivative became ``changed``."""
     states = [(e.time, e.derivatives[name].status.startswith("changed")) for e in history if name in e.derivatives]
     before = [False, *(changed for _, changed in states)]
     return [time for (time, changed), was in zip(states, before, strict=False) if changed and not was]

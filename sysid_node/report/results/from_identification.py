@@ -20,7 +20,7 @@ from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
 from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
-#: Hz: what the drawn spectra show.
+#: Frequencies of the drawn spectra, Hz.
 _SPECTRUM = np.arange(0.1, 5.01, 0.1)
 
 
@@ -31,7 +31,7 @@ def identification_result(
     settings: BatchSettings,
     truth: Mapping[str, float] | None = None,
 ) -> RunResult:
-    """All that the report, the summary and the tables need. ``records`` are the flights that were fitted."""
+    """The result of a batch method as the reports take it. ``records`` are the flights that were fitted."""
     fit, first = found.fit, records[0]
     trusted = "ok" if fit.converged else f"not converged: {fit.message}"
     derivatives = {
@@ -58,7 +58,7 @@ def identification_result(
 def _derivative(
     name: str, estimate: ParameterEstimate | None, trusted: str, remarks: Sequence[str]
 ) -> DerivativeEstimate:
-    """One row of the table; a derivative that was not estimated is there with the reason."""
+    """The final estimate of a derivative; one that was not estimated has the reason as its status."""
     if estimate is None:
         coefficient = name.partition("_")[0]
         reasons = [remark for remark in remarks if name in remark or coefficient in remark]
@@ -88,7 +88,7 @@ def _history(fit: BatchFit) -> list[Estimates]:
 
 
 def _fits(found: Identification) -> dict[str, FitQuality]:
-    """Quality by coefficient, then by the outputs of a method that integrates."""
+    """The quality of fit of each coefficient, and of each output of a method that integrates."""
     names = list(found.fit.estimates)
     table = {}
     for name, q in (goodness_of_fit(found.fit.responses) | goodness_of_fit(found.coefficients)).items():
@@ -99,7 +99,7 @@ def _fits(found: Identification) -> dict[str, FitQuality]:
 
 
 def _responses(found: Identification) -> dict[str, Response]:
-    """Of the first flight: its outputs, and its coefficients."""
+    """Outputs and coefficients of the first flight."""
     table = {}
     for response in (*found.fit.responses[:1], *found.coefficients[:1]):
         for name in response.names:
@@ -113,7 +113,7 @@ def _note(records: Sequence[FlightRecord], settings: BatchSettings) -> str:
 
 
 def _spectra(aircraft: Aircraft, record: FlightRecord, coefficients: Sequence[ModelResponse]) -> Spectra | None:
-    """Of the first flight: the controls, the coefficients and what the model leaves of them."""
+    """Spectra of the first flight: controls, coefficients and residuals."""
     if not coefficients:
         return None
     response = coefficients[0]

@@ -1,4 +1,4 @@
-"""From a replayed or live record to a RunResult: what was flown, and what the final estimates make of it.
+"""From a replayed or live record to a RunResult.
 
 The measured coefficients drawn here differentiate the rates numerically, which the estimator itself does not do; they
 serve the eye. The estimates do not depend on anything in this file.
@@ -24,14 +24,14 @@ from sysid_node.report.results.run_result import References, RunData, RunResult,
 from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
 THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
-FEWEST = 10  # samples that anything is drawn from
-POINTS_A_PERIOD = 8  # of the highest frequency in use, in drawn responses
+FEWEST = 10  # samples below which nothing is drawn
+POINTS_A_PERIOD = 8  # drawn points of a response in a period of the highest frequency in use
 RESPONSE_NOTE = "Both are averaged over half the shortest period in use; measured moments hold differentiated rates."
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Complete samples as the model sees them: coefficients name -> (N,), measured and from the final estimates."""
+    """Complete samples with their coefficients, name -> (N,), as measured and from the final estimates."""
 
     time: Array  # (N,) s
     controls: Mapping[str, Array]  # symbol -> (N,) rad
@@ -106,7 +106,7 @@ def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | N
 
 
 def _motion(aircraft: Aircraft, time: Array, samples: Array, history: Sequence[Estimates]) -> Motion | None:
-    """The complete samples, unknown thrust taken as none, as the estimator does; None for fewer than ten."""
+    """The complete samples, an unknown thrust taken as zero, as in the estimator; None for fewer than ten."""
     filled = samples.copy()
     filled[np.isnan(filled[:, THRUST]), THRUST] = 0.0
     complete = np.isfinite(filled).all(axis=1)
@@ -152,13 +152,13 @@ def _spectra(settings: Settings, motion: Motion) -> Spectra:
 
 
 def _averaged(values: Array, every: int) -> Array:
-    """Means over so many samples (N, ...) each: at sixteen a period they take 0.6 % off an amplitude."""
+    """Means over ``every`` samples (N, ...). With sixteen means in a period they reduce an amplitude by 0.6 %."""
     whole = values[: values.shape[0] // every * every]
     return np.asarray(whole.reshape(-1, every, *values.shape[1:]).mean(axis=1))
 
 
 def _responses(settings: Settings, motion: Motion) -> dict[str, Response]:
-    """Measured and modelled coefficients, averaged over half the shortest period in use: noise above is left out."""
+    """Measured and modelled coefficients, averaged over half the shortest period in use to remove noise above it."""
     step = float(np.median(np.diff(motion.time)))
     width = max(round(0.5 / (settings.frequencies[2] * step)), 1)
     every = max(2 * width // POINTS_A_PERIOD, 1)

@@ -20,7 +20,7 @@ from sysid_node.report.results.signals import RunSignals
 
 @dataclass(frozen=True)
 class Prior:
-    """What the aircraft file says of a derivative: its value and 1-sigma tolerance (NaN = not given)."""
+    """The aircraft file's value of a derivative and its 1-sigma tolerance (NaN = not given)."""
 
     value: float
     tolerance: float = np.nan

@@ -47,7 +47,7 @@ class Row:
     prior: str
     differs: bool  # from the prior, by more than both uncertainties
     truth: str
-    missed: bool  # valid, yet the interval does not hold the true value
+    missed: bool  # valid, but the interval does not contain the true value
     mark: Mark | None
     prior_mark: Mark | None
 
@@ -92,14 +92,14 @@ def _row(run: RunResult, d: DerivativeEstimate, span: float) -> Row:
 
 
 def _reference(run: RunResult, name: str) -> float:
-    """What the picture is normalised by: the truth where any is known, else the prior; NaN = neither."""
+    """The reference of the picture: the truth where any is known, else the prior; NaN = neither."""
     if run.references.truth:
         return run.references.truth.get(name, math.nan)
     return run.references.prior[name].value if name in run.references.prior else math.nan
 
 
 def _span(run: RunResult, estimates: Iterable[DerivativeEstimate]) -> float:
-    """The smallest axis on which most usable intervals lie whole."""
+    """The smallest axis that shows most valid intervals completely."""
     reach = [
         max(abs(d.lower - reference), abs(d.upper - reference)) / abs(reference)
         for d in estimates
@@ -111,7 +111,7 @@ def _span(run: RunResult, estimates: Iterable[DerivativeEstimate]) -> float:
 
 
 def _mark(value: float, half: float, reference: float, span: float) -> Mark | None:
-    """Where a value and its interval fall on an axis from -span to +span about the reference: stronger is right."""
+    """The place of a value and its interval on an axis from -span to +span about the reference; larger is right."""
     if not math.isfinite(value):
         return None
     at = 50.0 + 50.0 * (value / reference - 1.0) / span

@@ -38,7 +38,7 @@ GROUPS = (
     Group("Thrust", "N", 1.0, {"thrust": "thrust"}),
 )
 
-#: One colour and dash an axis of motion, throughout: pitch, roll, yaw; anything else comes last.
+#: One colour and dash for each axis of motion: pitch, roll, yaw; all other signals have a common one.
 _STYLE = {
     **dict.fromkeys(("de", "alpha", "q", "theta", "az"), (BLUE, "solid")),
     **dict.fromkeys(("da", "p", "phi"), (VERMILION, "solid")),
@@ -57,7 +57,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
 
 
 def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
-    """Titles and figures of what was flown; none where the record itself is not there."""
+    """Titles and figures of inputs and motion; none without the recorded signals."""
     return [] if run.signals.flight is None else histories(run.signals.flight)
 
 

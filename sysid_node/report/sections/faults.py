@@ -1,4 +1,4 @@
-"""What the fault monitor would have said of the flight."""
+"""The faults that the fault monitor would have reported in flight."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sysid_node.report.wording.numbers import number, seconds
 
 
 def context(run: RunResult) -> Mapping[str, Any]:
-    """Rows of the table, and for how long there was something to judge."""
+    """Rows of the table, and the length of flight that was checked."""
     if run.faults is None:
         return {"judged": None, "rows": []}
     return {"judged": seconds(run.faults.judged), "rows": [_row(episode) for episode in run.faults.episodes]}

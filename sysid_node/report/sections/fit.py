@@ -1,4 +1,4 @@
-"""How well the model explains the flight, and other flights."""
+"""The quality of fit: on the flight that was used, and on flights held out."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
 
 
 def _percent(share: float) -> str:
-    """A share in percent; what is not quite all is not rounded up to it."""
+    """A share in percent; a share below one is never rounded up to 100 %."""
     if not math.isfinite(share):
         return number(share)
     return ">\u202f99.9\u202f%" if 0.9995 <= share < 1 else f"{number(100 * share, 3)}\u202f%"

@@ -1,4 +1,4 @@
-"""Every estimate against time with its 95 % band, small multiples."""
+"""Every estimate against time with its 95 % interval, one panel per derivative."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ POINTS = 900  # of one panel's curves
 
 @dataclass(frozen=True)
 class Panel:
-    """One small multiple with its caption; without a figure where no estimate was ever finite."""
+    """A panel with its caption; without a figure if no estimate was ever finite."""
 
     name: str
     symbol: Markup
@@ -48,7 +48,7 @@ class _Curves:
 
 
 def context(run: RunResult) -> Mapping[str, Any]:
-    """Groups of panels; none where there is but one time."""
+    """Groups of panels; none if there is only one time."""
     if run.final is None or len(run.history) < 2:
         return {"groups": []}
     final = run.final.derivatives
@@ -62,7 +62,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
 
 
 def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
-    """Each panel's figure under the derivative's name and unit; none where there is but one time."""
+    """Each panel's figure under the derivative's name and unit; none if there is only one time."""
     panels = [panel for _, group in context(run)["groups"] for panel in group]
     return [(f"{panel.name} {unit(panel.name)}".strip(), panel.figure) for panel in panels if panel.figure]
 
@@ -118,7 +118,7 @@ def _references(run: RunResult, name: str) -> list[dict[str, Any]]:
 
 
 def _limits(run: RunResult, name: str, c: _Curves) -> list[float]:
-    """Axis limits for where the estimate ends up; the wide intervals of the first seconds run off the panel."""
+    """Axis limits around the later estimates; the wide intervals of the first seconds are cut off."""
     progress = (c.time - c.time[0]) / max(c.time[-1] - c.time[0], 1e-9)
     shown = (progress >= 0.25) & (c.valid > 0.5)
     if not shown.any():

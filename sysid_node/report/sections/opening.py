@@ -1,4 +1,4 @@
-"""The opening: what came out, in one paragraph that a pilot understands."""
+"""The opening of a run's report: the results in one paragraph for a pilot."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _known(run: RunResult, derivatives: list[DerivativeEstimate]) -> Markup:
 
 
 def _handling(_: RunResult, derivatives: list[DerivativeEstimate]) -> Markup | None:
-    """Statements only where the whole interval has one sign."""
+    """What the signs of derivatives mean in flight, of those whose whole interval has one sign."""
     known = {d.name: d for d in derivatives if d.valid}
     clauses = []
     for name, negative, positive in HANDLING:
@@ -130,7 +130,7 @@ def _difference(value: float, prior: float) -> str:
 
 
 def _named(d: DerivativeEstimate) -> bool:
-    """Offsets and trim terms are left out where the best known derivative is named."""
+    """Whether a derivative can be named as the most accurate: offsets are left out."""
     return not d.name.endswith("_0") and math.isfinite(half_width(d))
 
 

@@ -1,4 +1,4 @@
-"""What was left out of the data, by topic and reason."""
+"""Messages that were rejected, by topic and reason."""
 
 from __future__ import annotations
 

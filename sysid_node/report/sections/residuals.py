@@ -14,7 +14,7 @@ from sysid_node.report.wording.names import COEFFICIENT_WORDS, symbol
 
 
 def context(run: RunResult) -> Mapping[str, Any]:
-    """One panel a coefficient: its residual, and itself where it is known."""
+    """One panel per coefficient: its residual, and the coefficient where it is known."""
     spectra = run.signals.spectra
     names = () if spectra is None else tuple(spectra.residuals)
     return {

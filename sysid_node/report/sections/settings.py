@@ -1,4 +1,4 @@
-"""The settings that gave these numbers."""
+"""The settings of the run."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 def symbol(name: str) -> Markup:
-    """The derivative or coefficient as it stands in a textbook, in HTML: C with its indices."""
+    """The symbol of a derivative or coefficient in HTML: C with its indices."""
     coefficient, regressor = split_name(name)
     if name in COEFFICIENTS:
         return _C.format(name[1:])
@@ -105,12 +105,12 @@ def meaning(name: str) -> str:
 
 
 def short_meaning(name: str) -> str:
-    """The nickname where there is one, else what ``meaning`` says."""
+    """The common name where there is one, else the result of ``meaning``."""
     return NICKNAMES.get(name, meaning(name))
 
 
 def unit(name: str) -> str:
-    """Unit of a derivative: per radian of its regressor, or what that regressor is."""
+    """The unit of a derivative: per unit of its regressor; "" for an offset."""
     coefficient, regressor = split_name(name)
     if not coefficient or regressor == "0":
         return ""
@@ -118,7 +118,7 @@ def unit(name: str) -> str:
 
 
 def status_words(status: str) -> str:
-    """A status in a pilot's words; one not known here as it is."""
+    """A status in words for a pilot; an unknown status is returned as it is."""
     return next((words for start, words in STATUS_WORDS.items() if status.startswith(start)), status)
 
 

@@ -40,7 +40,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def likely(probability: float) -> str:
-    """A probability in two decimals, never as certain: ``0.83``, ``over 0.99``, ``under 0.01``."""
+    """A probability in two decimals, never as 0 or 1: ``0.83``, ``over 0.99``, ``under 0.01``."""
     if probability >= 0.995:
         return "over 0.99"
     return f"{probability:.2f}" if probability >= 0.005 else "under 0.01"
@@ -75,7 +75,7 @@ def seconds(value: float) -> str:
 
 
 def setting(value: object) -> str:
-    """A setting as a person would write it."""
+    """The text of a setting's value."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid_node.report.pages.closed_loop_page import ClosedLoopFlight, Event, write_loop
+from sysid_node.report.pages.closed_loop_page import write_loop
+from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 
 TIME = np.arange(0.0, 60.0, 0.01).tolist()
 EVENTS = (
@@ -26,8 +27,8 @@ def episode(events: tuple[Event, ...] = EVENTS, failure: str = EVENTS[4].text) -
     """Pitch is off by 0.01 rad until 30 s and by 0.02 rad after; a tenth of the rows is not measured."""
     off = [math.nan if i % 10 == 0 else 0.01 if t < 30.0 else 0.02 for i, t in enumerate(TIME)]
     errors = {"pitch": off, "roll": [0.0] * len(TIME), "sideslip": [0.0] * len(TIME)}
-    asked = {"pitch": [0.08] * len(TIME), "roll": [0.2] * len(TIME)}
-    return ClosedLoopFlight("cdrw", failure, 30.0, True, TIME, errors, asked, {}, events, {"imu/data": 3})
+    commanded = {"pitch": [0.08] * len(TIME), "roll": [0.2] * len(TIME)}
+    return ClosedLoopFlight("cdrw", failure, 30.0, True, TIME, errors, commanded, {}, events, {"imu/data": 3})
 
 
 def test_excitation_and_alarms_are_told_from_the_events() -> None:

@@ -13,7 +13,7 @@ from sysid_node.report.wording.numbers import NONE, likely, number, with_interva
 
 
 def candidates(found: Diagnosis) -> Mapping[str, Any]:
-    """Every effect that was fitted to the end, alone; and the causes with their parameters."""
+    """The effects that were fitted alone, and the causes with their parameters."""
     said = document(found)
     rows = [
         (words_of(c["effect"]), NONE if c["probability"] is None else likely(c["probability"]),
@@ -47,7 +47,7 @@ def _parameters(cause: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _confusion(found: Diagnosis) -> Mapping[str, Any]:
-    """Cells of the map of what is confused with what."""
+    """Cells of the map that shows which effects the flight cannot distinguish."""
     table = found.confusion
     cells = [
         {"row": i, "column": j, "value": number(value, 2), "opacity": f"{abs(value):.2f}", "positive": value > 0}

@@ -20,10 +20,10 @@ from sysid_node.report.wording.names import symbol
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.model.prediction import COEFFICIENTS
 
-#: Flight that is drawn at most, s: where the simulator of the file is furthest off.
+#: Longest part of the flight that is drawn, s: the part with the largest errors of the aircraft file.
 _DRAWN = 24.0
 
-#: How much smaller the error of a reading must have become for it to be drawn beside forces and moments.
+#: Ratio of a reading's errors before and after the correction from which it is drawn beside forces and moments.
 _MENDED = 1.3
 
 _UNITS = {**dict.fromkeys(("ax", "ay", "az"), "m/s²"), **dict.fromkeys("pqr", "rad/s"), "V": "m/s"}
@@ -36,7 +36,7 @@ Panel = tuple[Any, str, Figure]
 
 
 def flight(found: Diagnosis) -> Mapping[str, Any]:
-    """Measured, as the file has it, and as corrected: short flights where there are any, else forces and moments."""
+    """Measured, with the aircraft file, and corrected: simulated short flights, or else forces and moments."""
     panels = _short_flights(found) if found.simulation_gap else _coefficients(found)
     return {
         "panels": panels,
@@ -52,7 +52,7 @@ def flight_figures(found: Diagnosis) -> list[tuple[str, Figure]]:
 
 
 def _short_flights(found: Diagnosis) -> list[Panel]:
-    """The readings that moved, each short flight a line of its own."""
+    """The readings that moved; each short flight is a separate line."""
     place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
     record = side_by_side(found.models[place], found.check.final.flights[place].points)
     span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
@@ -61,7 +61,7 @@ def _short_flights(found: Diagnosis) -> list[Panel]:
     for name in found.size.per_channel:
         k = OUTPUTS.index(name)
         before, after = (series[span, k].copy() for series in (record.before, record.after))
-        before[begins], after[begins] = np.nan, np.nan  # a line ends where the simulator begins anew
+        before[begins], after[begins] = np.nan, np.nan  # a line ends where the simulator restarts
         panels.append(_panel(name, record.time[span], record.measured[span, k], before, after, _UNITS.get(name, "")))
     return panels
 
@@ -77,7 +77,7 @@ def _worst(time: Array, error: Array) -> slice:
 
 
 def _coefficients(found: Diagnosis) -> list[Panel]:
-    """Coefficients, constant offsets removed, and readings that the causes mend."""
+    """Coefficients without constant offsets, and readings whose errors the correction reduces."""
     model, gaps = found.models[0], found.gap.per_channel
     point = transferred_parameters(found.attribution.corrected, model)
     before, after = model.predicted_series(model.simulator.neutral()), model.predicted_series(point)

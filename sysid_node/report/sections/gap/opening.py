@@ -13,7 +13,7 @@ from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.report.wording.names import words_of
 from sysid_node.report.wording.numbers import number
 
-#: Of a gap's errors.
+#: The stages of a gap's error, in words.
 _STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis found, in one paragraph for a pilot."""
+"""The result of a diagnosis in one paragraph for a pilot."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def _span(name: str, low: float, high: float) -> str:
 
 
 def waterfall(found: Diagnosis) -> Figure:
-    """From all of the gap down to what noise leaves."""
+    """A waterfall from the whole gap down to the noise."""
     steps = _steps_down(found)
     stations = list(dict.fromkeys(station for station, _, _ in steps))
     colours = dict(zip(stations, _COLOURS, strict=False)) | {"noise": MUTED, "unexplained": INK}

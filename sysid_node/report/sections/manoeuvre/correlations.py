@@ -1,4 +1,4 @@
-"""Correlations of the predicted errors: a map, and the pairs that are hardly told apart."""
+"""Correlations of the predicted errors: a map, and the pairs that are hard to distinguish."""
 
 from __future__ import annotations
 

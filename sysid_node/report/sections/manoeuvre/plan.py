@@ -19,7 +19,7 @@ from sysid_node.report.wording.numbers import listing, number, plural, seconds
 DEGREES = 180.0 / np.pi
 _COLOURS = {"elevator": BLUE, "aileron": VERMILION, "rudder": GREEN}
 
-#: What is left of a tolerance below which a derivative counts as shown well, and above which as hardly shown.
+#: Remaining share of a tolerance below which a derivative counts as well determined, and above which as hardly.
 WELL, HARDLY = 0.1, 0.9
 
 
@@ -47,7 +47,7 @@ def opening(result: ManoeuvreResult) -> Mapping[str, Any]:
 
 
 def context(result: ManoeuvreResult) -> Mapping[str, Any]:
-    """The spec, each control's travel, and the plan against time."""
+    """The specification, the deflections of each control, and the plan against time."""
     plan = result.prediction.manoeuvre
     limits = control_limits(result.aircraft)
     rows = []
@@ -84,7 +84,7 @@ def _figure(result: ManoeuvreResult, surfaces: list[str]) -> Figure:
 
 
 def _beyond(result: ManoeuvreResult) -> list[str]:
-    """Limits of the envelope that the flight passes, in words."""
+    """Limits of the envelope that the flight exceeds, in words."""
     names = {
         "alpha": "angle of attack",
         "beta": "sideslip",

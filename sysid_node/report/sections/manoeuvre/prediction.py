@@ -1,4 +1,4 @@
-"""Predicted standard errors, derivative by derivative."""
+"""The predicted standard error of each derivative."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sysid_node.report.wording.numbers import number
 
 @dataclass(frozen=True)
 class Row:
-    """One derivative."""
+    """One derivative as the table shows it."""
 
     name: str
     symbol: Markup
@@ -28,7 +28,7 @@ class Row:
     tolerance: str
     error: str
     relative: str  # percent of the value
-    before: str  # the start's error, where there was an optimisation
+    before: str  # standard error of the initial manoeuvre, if it was optimised
     left: float  # percent of the tolerance
     seen: bool
 
