@@ -122,7 +122,9 @@ def readme() -> str:
     parts = [_README]
     for name, (meaning, options) in FLIGHTS.items():
         command = options.replace(" --", " \\\n    --")
-        parts.append(f"## {name}\n\n{meaning}\n\n```\nsysid simulate {command} \\\n    --out bags/{name}\n```\n")
+        why = "<!-- not run: `bags/make.py` runs it -->"
+        code = f"```bash\nsysid simulate {command} \\\n    --out bags/{name}\n```"
+        parts.append(f"## {name}\n\n{meaning}\n\n{why}\n{code}\n")
     return "\n".join(parts)
 
 

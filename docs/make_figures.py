@@ -117,7 +117,9 @@ def intervals() -> str:
         held = sum(abs(row[0] - truth) < row[column] for row in found)
         print(f"intervals: {name}: {held} of {len(found)} hold the truth ({100 * held / len(found):.0f} %)")
         chart = Chart((50 + 380 * k, 60, 340, 200), (0, 41), (-0.5, 2.5))
-        chart.frame(f"{name}: {100 * held / len(found):.0f} % hold", "experiment", (1, 10, 20, 30, 40), (0, 0.5, 1, 1.5, 2))
+        chart.frame(
+            f"{name}: {100 * held / len(found):.0f} % hold", "experiment", (1, 10, 20, 30, 40), (0, 0.5, 1, 1.5, 2)
+        )
         chart.line((0, 41), (truth, truth), ORANGE, 1.4)
         for i, row in enumerate(found[:40]):
             colour = BLUE if abs(row[0] - truth) < row[column] else INK
@@ -212,13 +214,14 @@ def gap_sizes() -> str:
 def layers() -> str:
     """The layers of the source: imports point downwards only."""
     rows = (
-        (("cli, report", "what a person runs and sees"),),
+        (("cli", "commands"), ("api", "the Python interface")),
+        (("report", "pages, figures, tables and files of a run"),),
         (("ros", "nodes: messages in and out, no mathematics"),),
         (("gap", "flight data, residuals, estimation, instruments, selection, validation, verdict"),),
+        (("faults", "which surface, sensor or part of the airframe failed"),),
         (
             ("online", "recursive estimator"),
             ("batch", "whole flights"),
-            ("faults", "what failed"),
             ("control", "adaptive gains"),
             ("excite", "manoeuvres"),
         ),
