@@ -1,9 +1,9 @@
 """The snippets of the documentation: fenced blocks of the Markdown pages, and what the pages say of running them.
 
-A block of ``bash``, ``python``, ``yaml`` or ``json`` is run, or parsed, by a test. The line ``<!-- not run: REASON -->``
-above a block of ``bash`` or ``python`` says that it is only checked, and why. The line ``<!-- output -->`` above a block
-of ``text`` says that the commands above it print these lines. A block of ``yaml`` whose first line is ``# NAME.yaml`` is
-the file of that name for what follows on the page.
+A block of ``bash``, ``python``, ``yaml`` or ``json`` is run, or parsed, by a test. The line
+``<!-- not run: REASON -->`` above a block of ``bash`` or ``python`` says that it is only checked, and why. The line
+``<!-- output -->`` above a block of ``text`` says that the commands above it print these lines. A block of ``yaml``
+whose first line is ``# NAME.yaml`` is the file of that name for what follows on the page.
 """
 
 from __future__ import annotations
