@@ -69,7 +69,7 @@ def test_a_figure_shows_the_estimates_as_the_report_does(replayed):
     figure = replayed.plot()
     names = [note.text for note in figure.layout.annotations]
     assert len(names) == len(replayed.derivatives)
-    place = names.index("Cm_alpha per rad") + 1
+    place = names.index("Cm_alpha") + 1
     line = [trace for trace in figure.data if trace.xaxis == f"x{place}"][-1]
     drawn = np.asarray(line.y, dtype=float)
     assert drawn[-1] == pytest.approx(replayed.derivatives["Cm_alpha"].value, rel=1e-6)

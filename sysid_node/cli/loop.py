@@ -35,11 +35,8 @@ if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 ACTUATORS = "actuator_lag:time_constant=0.05"
-ONSET, EXCITE_AT, SETTLED = (
-    30.0,
-    3.0,
-    10.0,
-)  # s: failure; first excitation; time after the failure until its effects are judged
+ONSET, EXCITE_AT = 30.0, 3.0  # s: failure and first excitation
+SETTLED = 10.0  # s after the failure from which tracking errors are counted apart
 PAUSE = 3.0  # s from an abort of the excitation until it is requested again
 START_UP = 60.0  # s in which the first command must come
 WATCHED = ("Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")

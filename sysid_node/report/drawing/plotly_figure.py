@@ -33,7 +33,9 @@ def plotly_figure(panels: Sequence[Titled], columns: int) -> graph_objects.Figur
         layout[f"yaxis{number}"] = y | {"domain": [bottom, top], "anchor": f"x{number}"}
         layout["annotations"].append(_heading(title, left, top))
         layout["shapes"] += [_placed(shape, number) for shape in figure.layout.get("shapes", ())]
-        traces += [_on_axes(trace, number) for trace in figure.traces]
+        explained = len(_names(figure)) > 1 and (place == 0 or _names(figure) != _names(panels[0][1]))
+        layout[f"legend{number}"] = _legend(figure, right, top)
+        traces += [_on_axes(trace, number, explained) for trace in figure.traces]
     layout["height"] = 60 + sum(max(f.height for _, f in panels[r * columns : (r + 1) * columns]) for r in range(rows))
     layout["showlegend"] = any(trace.get("name") for trace in traces)
     style = {key: value for key, value in panels[0][1].spec["layout"].items() if key not in layout} if panels else {}
@@ -47,9 +49,19 @@ def _domain(place: int, rows: int, columns: int) -> tuple[float, float, float, f
     return left, left + width, max(top - height * (1.0 - _ABOVE), 0.0), top
 
 
-def _on_axes(trace: Trace, number: str) -> Trace:
-    """The trace on its panel's axes; the first panel's names stand in the legend."""
-    named = {"showlegend": not number} if trace.get("name") else {}
+def _names(figure: Figure) -> list[str]:
+    """The names of the lines."""
+    return [trace["name"] for trace in figure.traces if trace.get("name")]
+
+
+def _legend(figure: Figure, right: float, top: float) -> dict[str, Any]:
+    """A legend above a panel, at its right."""
+    return {**figure.spec["layout"]["legend"], "x": right, "xanchor": "right", "y": top, "yanchor": "bottom"}
+
+
+def _on_axes(trace: Trace, number: str, explained: bool) -> Trace:
+    """The trace on its panel's axes; its name stands in the panel's legend where that is ``explained``."""
+    named = {"showlegend": explained, "legend": f"legend{number}"} if trace.get("name") else {}
     arrays = {axis: unpacked(trace[axis]) for axis in "xy" if isinstance(trace[axis], Mapping)}
     return {**trace, **arrays, "xaxis": f"x{number}", "yaxis": f"y{number}", **named}
 

@@ -62,9 +62,9 @@ def context(run: RunResult) -> Mapping[str, Any]:
 
 
 def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
-    """Each panel's figure under the derivative's name and unit; none if there is only one time."""
+    """Each panel's figure under the derivative's name; none if there is only one time."""
     panels = [panel for _, group in context(run)["groups"] for panel in group]
-    return [(f"{panel.name} {unit(panel.name)}".strip(), panel.figure) for panel in panels if panel.figure]
+    return [(panel.name, panel.figure) for panel in panels if panel.figure]
 
 
 def _panel(run: RunResult, last: DerivativeEstimate) -> Panel:
