@@ -1,0 +1,63 @@
+"""The flight of ``sysid loop``: what is flown, what fails in it, and how its nodes are started."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from sysid_node.aircraft.model import Aircraft
+
+ACTUATORS = "actuator_lag:time_constant=0.05"
+ONSET, EXCITE_AT = 30.0, 3.0  # s: failure and first excitation
+NODES: Mapping[str, tuple[str, ...]] = {
+    "flight_simulator": (f"effects:='{ACTUATORS}'",),
+    "identifier": (),
+    "exciter": ("watch:=true", "accuracy:=0.15"),
+    "fault_monitor": (),
+    "adaptive_controller": (),
+}
+
+
+@dataclass(frozen=True)
+class LoopScenario:
+    """The flight to simulate, and how it is controlled and identified."""
+
+    aircraft: Aircraft
+    name: str  # name or file of the aircraft, as the nodes receive it
+    fail: str  # the effect that begins at ONSET; "" = none
+    seconds: float
+    adapt: bool
+    turbulence: str
+    method: str
+    out: Path
+
+    @property
+    def effects_after_failure(self) -> str:
+        """The simulator's effects from ``ONSET`` on."""
+        return f"{ACTUATORS} {self.fail}" if self.fail else ACTUATORS
+
+    def check_effects(self) -> None:
+        """Raise InputError on effects that the simulator would refuse half a minute later."""
+        from sysid_node.sim import Simulator  # noqa: PLC0415  # JAX takes its time
+        from sysid_node.sim.flying import live  # noqa: PLC0415  # JAX takes its time
+
+        live.vector(Simulator(self.aircraft), self.effects_after_failure.split())
+
+    def arguments(self, node: str) -> list[str]:
+        """The command-line arguments of a node."""
+        parameters = [f"aircraft:={self.name}", *NODES[node]]
+        if node == "flight_simulator":
+            parameters.append(f"turbulence:={self.turbulence}")
+        if node == "identifier":
+            parameters.append(f"method:={self.method}")
+        if node == "adaptive_controller":
+            parameters.append(f"adapt:={str(self.adapt).lower()}")
+        return ["--ros-args", *(word for parameter in parameters for word in ("-p", parameter))]
+
+
+def set_points(time: float) -> dict[str, float]:
+    """Commanded roll and pitch (rad) at a time of the flight (s): steps."""
+    roll = (0.3, 0.0, -0.3, 0.0)[int(time / 4.0) % 4]
+    pitch = (0.16, 0.08, 0.03, 0.08)[int((time + 1.0) / 3.0) % 4]
+    return {"roll": roll, "pitch": pitch}
