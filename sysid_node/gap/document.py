@@ -1,4 +1,4 @@
-"""What gap.json holds of a diagnosis."""
+"""The content of gap.json, from a diagnosis."""
 
 from __future__ import annotations
 
@@ -48,20 +48,25 @@ def document(found: Diagnosis) -> dict[str, Any]:
 
 
 def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
-    """Effects that were tried alone, the one that predicts best first: label, probability that it is there, share.
+    """Effects that were fitted alone, the best first: label, probability that it is there, share of the probability.
 
-    Shares rank predictions of flight not fitted among one another, of derivatives within their tolerances ("none") too:
-    one of them is always the best, whatever is there. What neither passed as a cause nor was weighed in its stead
-    has no probability.
+    The shares rank how well the effects, and the derivatives within their tolerances ("none"), predict flight that was
+    not fitted; one of them is always the best. Only what was weighed as a cause, or as an alternative to one, has a
+    probability.
     """
     attribution = found.attribution
-    effects = {t.added.label: t.added.effect for t in attribution.first_stage if t.added}
+    effects = {each.added.label: each.added.effect for each in attribution.first_stage if each.added}
     weighed = (*attribution.doubted, *attribution.causes)
-    instead = {
-        e: share * calibrated_probability(cause.evidence) for cause in weighed for e, share in cause.alternatives
+    as_alternative = {
+        effect: share * calibrated_probability(cause.evidence)
+        for cause in weighed
+        for effect, share in cause.alternatives
     }
-    own = {cause.candidate.label: cause.probability for cause in weighed}
-    return [(label, own.get(label, instead.get(effects.get(label, ""))), p) for label, p in attribution.ranking]
+    as_cause = {cause.candidate.label: cause.probability for cause in weighed}
+    return [
+        (label, as_cause.get(label, as_alternative.get(effects.get(label, ""))), share)
+        for label, share in attribution.ranking
+    ]
 
 
 def _gap(gap: Gap) -> dict[str, Any]:
@@ -91,7 +96,7 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
 
 
 def _doubted(cause: Cause) -> dict[str, Any]:
-    """What predicts better, but is not named; its size in the explanation that it was part of."""
+    """A doubted effect, with its size in the explanation that it was part of."""
     return {
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
@@ -114,15 +119,19 @@ def _grounds(cause: Cause) -> dict[str, Any]:
 
 
 def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
-    """Value and standard error of each of a cause's parameters, in the simulator's units."""
-    simulator, places = fit.simulator, {index: place for place, index in enumerate(fit.indices)}
-    own = cause.candidate.indices
-    if not own:
-        ordered = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-        ordered += [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if not s]
+    """Value and standard error of each of a cause's parameters by name, in the simulator's units.
+
+    ``fit`` holds the cause. A cause that only widens the tolerances of derivatives has these as its parameters.
+    """
+    places = {index: place for place, index in enumerate(fit.indices)}
+    entries = cause.candidate.indices
+    if not entries:
+        nuisances = list(zip(fit.nuisances.indices, fit.nuisances.shared, strict=True))
+        ordered = [i for i, shared in nuisances if shared] + [i for i, shared in nuisances if not shared]
         places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
-        own = tuple(i for i in ordered if i in cause.candidate.widened)
-    errors, names = standard_errors(fit), {i: simulator.parameters[i][1].name for i in own}
+        entries = tuple(i for i in ordered if i in cause.candidate.widened)
+    errors = standard_errors(fit)
+    names = {i: fit.simulator.parameters[i][1].name for i in entries}
     return {
         name: with_standard_error(name, float(fit.flights[0].point[i]), float(errors[places[i]]))
         for i, name in names.items()

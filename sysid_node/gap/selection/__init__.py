@@ -1,7 +1,7 @@
 """Selection: which effects explain the residual, and how probable each is.
 
-Candidates are screened and fitted (``candidate_fitter``), added one by one (``forward_selection``) where they predict
-better and matter (``acceptance``), and held against their alternatives (``alternatives``). ``misspecification`` tests
-whether an effect's equation fits, ``calibration`` turns the evidence into a probability, and ``causes`` keeps what is
-probable. ``validation`` checks the result on flight that was not fitted.
+Candidates are screened (``screening``), fitted (``candidate_fitter``, ``onset``) and compared with the explanation
+without them (``comparison``). ``forward_selection`` adds those that ``acceptance`` accepts; ``alternatives`` replaces
+causes as ``replacement`` decides; ``causes`` keeps those that ``retention`` keeps, by a calibrated probability
+(``calibration``, ``misspecification``). ``validation`` then tests the explanation on flight that was not fitted.
 """

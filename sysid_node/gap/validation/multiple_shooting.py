@@ -1,11 +1,10 @@
-"""The simulator flown beside a flight, begun anew every few samples in the state that was measured.
+"""Multiple shooting: the simulator beside a flight, started again every few samples from the measured state.
 
-Short flights show the dynamics before drift hides them. Each begins with the velocity, attitude and rates that the
-instruments read there (through the zero-phase low-pass of ``flights``, the sensors' effects undone); actuators, motor,
-flow separation and the structure keep what they remember of the commands and of the flight before. The air in between
-is taken from the flight, too: it moves by what the air data show beyond the inertial instruments, integrated from the
-start of the short flight. So gusts, and the noise of the vanes with them, are an input of the simulator and not its
-error, and what a flow angle is off by is the simulator's own motion.
+Short flights show the dynamics before drift hides them. Each starts with the velocity, attitude and angular rates that
+the instruments measured there (low-passed with zero phase, the sensors' effects removed). Actuators, motor, flow
+separation and structure keep their states. The air moves as the air data show it beyond the inertial instruments,
+integrated from the start of the short flight. Gusts, and the vanes' noise with them, are thus an input of the simulator
+and not its error, and the error of a flow angle is that of the simulator's own motion.
 """
 
 from __future__ import annotations
@@ -31,13 +30,13 @@ from sysid_node.sim.stations import command
 
 
 class Course(NamedTuple):
-    """A flight to be flown beside, N samples at a constant rate."""
+    """A flight to be simulated, N samples at a constant rate."""
 
     motion: Motion
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     altitude: Scalar  # (N,) m, at which the standard air has the density that was measured
-    moving: Scalar  # (N, 3) velocity of the air that the air data do not show, m/s, and that the simulator is told of
-    turning: Scalar  # (N, 3) rotation of the air that the simulator is told of, rad/s
+    moving: Scalar  # (N, 3) velocity of the air that is added to what the air data show, m/s
+    turning: Scalar  # (N, 3) rotation of the air, rad/s
     begins: Scalar  # (N,) whether a short flight begins here
 
 
@@ -45,7 +44,7 @@ _ANGLES = tuple(OUTPUTS.index(name) for name in ("phi", "psi"))
 
 
 class _Start(NamedTuple):
-    """What a short flight may begin with, at every sample."""
+    """The state that a short flight would start with, at every sample."""
 
     begins: Scalar
     body: Scalar  # (13,)
@@ -54,9 +53,9 @@ class _Start(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """The simulator beside a flight, N samples, all at the time of the motion: readings, columns ``layout.OUTPUTS``.
+    """Readings of the simulator and of the flight, N samples at the time of the motion, columns ``layout.OUTPUTS``.
 
-    Where the parameters say that messages are late, the measured readings are moved.
+    Measured readings are shifted where the parameters say that messages are late.
     """
 
     simulated: Scalar  # (N, 12)
@@ -66,7 +65,7 @@ class Readings(NamedTuple):
 
 @partial(jax.jit, static_argnums=0)
 def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Readings:
-    """The simulator of parameters (P,) beside a flight; pure."""
+    """The readings with parameters (P,) beside a flight; a pure function of arrays, compiled."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
     samples = corrected_motion(chain, course.motion)
     arriving = command.arrive(chain.effects, course.commands, step)
@@ -82,7 +81,7 @@ def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scala
 def _advance(
     chain: Chain, carry: Carry, start: _Start, gusts: Scalar, command_: Scalar, next_gusts: Scalar, time: Scalar
 ) -> tuple[Carry, tuple[Scalar, ...]]:
-    """Begins anew where a short flight does, reads the instruments, and flies on to ``time``."""
+    """One sample: the start of a short flight where one begins, the readings, and the integration up to ``time``."""
 
     def fresh(new: Scalar, old: Scalar) -> Scalar:
         return jnp.where(start.begins, new, old)
@@ -99,15 +98,17 @@ def _advance(
 
 def _starts(samples: Sample, course: Course) -> _Start:
     """The measured state at every sample."""
-    place = jnp.zeros_like(course.altitude)
+    origin = jnp.zeros_like(course.altitude)
     attitude = quaternion(samples.attitude, jnp)
-    columns = (place, place, -course.altitude, *samples.velocity, *attitude, *samples.rates)
+    columns = (origin, origin, -course.altitude, *samples.velocity, *attitude, *samples.rates)
     return _Start(course.begins, jnp.stack(columns, 1), _previous(samples.flow), _previous(samples.probe))
 
 
 def _air(samples: Sample, begins: Scalar, step: Scalar) -> Scalar:
-    """Velocity of the air (N, 3) along body axes since the short flight began, m/s: what the integral of specific
-    force is ahead of the velocity that the air data show."""  # fmt: skip
+    """Velocity of the air (N, 3) along body axes since the short flight began, m/s.
+
+    It is the integral of specific force and gravity minus the velocity that the air data show.
+    """
     shown = jnp.stack(samples.velocity, 1)
 
     def integrate(held: Scalar, new: tuple[Sample, Sample, Scalar]) -> tuple[Scalar, Scalar]:
@@ -131,33 +132,38 @@ def _measured(chain: Chain, motion: Motion) -> Scalar:
 
 
 def _next(series: Scalar) -> Scalar:
+    """A series (N, ...) one sample later, its last sample twice."""
     return jnp.concatenate([series[1:], series[-1:]])
 
 
 def _previous(series: Scalar) -> Scalar:
+    """A series (N, ...) one sample earlier, its first sample twice."""
     return jnp.concatenate([series[:1], series[:-1]])
 
 
 def course_of(model: ResidualModel, size: int) -> Course:
-    """A view's flight, begun anew every ``size`` samples; padded as the view's signals are."""
+    """The course of a model's flight with short flights of ``size`` samples, padded as the model's signals are.
+
+    The flight must have attitude (``simulation_error.can_be_simulated``).
+    """
     given = model.given
     altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
     begins = jnp.arange(altitude.size) % size == 0
     still = jnp.zeros((altitude.size, 3))
-    assert given.motion is not None  # short flights are of flights with attitude (``flown``)
+    assert given.motion is not None
     return Course(given.motion, given.signals.commands, altitude, still, still, begins)
 
 
 def simulate_beside(model: ResidualModel, theta: Array, course: Course) -> tuple[Array, Array, Array]:
-    """Simulated (N, 12), measured (N, 12) and the air's motion (N, 3), as ``Beside`` has them, for parameters (P,)."""
+    """Simulated readings (N, 12), measured ones (N, 12) and the air's motion (N, 3), as in ``Readings``."""
     s, samples = model.simulator, len(model.record)
-    flown = fly(s.layout, s.model, jnp.asarray(theta), course, jnp.asarray(s.step))
-    simulated, measured, air = (np.asarray(series)[:samples] for series in flown)
+    readings = fly(s.layout, s.model, jnp.asarray(theta), course, jnp.asarray(s.step))
+    simulated, measured, air = (np.asarray(series)[:samples] for series in readings)
     return simulated, measured, air
 
 
 def simulation_error(model: ResidualModel, theta: Array, course: Course) -> Array:
-    """Measured minus simulated (N, 12); angles within half a turn."""
+    """Measured minus simulated readings (N, 12) for parameters (P,); angles within half a turn."""
     simulated, measured, _ = simulate_beside(model, theta, course)
     error: Array = measured - simulated
     error[:, _ANGLES] = (error[:, _ANGLES] + np.pi) % (2.0 * np.pi) - np.pi

@@ -1,10 +1,10 @@
-"""What a simulator with nothing wrong would be off by: the noise floor of short flights.
+"""The noise floor of short simulated flights, by simulation: the error of a simulator with nothing wrong.
 
-The simulator flies the flight itself, short flight by short flight, with the flight's commands, in air that moves as
-the air data show and turns as turbulence of that strength does (``sim.dryden``), and the sensors' noise is added to
-what it reads. Flown beside this record, the same simulator is off by what no model could avoid: noise in the readings,
-in the states that short flights begin with and in the motion of the air, and the air's rotation that no vane shows.
-Without vanes the air's motion across the flight path is not shown either.
+The simulator itself takes the place of the aircraft. It flies the flight's commands, short flight by short flight, in
+air that moves as the air data show and rotates as turbulence of that strength does (``sim.signals.dryden``), and the
+sensors' noise is added to its readings. Simulated beside this record, the same simulator has the error that no model
+can avoid: noise in the readings, in the initial states and in the motion of the air, and the air's rotation, which no
+vane measures. Without vanes the air's motion across the flight path is not measured either.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from sysid_node.gap.validation.multiple_shooting import Course, simulate_beside,
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import Dryden
 
-#: Flights of the simulator itself.
+#: Flights that are simulated.
 _REALISATIONS = 6
 
-#: Height over ground that the air's rotation is taken for, m: it matters little.
+#: Height above ground of the turbulence model, m. The result depends little on it.
 _HEIGHT = 100.0
 
-#: Clocks of what ``side_by_side`` gives at the time of the motion anyway.
+#: Clock errors that are neutral here: simulated readings are at the time of the motion.
 _CLOCKS = ("imu_delay.delay", "air_data_delay.delay")
 
 
 def noise_floor_errors(
     model: ResidualModel, theta: Array, course: Course, seed: int = 0
 ) -> Iterator[tuple[Array, Array]]:
-    """Errors (N, 12) of a few flights of parameters (P,), and the sensors' noise (N, 12) that was added."""
+    """For each of a few simulated flights of parameters (P,): its errors (N, 12), and the noise (N, 12) added to it."""
     random, prompt = np.random.default_rng(seed), theta.copy()
     prompt[[model.simulator.names.index(name) for name in _CLOCKS]] = 0.0
     _, _, shown = simulate_beside(model, theta, course)
@@ -44,23 +44,20 @@ def noise_floor_errors(
         again = resampled(with_added_noise(model, random), model.simulator.rate)
         added = {n: values - model.record[n] for n, values in again.columns.items()}
         noise = np.column_stack([added.get(name, np.zeros(len(model.record))) for name in OUTPUTS])
-        moving, turning = _hidden_air(model, course, shown, noise, random)
-        own, _, _ = simulate_beside(
-            model, prompt, course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning))
-        )
-        yield (
-            simulation_error(model, prompt, _recorded(model, course, own - _unseen(model, moving) + noise, added)),
-            noise,
-        )
+        moving, turning = _unmeasured_air(model, course, shown, noise, random)
+        air = course._replace(moving=jnp.asarray(moving), turning=jnp.asarray(turning))
+        readings, _, _ = simulate_beside(model, prompt, air)
+        readings = readings - _flow_angles_of(model, moving) + noise
+        yield simulation_error(model, prompt, _recorded(model, course, readings, added)), noise
 
 
-def _hidden_air(
+def _unmeasured_air(
     model: ResidualModel, course: Course, shown: Array, noise: Array, random: np.random.Generator
 ) -> tuple[Array, Array]:
     """Velocity (m/s) and rotation (rad/s) of the air, (N, 3) each along body axes, that the air data do not show.
 
-    Turbulence (``sim.dryden``) as strong as the air data show that there is, (N, 3) m/s. What counts is motion within a
-    short flight: slower air does not turn. The air data's noise moves no air.
+    A realisation of turbulence, as strong as the motion that the air data show within the short flights (N, 3), less
+    what the air data's noise (N, 12) adds to it.
     """
     dryden, speed = Dryden.at(_HEIGHT, model.simulator.aircraft.geometry.b), float(model.record["V"].mean())
     gusts = dryden.realisation(course.altitude.size, model.simulator.rate, speed, random)
@@ -75,19 +72,20 @@ def _hidden_air(
     return gusts[:, :3] * across, gusts[:, 3:]
 
 
-def _unseen(model: ResidualModel, moving: Array) -> Array:
-    """What air that moves so (N, 3) does to readings (N, 12) of the flow angles, and what no vane reads."""
+def _flow_angles_of(model: ResidualModel, moving: Array) -> Array:
+    """Changes of the readings (N, 12) of the flow angles by air that moves at (N, 3) m/s and that no vane measures."""
     angles = np.zeros((len(model.record), len(OUTPUTS)))
     angles[:, [OUTPUTS.index("beta"), OUTPUTS.index("alpha")]] = -moving[: len(angles), 1:] / model.record["V"][:, None]
     return angles
 
 
 def _power(velocity: Array) -> float:
+    """Mean square (m^2/s^2) of a velocity (N, K)."""
     return float((velocity**2).sum(axis=1).mean())
 
 
 def _recorded(model: ResidualModel, course: Course, readings: Array, noise: dict[str, Array]) -> Course:
-    """Readings (N, 12) as the instruments would have recorded them, with the commands as noisy as the flight's."""
+    """The course with simulated readings (N, 12) as measured, and with the noise of the commands."""
     turning = _rates_of_change(readings[:, 3:6], np.asarray(course.begins), model.simulator.step)
     symbols = [*model.simulator.layout.symbols, *(["thrust"] if model.simulator.aircraft.throttle else [])]
     commands = np.asarray(course.commands).copy()
@@ -99,7 +97,7 @@ def _recorded(model: ResidualModel, course: Course, readings: Array, noise: dict
 
 
 def _rates_of_change(rates: Array, begins: Array, step: float) -> Array:
-    """d/dt (N, 3) of rates (N, 3) that jump where short flights begin."""
+    """Derivatives with time (N, 3) of angular rates (N, 3) that jump where short flights begin."""
     starts = np.flatnonzero(begins[: len(rates)])
     pieces = [p for p in np.split(rates, starts[1:]) if len(p)]
     return np.concatenate([np.gradient(p, step, axis=0) if len(p) > 1 else np.zeros_like(p) for p in pieces])

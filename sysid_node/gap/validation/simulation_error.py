@@ -1,9 +1,9 @@
-"""How far off the simulator is when it is flown beside the flight, and how far that shrinks: errors of short flights.
+"""The gap in the time domain: errors of short simulated flights, beside their noise floor.
 
-Error of a reading: root mean square of simulated minus measured, over the root mean square of the measured motion about
-its mean in each short flight. Overall: the root mean square over the readings that moved. The noise floor is what a
-simulator with nothing wrong would leave (``unavoidable``). Intervals: block bootstrap over the short flights (Kuensch
-(1989), Annals of Statistics 17(3)).
+The error of a reading is the root mean square of simulated minus measured, over the root mean square of the measured
+motion about its mean in each short flight. The overall error is the root mean square over the readings that moved. The
+noise floor is the error of a simulator with nothing wrong (``noise_floor``). Intervals are by a block bootstrap over
+the short flights (Kuensch (1989), Annals of Statistics 17(3)).
 """
 
 from __future__ import annotations
@@ -27,21 +27,24 @@ from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
 from sysid_node.gap.validation.standing import weather_accounts_for
 from sysid_node.sim.model.layout import OUTPUTS
 
-#: Length of a short flight, s: a short period or two of a small aircraft, over before drift counts.
+#: Length of a short flight, s: one or two short periods of a small aircraft, too short for drift to matter.
 WINDOW = 2.0
 
-#: Readings that are compared: heading only repeats the yaw rate.
+#: Readings that are compared. Heading is left out, because it is the integral of the yaw rate.
 READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
 
 _COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
 
-#: Bootstrap draws, and short flights in a row that are drawn together.
+#: Bootstrap draws, and length of a block in short flights.
 _DRAWS, _BLOCK = 2000, 2
 
 
 @dataclass(frozen=True)
 class SideBySide:
-    """A flight and the simulator beside it, N samples: readings (N, 12), columns ``layout.OUTPUTS``."""
+    """A flight and its simulation, N samples: readings (N, 12) as measured, by the file and as corrected.
+
+    Columns are ``sim.model.layout.OUTPUTS``; ``begins`` (N,) marks where short flights begin.
+    """
 
     time: Array  # s
     measured: Array
@@ -51,9 +54,10 @@ class SideBySide:
 
 
 def simulation_gap(base: Evidence, final: Evidence) -> Gap | None:
-    """The gap on the flights of some evidence.
+    """The gap of short simulated flights, on the flights of evidence without and with the causes.
 
-    None without attitude, where no flight is long enough, or where the simulator departs within a short flight.
+    None without attitude, where no flight is long enough, where the simulator diverges within a short flight, or where
+    no reading moved.
     """
     pairs = list(zip(base.flights, final.flights, strict=True))
     simulated = [pair for pair in pairs if can_be_simulated(pair[0].model)]
@@ -73,9 +77,9 @@ def simulation_gap(base: Evidence, final: Evidence) -> Gap | None:
 
 
 def weather_suffices(models: Sequence[ResidualModel]) -> bool:
-    """Whether the file's own simulator, in such air and with such sensors, would be off as far in every reading.
+    """Whether weather and the sensors' noise account for the error of the file's own simulator in every reading.
 
-    Then there is nothing to blame, however well an effect would mimic the weather.
+    Then no effect is a cause, however well it imitates the weather.
     """
     tables = [_table(v, *[[v.simulator.neutral()] * len(window_groups(v))] * 2) for v in models if can_be_simulated(v)]
     if not tables or not all(np.isfinite(table).all() for table in tables):
@@ -85,12 +89,12 @@ def weather_suffices(models: Sequence[ResidualModel]) -> bool:
 
 
 def can_be_simulated(model: ResidualModel) -> bool:
-    """Whether a flight can be flown beside: its attitude was measured, and it is long enough."""
+    """Whether short flights can be simulated: attitude was measured, and the flight is long enough."""
     return motion_of(model.record) is not None and len(model.record) >= _size(model)
 
 
 def side_by_side(model: ResidualModel, points: Sequence[Array]) -> SideBySide:
-    """A flight with the file's simulator and the corrected one beside it; ``points`` by group of windows."""
+    """A flight with its simulation by the file and as corrected; ``points`` are parameters (P,) by group of windows."""
     course, neutral = course_of(model, _size(model)), model.simulator.neutral()
     _, measured, _ = simulate_beside(model, neutral, course)
     before, after = (measured - e for e in (simulation_error(model, neutral, course), _errors(model, points, course)))
@@ -98,24 +102,23 @@ def side_by_side(model: ResidualModel, points: Sequence[Array]) -> SideBySide:
 
 
 def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:
-    """Of motion (S, R) and errors (3 + K, S, R), mean squares by short flight and reading.
+    """The gap from mean squares of motion (S, R) and errors (3 + K, S, R) by short flight and reading.
 
-    The last K are what as many flights of the simulator itself leave. What noise leaves of this flight is one more like
-    them, no one knows which: so each draw takes one.
+    The last K errors are those of as many flights for the noise floor. Each bootstrap draw uses another one of them.
     """
     whole = _shares(motion, np.concatenate([errors[:3], errors[3:].mean(axis=0, keepdims=True)]))
     random = np.random.default_rng(0)
     overall, draws = _overall(whole), list[Array]()
-    centred = np.append(np.ones(3), _floored(overall)[3] / overall[3])  # draws scatter about what is stated
+    centred = np.append(np.ones(3), _floored(overall)[3] / overall[3])  # draws scatter about the stated value
     for windows in _blocks(len(motion), random):
         taken = errors[[0, 1, 2, int(random.integers(3, len(errors)))]]
         draws.append(_floored(centred * _overall(_shares(motion[windows], taken[:, windows]))))
-    own = {name: dict(zip(STAGES, _floored(whole[:, r]).tolist(), strict=True)) for r, name in enumerate(names)}
-    return gap_from(_floored(overall), np.array(draws), own)
+    by_reading = {name: dict(zip(STAGES, _floored(whole[:, r]).tolist(), strict=True)) for r, name in enumerate(names)}
+    return gap_from(_floored(overall), np.array(draws), by_reading)
 
 
 def _floored(errors: Array) -> Array:
-    """Errors (4,): what is left cannot be less than the floor, so the floor cannot be more."""
+    """Errors (4,) whose last, the noise floor, is at most the smallest of the others."""
     return np.append(errors[:3], errors.min())
 
 
@@ -125,21 +128,22 @@ def _shares(motion: Array, errors: Array) -> Array:
 
 
 def _overall(shares: Array) -> Array:
+    """Root mean square over the readings (..., R)."""
     return np.asarray(np.sqrt((shares**2).mean(axis=-1)))
 
 
 def _blocks(count: int, random: np.random.Generator) -> NDArray[np.intp]:
-    """Draws (D, count) of short flights, a few in a row together; the last are followed by the first."""
+    """Indices (D, count) of short flights in blocks; the last short flight is followed by the first."""
     size = min(_BLOCK, count)
     starts = random.integers(count, size=(_DRAWS, -(-count // size)))
     return np.asarray((starts[..., None] + np.arange(size)).reshape(_DRAWS, -1)[:, :count] % count)
 
 
 def _table(model: ResidualModel, base: Sequence[Array], final: Sequence[Array]) -> Array:
-    """Mean squares (5 + K, S, R) by short flight.
+    """Mean squares (5 + K, S, R) by short flight and reading.
 
-    Of the motion, of the sensors' noise, of the errors of the file, of the derivatives within their tolerances and with
-    the causes, and of what is left of each of K flights of the simulator itself.
+    They are those of the motion, of the sensors' noise, of the errors by the file, with the fitted derivatives
+    (``base``) and with the causes (``final``), and of the errors of K flights for the noise floor.
     """
     course, neutral = course_of(model, _size(model)), model.simulator.neutral()
     measured = _cut(model, simulate_beside(model, neutral, course)[1])
@@ -151,24 +155,24 @@ def _table(model: ResidualModel, base: Sequence[Array], final: Sequence[Array]) 
 
 
 def _errors(model: ResidualModel, points: Sequence[Array], course: Course) -> Array:
-    """Measured minus simulated (N, 12), each short flight with the parameters that it was not fitted to."""
+    """Measured minus simulated (N, 12), each short flight with the parameters of its group of windows."""
     size, windows = _size(model), model.windows
     edges = [windows.slices[group[0]].start + windows.size / 4 for group in window_groups(model)][1:]
     middles = np.arange(len(model.record)) // size * size + size // 2
-    owner = np.searchsorted(np.array(edges), middles, side="right")
+    group_of = np.searchsorted(np.array(edges), middles, side="right")
     error = np.empty((len(model.record), len(OUTPUTS)))
-    for mine, theta in _distinct(points):
-        chosen = np.isin(owner, mine)
+    for groups, theta in _distinct(points):
+        chosen = np.isin(group_of, groups)
         error[chosen] = simulation_error(model, theta, course)[chosen]
     return error
 
 
 def _distinct(points: Sequence[Array]) -> list[tuple[list[int], Array]]:
-    """Points that differ, each with the places where it stands."""
+    """Distinct parameters (P,), each with the indices of the groups that have them."""
     places: dict[bytes, list[int]] = {}
     for place, point in enumerate(points):
         places.setdefault(np.ascontiguousarray(point).tobytes(), []).append(place)
-    return [(own, points[own[0]]) for own in places.values()]
+    return [(groups, points[groups[0]]) for groups in places.values()]
 
 
 def _size(model: ResidualModel) -> int:

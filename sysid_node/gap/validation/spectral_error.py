@@ -1,7 +1,8 @@
-"""How far the gap shrinks: the simulator's error on flight not fitted, before and after, beside what noise leaves.
+"""The gap by frequency: errors of forces, moments and kinematics on flight not fitted, beside their noise floor.
 
 The error of a channel is the root of its residual's power, up to 4 Hz, over the power of its motion about the mean, in
-windows of ``spectra.LENGTH`` seconds; all channels that were moved count alike.
+the windows of ``residuals.windowed_spectra``. All channels that moved count alike. Intervals are by a bootstrap over
+groups of windows.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
@@ -18,8 +20,8 @@ from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex, power_of
 from sysid_node.gap.thresholds import THRESHOLDS
 
+#: Bootstrap draws.
 _DRAWS = 2000
-
 
 #: The errors of a gap, in order.
 STAGES = ("before", "tolerances", "after", "noise_floor")
@@ -29,10 +31,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Gap:
-    """Root-mean-square errors as shares of what was measured, overall and by channel, with 95 % intervals."""
+    """Root-mean-square errors as shares of the measured motion, overall and by channel, with 95 % intervals."""
 
     before: float
-    tolerances: float  # with derivatives and biases fitted within their tolerances, no effect
+    tolerances: float  # with derivatives and biases fitted within their tolerances, without causes
     after: float
     noise_floor: float
     shrink_percent: float
@@ -41,51 +43,72 @@ class Gap:
     intervals: dict[str, Interval]  # of the four errors, by name
 
 
+@dataclass(frozen=True)
+class _Powers:
+    """Powers by group of windows (G, 12): of the motion, of the sensors' noise, and of the errors (3, G, 12)."""
+
+    measured: Array
+    noise: Array
+    errors: Array  # by the file, by the fitted derivatives, with the causes
+    counted: NDArray[np.bool_]  # (12,) channels that moved
+
+    def table(self, structure: Array) -> Array:
+        """Powers (4, G, 12) of the errors and of the noise floor, where a share (12,) of what is left is structure."""
+        before, tolerances, after = self.errors
+        floor = np.minimum(np.maximum(self.noise, after * (1.0 - structure)), np.minimum(before, tolerances))
+        return np.stack([*self.errors, floor])
+
+    def overall(self, weight: Array, structure: Array) -> Array:
+        """Overall errors (4,) at weights (G,) of the groups."""
+        measured = np.maximum((self.measured * weight[:, None]).sum(axis=0), 1e-300)
+        shares = (self.table(structure) * weight[:, None]).sum(axis=1) / measured
+        return np.asarray(np.sqrt(shares[:, self.counted].mean(axis=1))) if self.counted.any() else np.zeros(4)
+
+    def by_channel(self, structure: Array) -> dict[str, dict[str, float]]:
+        """Errors by channel that moved, and by stage."""
+        errors = np.sqrt(self.table(structure).sum(axis=1) / np.maximum(self.measured.sum(axis=0), 1e-300))
+        columns = {name: errors[:, k].tolist() for k, name in enumerate(CHANNELS) if self.counted[k]}
+        return {name: dict(zip(STAGES, column, strict=True)) for name, column in columns.items()}
+
+
 def gap_of(base: Evidence, after: Evidence, left: OveridentificationTest) -> Gap:
     """The gap on flights not fitted: as the aircraft file, the fitted derivatives and the explanation predict them."""
+    powers = _powers_of(base, after)
+    structure, groups = np.clip(left.share, 0.0, 1.0), len(powers.measured)
+    overall = powers.overall(np.ones(groups), structure)
+    return gap_from(overall, _bootstrap(powers.overall, left, groups), powers.by_channel(structure))
+
+
+def _powers_of(base: Evidence, after: Evidence) -> _Powers:
+    """Powers of the flights of evidence without and with the causes."""
     models = [flight.model for flight in base.flights]
     groups = [(model, group) for model in models for group in window_groups(model)]
     measured = np.array([(np.abs(model.measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for model, g in groups])
     noise = np.array([len(g) * (model.noise.sum(axis=0) - 0.5 * model.noise[0]) for model, g in groups])
     before = [model.residual(model.simulator.neutral()) for model in models]
     fitted = ([flight.residual for flight in evidence.flights] for evidence in (base, after))
-    stages = [_powers(residuals, models) for residuals in (before, *fitted)]
-    counted = models[0].axes & (measured.sum(axis=0) > THRESHOLDS.validation.motion * noise.sum(axis=0))
-
-    def errors(weight: Array, share: Array) -> Array:
-        """Overall errors (4,) at weights (G,) of the groups, where such a share (12,) of the remainder is structure."""
-        floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - share)), np.minimum(stages[0], stages[1]))
-        table = np.stack([*stages, floor])  # (4, groups, 12)
-        shares = (table * weight[:, None]).sum(axis=1) / np.maximum((measured * weight[:, None]).sum(axis=0), 1e-300)
-        return np.asarray(np.sqrt(shares[:, counted].mean(axis=1))) if counted.any() else np.zeros(4)
-
-    all_equal, structured = np.ones(len(groups)), np.clip(left.share, 0.0, 1.0)
-    overall = errors(all_equal, structured)
-    drawn = _bootstrap(errors, left, len(groups))
-    floor = np.minimum(np.maximum(noise, stages[2] * (1.0 - structured)), np.minimum(stages[0], stages[1]))
-    table = np.stack([*stages, floor])
-    own = np.sqrt(table.sum(axis=1) / np.maximum(measured.sum(axis=0), 1e-300))
-    channels = {c: dict(zip(STAGES, own[:, k].tolist(), strict=True)) for k, c in enumerate(CHANNELS) if counted[k]}
-    return gap_from(overall, drawn, channels)
+    errors = np.array([_powers(residuals, models) for residuals in (before, *fitted)])
+    moved = measured.sum(axis=0) > THRESHOLDS.validation.motion * noise.sum(axis=0)
+    return _Powers(measured, noise, errors, models[0].axes & moved)
 
 
-def gap_from(overall: Array, drawn: Array, channels: dict[str, dict[str, float]]) -> Gap:
-    """Of the errors (4,), draws (D, 4) of these, and those of each channel."""
+def gap_from(overall: Array, draws: Array, channels: dict[str, dict[str, float]]) -> Gap:
+    """The gap of the overall errors (4,), with bootstrap draws (D, 4) of them, and the errors by channel."""
     values = dict(zip(STAGES, overall.tolist(), strict=True))
-    intervals = {name: interval(drawn[:, k]) for k, name in enumerate(STAGES)}
+    intervals = {name: interval(draws[:, k]) for k, name in enumerate(STAGES)}
     shrink = float(shrinkage(overall))
-    return Gap(**values, shrink_percent=shrink, ci95=interval(shrinkage(drawn)), per_channel=channels,
+    return Gap(**values, shrink_percent=shrink, ci95=interval(shrinkage(draws)), per_channel=channels,
                intervals=intervals)  # fmt: skip
 
 
-def interval(drawn: Array) -> Interval:
-    """95 % of draws (D,)."""
-    low, high = np.percentile(drawn, [2.5, 97.5]).tolist()
+def interval(draws: Array) -> Interval:
+    """Ends of the 95 % interval of draws (D,)."""
+    low, high = np.percentile(draws, [2.5, 97.5]).tolist()
     return low, high
 
 
 def _bootstrap(errors: Callable[[Array, Array], Array], left: OveridentificationTest, groups: int) -> Array:
-    """Errors (D, 4) in bootstraps of the groups, the structure left as uncertain as chance makes it."""
+    """Errors (D, 4) by a bootstrap over the groups; the share of structure is drawn within its standard deviation."""
     random = np.random.default_rng(0)
     draws = random.multinomial(groups, np.ones(groups) / groups, _DRAWS)
     shares = left.beyond + random.standard_normal((_DRAWS, left.chance.size)) * left.chance
@@ -94,10 +117,7 @@ def _bootstrap(errors: Callable[[Array, Array], Array], left: Overidentification
 
 
 def shrinkage(errors: Array) -> Array:
-    """Percent (...,) of what could be closed that is, of errors (..., 4).
-
-    Nothing could where the gap is not above the floor.
-    """
+    """Shrinkage (...,) of errors (..., 4), in percent of what lies above the noise floor; 0 where nothing does."""
     before, _, after, floor = np.moveaxis(errors, -1, 0)
     room = before - floor
     open_ = room > 1e-9 * floor

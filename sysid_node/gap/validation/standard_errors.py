@@ -1,13 +1,13 @@
-"""Standard errors that take neither the remainder's word for being noise, nor the model for the aircraft.
+"""Standard errors of the sizes that allow for a remainder that is no noise, and for a model that is not exact.
 
-White in its own spectrum, the remainder would make the inverse of the information the covariance. What the model lacks
-repeats itself from window to window instead; so what groups of windows alone would change is summed, and its scatter
-from group to group is taken where it is more (White (1982), Econometrica 50(1); by clusters: Liang & Zeger (1986),
-Biometrika 73(1)).
+If the remainder were noise with its own spectrum, the inverse of the information would be the covariance. What the
+model lacks repeats itself from window to window instead. So the change that each group of windows alone would make is
+computed, and its scatter from group to group is taken where that is more (White (1982), Econometrica 50(1); by
+clusters: Liang & Zeger (1986), Biometrika 73(1)).
 
-What an aircraft has beside the effects of the list moves a size alike in every window, and no scatter shows it. So a
-size is off by a share of itself, too, which is learned from plants of another make (``bench/gap_sizes.py``; a
-discrepancy of the model: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63(3)).
+What an aircraft has beside the effects of the list may change a size in the same way in every window, which no scatter
+shows. A size is therefore also uncertain by a share of itself, which ``bench/gap_sizes.py`` learned from aircraft that
+are not the simulator's (a discrepancy of the model: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63(3)).
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from sysid_node.gap.thresholds import THRESHOLDS
 
 
 def with_standard_error(name: str, value: float, error: float) -> list[float]:
-    """A parameter's value and its standard error by chance and by the model together; a moment in time is no size."""
+    """A parameter's value, and its standard error by chance (``error``) and by the model together.
+
+    An onset is a time and no size: its standard error is that by chance.
+    """
     return [value, error if name == "onset" else float(np.hypot(error, THRESHOLDS.validation.discrepancy * value))]
 
 
 def standard_errors(fit: CandidateFit) -> Array:
-    """Of all unknowns (unknowns,) by chance alone, of a fit as ``sizes.unbiased`` leaves it."""
+    """Standard errors (unknowns,) by chance alone, of a fit of ``instruments.liml.liml_estimate``."""
     steps = np.array([part[group].sum(axis=0) for model, part in zip(fit.models, influence(fit), strict=True)
                       for group in window_groups(model)])  # fmt: skip
     steps = steps - steps.mean(axis=0)

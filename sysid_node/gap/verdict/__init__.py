@@ -1,6 +1,6 @@
-"""Verdict: what the numbers of selection and validation mean.
+"""Verdict: what the scores of selection and validation mean.
 
-``decision`` says it in one of five words, ``localisation`` says where in the simulator's chain and when the gap lies.
-``next_flight`` proposes the manoeuvre that would best separate the remaining candidates. ``diagnose`` puts all three
-into its result.
+``measurement`` fills the table of scores, and ``decision`` decides from it on one of five words. ``localisation`` says
+where in the simulator's chain and when the gap lies, and ``next_flight`` proposes the manoeuvre that would best
+separate the effects that are still confused. ``diagnose`` puts all of it into its result.
 """

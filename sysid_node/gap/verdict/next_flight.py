@@ -1,9 +1,9 @@
-"""What to fly next: of a handful of manoeuvres, the one that parts most what this flight confuses.
+"""What to fly next: of a few manoeuvres, the one that best separates the effects that this flight confuses.
 
-Each is flown by the simulator as it was corrected, in still air. The separation of a cause from a rival is what stays
-of the cause's response, in standard deviations of the sensors' noise, when the rival, the derivatives within their
-tolerances and the biases have mimicked it as well as they can (the distance between two models that is left to an
-experiment: Atkinson & Fedorov (1975), Biometrika 62(1), linearised).
+Each manoeuvre is flown by the corrected simulator in still air. The separation of a cause from an alternative is what
+is left of the cause's response, in standard deviations of the sensors' noise, after the alternative, the derivatives
+within their tolerances and the biases were fitted to it (the distance between two models, linearised: Atkinson &
+Fedorov (1975), Biometrika 62(1)).
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.forward_selection import Attribution
-from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import Conditions, fly_sortie
 
 #: Amplitude of the proposed deflections, as a share of each surface's limit, unless the words say otherwise.
 _USUAL = 0.2
 
-#: Words, shape, width or length (s), share of the usual amplitude, whether the throttle is stepped too.
+#: Manoeuvres in words, shape, width (s), share of the usual amplitude, and whether the throttle is stepped, too.
 _PROPOSALS = (
     ("3-2-1-1 on each surface in turn", "3211", 0.3, 1.0, False),
     ("quick 3-2-1-1 on each surface in turn, 0.12 s the shortest step", "3211", 0.12, 1.2, False),
@@ -46,16 +46,16 @@ _PROPOSALS = (
     ("3-2-1-1 on each surface in turn while the throttle is stepped up and down", "3211", 0.3, 1.0, True),
 )
 
-#: What to fly where no pair of effects is in doubt.
+#: What to fly where no pair of effects is confused.
 _LARGER = "3-2-1-1 on each surface in turn, larger and at two airspeeds, in still air"
 
-#: Amplitude of the throttle's steps, of full throttle.
+#: Amplitude of the throttle's steps, as a share of full throttle.
 _THROTTLE_STEP = 0.25
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A manoeuvre in words, and the least separation (sigmas) of any pair; that of the flight that was flown."""
+    """A manoeuvre in words, the least separation (sigmas) of any pair of effects by it, and by the flight flown."""
 
     words: str
     separation: float
@@ -63,33 +63,36 @@ class Proposal:
 
 
 def advice(verdict: str, attribution: Attribution) -> str:
-    """What to fly, by what is in doubt."""
-    if verdict == "no_gap":
+    """What to fly next, in words; empty where nothing is in doubt."""
+    pairs = [(cause.candidate, each.fit) for cause in attribution.causes for each in _confused(cause)]
+    best = propose(attribution.chosen.fit, pairs) if pairs and verdict != "no_gap" else None
+    return advice_in_words(verdict, _listed(attribution) if pairs else "", best)
+
+
+def advice_in_words(verdict: str, confused: str, best: Proposal | None, thresholds: Thresholds = THRESHOLDS) -> str:
+    """The words for a verdict, the effects that are ``confused`` (empty where none are) and the best proposal."""
+    if verdict == "no_gap" or (verdict == "explained" and not confused):
         return ""
-    pairs = [(cause.candidate, rival.fit) for cause in attribution.causes for rival in _confused(cause)]
-    if not pairs:
-        return "" if verdict == "explained" else _LARGER
-    best = propose(attribution.chosen.fit, pairs)
     if best is None:
         return _LARGER
-    if best.separation < THRESHOLDS.verdict.separated:
+    if best.separation < thresholds.verdict.separated:
         return (
-            f"no manoeuvre parts {_listed(attribution)} (at most {best.separation:.2g} standard deviations): what they "
+            f"no manoeuvre parts {confused} (at most {best.separation:.2g} standard deviations): what they "
             "do in flight is the same; measure on the ground"
         )
     if best.separation <= best.flown:
         return (
-            f"the same again, longer and in still air: no other manoeuvre parts {_listed(attribution)} better than "
+            f"the same again, longer and in still air: no other manoeuvre parts {confused} better than "
             f"those flown ({best.flown:.3g} standard deviations of the sensors' noise)"
         )
     return (
-        f"{best.words}, in still air: parts {_listed(attribution)} by {best.separation:.3g} standard deviations or "
+        f"{best.words}, in still air: parts {confused} by {best.separation:.3g} standard deviations or "
         f"more, the manoeuvres flown by {best.flown:.3g}"
     )
 
 
 def _listed(attribution: Attribution) -> str:
-    """The causes in doubt and what is named beside them."""
+    """The causes beside which alternatives are named, and these, with commas between."""
     doubtful = [cause for cause in attribution.causes if named(cause)]
     return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause))))
 
@@ -100,16 +103,16 @@ def named(cause: Cause) -> list[str]:
 
 
 def _confused(cause: Cause) -> list[FittedSet]:
-    """The best trial of each effect that is named beside a cause."""
+    """The first fitted set of each effect that is named beside a cause."""
     best: dict[str, FittedSet] = {}
-    for trial in cause.alternative_sets:
-        if trial.added is not None and trial.added.effect in named(cause):
-            best.setdefault(trial.added.effect, trial)
+    for fitted in cause.alternative_sets:
+        if fitted.added is not None and fitted.added.effect in named(cause):
+            best.setdefault(fitted.added.effect, fitted)
     return list(best.values())
 
 
 def propose(fit: CandidateFit, pairs: Sequence[tuple[Candidate, CandidateFit]]) -> Proposal | None:
-    """The best of the proposals for pairs of a cause and the fit of its rival; None where none can be flown."""
+    """The best of the proposals for pairs of a cause and the fit of an alternative; none where none can be flown."""
     model = fit.models[0]
     flown = min(_separation(model, fit.flights[0].point, *pair, fit) for pair in pairs)
     found: list[Proposal] = []
@@ -117,13 +120,13 @@ def propose(fit: CandidateFit, pairs: Sequence[tuple[Candidate, CandidateFit]]) 
         try:
             planned = _flown(model, fit, _specs(model, shape, width, share, throttle))
         except InputError:
-            continue  # beyond a limit, or it diverges: not a flight to propose
+            continue  # it exceeds a limit of the aircraft file, or diverges
         found.append(Proposal(words, min(_separation(planned, fit.flights[0].point, *p, fit) for p in pairs), flown))
     return max(found, key=lambda proposal: proposal.separation, default=None)
 
 
 def _specs(model: ResidualModel, shape: str, width: float, share: float, throttle: bool) -> list[str]:
-    """The manoeuvre as ``sysid excite`` takes it: surfaces in turn, every twelve seconds again."""
+    """The manoeuvre as arguments of ``sysid excite``: every four seconds the next surface, until the flight ends."""
     aircraft, duration = model.simulator.aircraft, model.record.duration
     surfaces = list(aircraft.controls)
     every = 4.0 * len(surfaces)
@@ -141,7 +144,7 @@ def _specs(model: ResidualModel, shape: str, width: float, share: float, throttl
 
 
 def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> ResidualModel:
-    """The manoeuvre as the corrected simulator flies it in still air, seen as the flight was. Raises InputError."""
+    """The residual model of the manoeuvre as the corrected simulator flies it in still air. Raises InputError."""
     simulator, record = model.simulator, model.record
     plan = parse_manoeuvre(specs, simulator.aircraft, simulator.rate, record.duration)
     deflections = np.zeros((len(record), len(simulator.commands)))
@@ -159,11 +162,12 @@ def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> Residua
 
 
 def _symbols(simulator: Simulator) -> tuple[str, ...]:
+    """Names of the simulator's commands, as columns of a record."""
     return (*simulator.layout.symbols, "thrust")
 
 
 def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
-    """The effects of a parameter vector that do something, but the sensors' biases."""
+    """The effects that act at parameters (P,), with their parameters within their bounds."""
     neutral, found = simulator.neutral(), dict[str, dict[str, float]]()
     acting = {e for i, (e, p) in enumerate(simulator.parameters) if p.switch and point[i] != neutral[i]}
     for i, (effect, parameter) in enumerate(simulator.parameters):
@@ -172,21 +176,21 @@ def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
     return found
 
 
-def _separation(model: ResidualModel, point: Array, cause: Candidate, rival: CandidateFit, fit: CandidateFit) -> float:
-    """Of a cause's response from the nearest that its rival and the nuisances can do, in standard deviations."""
-    neutral = model.simulator.neutral()
-    own = list(cause.entries)
-    without, instead = point.copy(), point.copy()
-    without[own] = neutral[own]
-    instead[own] = neutral[own]
-    added = [i for i in rival.indices if i not in fit.indices]
-    instead[added] = rival.flights[0].point[added]
+def _separation(
+    model: ResidualModel, point: Array, cause: Candidate, alternative: CandidateFit, fit: CandidateFit
+) -> float:
+    """Distance (sigmas) of a cause's response at parameters (P,) from the nearest by an alternative and nuisances."""
+    neutral, entries = model.simulator.neutral(), list(cause.entries)
+    instead = point.copy()
+    instead[entries] = neutral[entries]
+    added = [i for i in alternative.indices if i not in fit.indices]
+    instead[added] = alternative.flights[0].point[added]
     weight = weights(model.windows, np.where(model.axes, model.noise, 1.0))
     response = real_rows(model.predicted(point) - model.predicted(instead), weight).ravel()
-    moving = [*added, *(i for i in fit.nuisances.indices if i not in own)]
-    slopes = real_rows(model.slopes(instead, moving), weight).reshape(response.size, -1)
+    free = [*added, *(i for i in fit.nuisances.indices if i not in entries)]
+    slopes = real_rows(model.slopes(instead, free), weight).reshape(response.size, -1)
     known = dict(zip(fit.nuisances.indices, fit.nuisances.sigma, strict=True))
-    sigma = np.array([*prior(model.simulator, added)[1], *(known[i] for i in moving[len(added) :])])
+    sigma = np.array([*prior(model.simulator, added)[1], *(known[i] for i in free[len(added) :])])
     matrix = np.vstack([slopes, np.diag(1.0 / sigma)])
     target = np.concatenate([response, np.zeros(sigma.size)])
     best = np.linalg.lstsq(matrix, target, rcond=None)[0]

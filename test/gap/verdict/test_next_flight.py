@@ -8,7 +8,7 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, un
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.verdict.next_flight import propose
+from sysid_node.gap.verdict.next_flight import Proposal, advice_in_words, propose
 from sysid_node.sim import Simulator
 
 
@@ -34,3 +34,24 @@ def test_a_lag_and_a_delay_are_parted_by_some_flight(fits) -> None:
     best = propose(chosen, [(chosen.candidates[0], fits["actuator_lag"])])
     assert best is not None and best.separation > 3.0
     assert np.isfinite(best.flown)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "confused", "best", "words"),
+    [
+        ("no_gap", "", None, ""),
+        ("no_gap", "a, b", Proposal("a sweep", 9.0, 1.0), ""),
+        ("explained", "", None, ""),
+        ("unknown_effect", "", None, "larger and at two airspeeds"),
+        ("unsupported", "", None, "larger and at two airspeeds"),
+        ("ambiguous", "a, b", None, "larger and at two airspeeds"),  # none can be flown
+        ("ambiguous", "a, b", Proposal("a sweep", 2.9, 1.0), "measure on the ground"),
+        ("ambiguous", "a, b", Proposal("a sweep", 3.0, 1.0), "a sweep, in still air: parts a, b by 3 "),
+        ("ambiguous", "a, b", Proposal("a sweep", 4.0, 4.0), "the same again"),
+        ("explained", "a, b", Proposal("a sweep", 9.0, 4.0), "the manoeuvres flown by 4"),
+    ],
+)
+def test_advice_by_what_is_confused(verdict: str, confused: str, best: Proposal | None, words: str) -> None:
+    """By hand: at the threshold of separation, below it, and where the flight flown is as good."""
+    found = advice_in_words(verdict, confused, best)
+    assert words in found and bool(words) == bool(found)
