@@ -1,7 +1,7 @@
 """How much the gap's decisions depend on its thresholds.
 
     python bench/gap_thresholds.py record TABLES.json --aircraft cdrw FLIGHT [--holdout FLIGHT] ...   # adds a diagnosis
-    python bench/gap_thresholds.py sweep TABLES.json [--ledger bench/withheld/final.jsonl] [--only verdict,acceptance]
+    python bench/gap_thresholds.py sweep TABLES.json [--ledger bench/withheld/final.jsonl] [--page PAGE.md]
 
 ``record`` diagnoses flights and keeps the scores from which was decided. ``sweep`` changes one threshold at a time by
 factors, decides again from the scores alone, and prints how many verdicts change, and in how many diagnoses the search
@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 from evaluation import score_tables
@@ -29,8 +29,16 @@ from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 #: Factors on each threshold.
 FACTORS = (0.5, 0.8, 1.25, 2.0)
 
-#: Groups that decide from scores; the others shape what is measured.
-DECIDING = ("admission", "instruments", "acceptance", "search", "calibration", "validation", "verdict")
+#: Thresholds that decide from the recorded scores; the others shape what is measured, or only what is reported.
+DECIDING = {
+    "admission": ("excitation",),
+    "instruments": ("chance",),
+    "acceptance": ("probability", "share_of_remainder", "share_of_gap", "noticeable_error", "large_error"),
+    "search": ("lead",),
+    "calibration": ("constant", "per_log_nat", "flexible", "misfit", "probability"),
+    "validation": ("chance",),
+    "verdict": ("told_apart", "structure", "explained", "closed", "error"),
+}
 
 
 def main() -> None:
@@ -69,19 +77,14 @@ def record(path: Path, flights: Sequence[Path], aircraft: str, holdouts: Sequenc
 
 
 def sweeps(groups: Sequence[str]) -> Iterator[tuple[str, float, Thresholds]]:
-    """Name of each threshold that is one number, its swept value, and all thresholds with it."""
+    """Name of each deciding threshold, its swept value, and all thresholds with it; shares stay below one."""
     for group in groups:
         values = getattr(THRESHOLDS, group)
-        for entry in fields(values):
-            usual = getattr(values, entry.name)
-            for factor in FACTORS if isinstance(usual, float) else ():
-                swept = replace(values, **{entry.name: factor * usual})
-                yield f"{group}.{entry.name}", factor * usual, replace(THRESHOLDS, **{group: swept})
-
-
-def possible(thresholds: Thresholds) -> bool:
-    """Whether probabilities stay below one."""
-    return thresholds.acceptance.probability < 1.0
+        for name in DECIDING[group]:
+            usual = getattr(values, name)
+            for value in (factor * usual for factor in FACTORS):
+                if not 0.0 < usual < 1.0 <= value:
+                    yield f"{group}.{name}", value, replace(THRESHOLDS, **{group: replace(values, **{name: value})})
 
 
 def page(
@@ -90,20 +93,12 @@ def page(
     """The tables; thresholds that change nothing at any factor are listed by name."""
     rows, idle = [], dict.fromkeys(name for name, _, _ in sweeps(groups))
     for name, value, thresholds in sweeps(groups):
-        if not possible(thresholds):
-            continue
         changes, others = changed(known, thresholds)
         if changes or others:
             idle.pop(name, None)
             words = ", ".join(f"{old} → {new} ({count})" for (old, new), count in changes.most_common())
             rows.append([name, f"{value:.3g}", str(changes.total()), words or "-", str(others)])
-    heads = (
-        "threshold",
-        "value",
-        "verdicts that change",
-        "from → to (diagnoses)",
-        "searches that would go on otherwise",
-    )
+    heads = ("threshold", "value", "verdicts that change", "from → to (diagnoses)", "searches that change")
     parts = [f"{len(known)} diagnoses.", table(heads, rows), f"No change at any factor: {', '.join(idle) or 'none'}."]
     return "\n\n".join([*parts, *(named_table(causes) if causes else ())])
 

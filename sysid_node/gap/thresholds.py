@@ -66,7 +66,9 @@ class Priors:
     )
     jammed: float = _threshold(0.95, "1", "least share of its movement that a stuck surface has lost")
     lowest_mode: float = _threshold(
-        3.0, "Hz", "lowest frequency of a structural mode: a slower one fits the response to gusts (research notes)"
+        3.0,
+        "Hz",
+        "lowest frequency of a structural mode: a slower one fits the response to gusts (docs/research/gap.md)",
     )
 
 
@@ -158,7 +160,7 @@ class Calibration:
         0.3,
         "1",
         "amplitude of what is left and depends on the effect, over what the effect does, from which it is misspecified",
-        "chosen by eye between right and wrong causes (docs/research/gap.md)",
+        "chosen by eye between right and wrong causes (docs/results/gap_calibration.md)",
     )
     deviations: float = _threshold(4.5, "1 sigma", "deviation from chance from which what is left counts as misfit")
     counted: float = _threshold(0.1, "1", "share of a cause's power from which its misfit on a channel counts")
