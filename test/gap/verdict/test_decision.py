@@ -1,4 +1,4 @@
-"""The verdict from tables of scores made by hand; truth: the rules as docs/explanation/gap.md states them, at every boundary."""
+"""The verdict from tables of scores made by hand; truth: the rules of docs/explanation/gap.md, at every boundary."""
 
 from dataclasses import replace
 
