@@ -8,12 +8,16 @@ from gap_flights import fly
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.gap.diagnose import Diagnosis, diagnose
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import Simulator
 
 Effects = Mapping[str, Mapping[str, float]]
+
+#: Errors of derivatives within their tolerances.
+WRONG_DERIVATIVES = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "Cl_p": 0.03, "Cn_beta": 0.006, "Cl_da": 0.02}
 
 
 @pytest.fixture(scope="session")
@@ -34,6 +38,18 @@ def plain(aircraft: Aircraft) -> GapFlight:
 @pytest.fixture(scope="session")
 def plain_model(aircraft: Aircraft, plain: GapFlight) -> ResidualModel:
     return residual_model_of(Simulator(aircraft, 50.0), plain)
+
+
+@pytest.fixture(scope="session")
+def wrong_derivatives() -> dict[str, float]:
+    return WRONG_DERIVATIVES
+
+
+@pytest.fixture(scope="session")
+def lagging(aircraft: Aircraft) -> Diagnosis:
+    """The diagnosis of a servo's lag through wrong derivatives, checked on a flight held out."""
+    effects = {"actuator_lag": {"time_constant": 0.08}, "derivative_error": WRONG_DERIVATIVES}
+    return diagnose(aircraft, [fly(aircraft, effects, seed=5)], [fly(aircraft, effects, seed=6)])
 
 
 @pytest.fixture

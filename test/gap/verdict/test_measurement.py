@@ -1,17 +1,9 @@
 """What the verdict depends on, measured; truth: predictions moved by a sample, and a diagnosis's own parts."""
 
 import numpy as np
-import pytest
-from gap_flights import fly
 
-from sysid_node.gap.diagnose import Diagnosis, diagnose
 from sysid_node.gap.verdict.decision import decide
 from sysid_node.gap.verdict.measurement import measure, sampling_power
-
-
-@pytest.fixture(scope="module")
-def lagging(aircraft) -> Diagnosis:
-    return diagnose(aircraft, [fly(aircraft, {"actuator_lag": {"time_constant": 0.08}}, seed=5)], [])
 
 
 def test_sampling_leaves_what_its_standard_deviation_of_a_delay_leaves(lagging) -> None:
