@@ -1,4 +1,4 @@
-"""A manoeuvre: deflections from trim over time, within limits."""
+"""A manoeuvre, as deflections from trim over time, and the limits of the controls."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ THROTTLE = "throttle"
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """``time`` (N,) s from zero, uniform; ``deflections`` control -> (N,), rad from trim (throttle: its own unit).
+    """A sampled manoeuvre: ``time`` (N,) s from zero, uniform; ``deflections`` control -> (N,), rad from trim
+    (throttle: its own unit).
 
     Every control that the aircraft has is a key, in the aircraft's order, the throttle last; zero where not moved.
     """
@@ -30,7 +31,7 @@ class Manoeuvre:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first to the last sample."""
+        """The time from the first to the last sample, s."""
         return float(self.time[-1])
 
     @property
@@ -44,7 +45,7 @@ class Manoeuvre:
 
 
 def control_limits(aircraft: Aircraft) -> dict[str, float]:
-    """Largest deflection of every control that can be flown, infinite where the file gives none."""
+    """The largest deflection of every control, infinite where the aircraft file gives none."""
     limits = {name: control.limit or np.inf for name, control in aircraft.controls.items()}
     if aircraft.throttle is not None:
         limits[THROTTLE] = 1.0 if aircraft.throttle.max_thrust is not None else np.inf
@@ -52,7 +53,7 @@ def control_limits(aircraft: Aircraft) -> dict[str, float]:
 
 
 def check_limits(manoeuvre: Manoeuvre, aircraft: Aircraft) -> None:
-    """Raise InputError, naming control, time and limit, where a deflection from trim passes the control's limit."""
+    """Raises InputError, naming control, time and limit, where a deflection from trim passes the control's limit."""
     for name, limit in control_limits(aircraft).items():
         size = np.abs(manoeuvre.deflections[name])
         worst = int(size.argmax())

@@ -1,4 +1,4 @@
-"""Orthogonal phase-optimised multisines: all surfaces at once, each on harmonics of its own, with low peaks.
+"""Orthogonal phase-optimised multisines: all surfaces at once, each with different harmonics, with low peaks.
 
 Morelli, "Multiple Input Design for Real-Time Parameter Estimation in the Frequency Domain", IFAC SYSID (2003); Klein &
 Morelli, "Aircraft System Identification" (2006), sect. 9.3. Phases minimise the p-norm for growing p (Guillaume,
@@ -26,7 +26,7 @@ _MOST_HARMONICS = 2000
 
 
 def harmonics(length: float, low: float, high: float) -> Harmonics:
-    """Numbers k of the harmonics k / length (Hz) from ``low`` to ``high``. InputError where there is none."""
+    """The numbers k of the harmonics k / length from ``low`` to ``high`` (Hz). Raises InputError without any."""
     numbers = np.arange(max(1, int(np.ceil(low * length - 1e-9))), int(np.floor(high * length + 1e-9)) + 1)
     if numbers.size == 0:
         raise InputError(
@@ -54,9 +54,9 @@ def multisine(time: Array, length: float, low: float, high: float, count: int) -
         )
     waves = []
     for i in range(count):
-        own = numbers[i::count]
-        phase = np.array(optimal_phases(tuple(own.tolist())))
-        wave, peak = sum_of_sines(time / length, own, np.ones(own.size), phase)
+        of_input = numbers[i::count]
+        phase = np.array(optimal_phases(tuple(of_input.tolist())))
+        wave, peak = sum_of_sines(time / length, of_input, np.ones(of_input.size), phase)
         waves.append(np.where((time >= 0) & (time <= length + 1e-9), wave / peak, 0.0))
     return np.array(waves)
 
@@ -98,7 +98,7 @@ def optimal_phases(numbers: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def to_zero_crossing(numbers: Harmonics, amplitude: Array, phase: Array) -> Array:
-    """The phases after a shift in time to where the wave crosses zero upwards: it begins and ends at zero."""
+    """The phases shifted in time to an upward zero crossing, so that the wave begins and ends at zero."""
     wave = over_period(numbers, amplitude, phase)
     i = int(np.flatnonzero((wave <= 0) & (np.roll(wave, -1) > 0))[0])
     after = wave[(i + 1) % wave.size]
@@ -116,7 +116,7 @@ def _schroeder(count: int) -> Array:
 
 
 def _flatten(numbers: Harmonics, phase: Array) -> Array:
-    """Minimise the p-norm of the wave for p = 4, 8, ..., each from the last."""
+    """The phases that minimise the p-norm of the wave, for p = 4, 8, ... in turn, each started at the last."""
     for power in _POWERS:
         norm = partial(_norm, numbers=numbers, power=power)
         phase = minimize(norm, phase, jac=True, method="L-BFGS-B", options={"maxiter": 200}).x

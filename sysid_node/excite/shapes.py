@@ -1,4 +1,4 @@
-"""Shapes of excitation: pure functions of time, peak one, zero outside ``0 <= time <= length``.
+"""Shapes of inputs: functions of time with a peak of one, zero outside ``0 <= time <= length``.
 
 Sources: multistep inputs after Koehler & Wilhelm (1977; the 3-2-1-1) and Plaetschke & Schulz (1979); exponential sweep
 after Tischler & Remple, "Aircraft and Rotorcraft System Identification", 2nd ed. (2012), eq. 5.15-5.17.
@@ -15,12 +15,12 @@ from sysid_node.excite.multisine import harmonics, sum_of_sines, to_zero_crossin
 
 Array = NDArray[np.float64]
 
-#: A sample this close to a switching time (s) belongs to what follows: times such as 0.3 are not exact in binary.
+#: A sample this close to a switching time (s) belongs to the next step: times such as 0.3 are not exact in binary.
 _EDGE = 1e-9
 
 
 def inside(time: Array, length: float) -> NDArray[np.bool_]:
-    """Where the shape is on, (N,)."""
+    """Whether each time (N,) is within the shape."""
     return (time >= -_EDGE) & (time <= length + _EDGE)
 
 
@@ -33,7 +33,7 @@ def multistep(time: Array, pattern: Sequence[float], width: float) -> Array:
 
 
 def ramp(time: Array, length: float) -> Array:
-    """From 0 to 1 in a quarter of ``length`` (s), to -1 in the next half, and back: slow, it is quasi-static."""
+    """A triangle: from 0 to 1 in a quarter of ``length`` (s), to -1 in the next half, and back; slow, quasi-static."""
     return np.interp(time, [0.0, 0.25 * length, 0.75 * length, length], [0.0, 1.0, -1.0, 0.0], left=0.0, right=0.0)
 
 

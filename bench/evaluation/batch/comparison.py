@@ -1,7 +1,7 @@
-"""All methods on the same bundled flights: estimates against the truth, answers to a flight held out, cost.
+"""All methods on the same bundled flights: estimates against the truth, predictions of a held-out flight, cost.
 
 Every method starts from the same wrong aircraft file: each derivative off by its tolerance times a random number, so
-that nothing is won by what the file already knows.
+that no method profits from what the file already knows.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Found = Mapping[str, tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class Case:
-    """A bundled flight, as every method gets it."""
+    """A bundled flight with the data that every method is given."""
 
     aircraft: Aircraft
     record: FlightRecord
@@ -63,7 +63,7 @@ def case(name: str) -> Case:
 
 
 def by_batch(method: str, flown: Case) -> Found:
-    """A method of ``sysid identify``, as it comes."""
+    """The estimates of a method of ``sysid identify`` with its default settings."""
     fit = identify(method, flown.aircraft, [flown.record], BatchSettings()).fit
     return {n: (e.value, e.lower, e.upper) for n, e in fit.estimates.items() if e.valid and n in flown.truth}
 
@@ -101,7 +101,7 @@ METHODS: Mapping[str, Callable[[Case], Found]] = {
 
 
 def section(name: str, holdout: str, without: Sequence[str] = ()) -> str:
-    """Errors on one flight, then what the estimates make of another; ``without`` some methods."""
+    """A table of errors on one flight, then one of predictions of another; ``without`` some methods."""
     flown, other = case(name), case(holdout)
     errors, responses = [], []
     for label, method in METHODS.items():
@@ -111,7 +111,7 @@ def section(name: str, holdout: str, without: Sequence[str] = ()) -> str:
         found = method(flown)
         seconds = time.process_time() - begin
         errors.append([label, *_errors(found, flown.truth), f"{seconds:.1f}"])
-        responses.append([label, *_answers(found, other)])
+        responses.append([label, *_predictions(found, other)])
         print("#", name, *errors[-1], flush=True)
     heads = ("error, %", *WATCHED, "mean", "intervals that hold", "processor, s")
     checked = (
@@ -133,7 +133,7 @@ def _errors(found: Found, truth: Mapping[str, float]) -> list[str]:
     return [*(f"{off[n]:+.1f}" if n in off else "-" for n in WATCHED), mean, f"{sum(holding)} of {len(holding)}"]
 
 
-def _answers(found: Found, other: Case) -> list[str]:
+def _predictions(found: Found, other: Case) -> list[str]:
     """Normalised error of each coefficient, then the means of the other figures; below the usual low-pass."""
     values = {n: value for n, (value, _, _) in found.items()}
     several = predicted_coefficients(other.aircraft, values, [other.record], BatchSettings().low_pass)

@@ -16,14 +16,14 @@ from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.model import ModelEquations, StateSpaceModel
 from sysid_node.flight.record import Array
 
-#: Where in the step each stage looks, and its share in the result.
-_PLACES, _SHARES = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
+#: Runge-Kutta coefficients of fourth order: the time of each stage in the step, and its weight in the result.
+_NODES, _WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
 def rk4_step(
     dynamics: ModelEquations, x: jax.Array, u0: jax.Array, u1: jax.Array, dt: jax.Array, theta: jax.Array
 ) -> jax.Array:
-    """State (nx,) after ``dt`` s, the input (nu,) going linearly from ``u0`` to ``u1``.
+    """The state (nx,) after ``dt`` s, with the input (nu,) linear from ``u0`` to ``u1``.
 
     The stages are a loop: written out one after the other, XLA fuses them into code whose size grows exponentially.
     """
@@ -32,22 +32,22 @@ def rk4_step(
         carry: tuple[jax.Array, jax.Array], at: tuple[jax.Array, jax.Array]
     ) -> tuple[tuple[jax.Array, jax.Array], None]:
         slope, total = carry
-        place, share = at
-        slope = derivative(dynamics, x + place * dt * slope, u0 + place * (u1 - u0), theta)
-        return (slope, total + share * slope), None
+        node, weight = at
+        slope = derivative(dynamics, x + node * dt * slope, u0 + node * (u1 - u0), theta)
+        return (slope, total + weight * slope), None
 
     nothing = jnp.zeros_like(x)
-    (_, total), _ = jax.lax.scan(stage, (nothing, nothing), (jnp.array(_PLACES), jnp.array(_SHARES)))
+    (_, total), _ = jax.lax.scan(stage, (nothing, nothing), (jnp.array(_NODES), jnp.array(_WEIGHTS)))
     return x + dt * total
 
 
 def derivative(dynamics: ModelEquations, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-    """State derivative (nx,)."""
+    """The state derivative (nx,)."""
     return jnp.stack(dynamics.derivative(tuple(x), tuple(u), tuple(theta)))
 
 
 def output(dynamics: ModelEquations, x: jax.Array, u: jax.Array, theta: jax.Array) -> jax.Array:
-    """Outputs (..., ny) at states (..., nx) and inputs (..., nu)."""
+    """The outputs (..., ny) at states (..., nx) and inputs (..., nu)."""
     values = dynamics.output(tuple(jnp.moveaxis(x, -1, 0)), tuple(jnp.moveaxis(u, -1, 0)), tuple(theta))
     return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
@@ -55,7 +55,7 @@ def output(dynamics: ModelEquations, x: jax.Array, u: jax.Array, theta: jax.Arra
 def simulate(
     dynamics: ModelEquations, time: jax.Array, inputs: jax.Array, x0: jax.Array, theta: jax.Array
 ) -> jax.Array:
-    """States (N, nx) at each time from ``x0`` (nx,); pure, differentiable."""
+    """The states (N, nx) at each time from ``x0`` (nx,); a differentiable function without side effects."""
 
     def advance(x: jax.Array, interval: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         following = rk4_step(dynamics, x, *interval, theta)
@@ -87,7 +87,7 @@ def _sensitivities(
     free: tuple[int, ...],
     free_states: tuple[int, ...],
 ) -> jax.Array:
-    """d outputs / d (theta[free], x0[free_states]): (N // every, ny, len(free) + len(free_states))."""
+    """Derivatives of the outputs by theta[free] and x0[free_states]: (N // every, ny, len(free) + len(free_states))."""
 
     def of(change: jax.Array) -> jax.Array:
         moved_theta = theta.at[jnp.array(free, dtype=int)].add(change[: len(free)])
@@ -99,7 +99,7 @@ def _sensitivities(
 
 
 def outputs(model: StateSpaceModel, manoeuvre: ManoeuvreData, theta: Array, x0: Array | None = None) -> Array:
-    """Modelled outputs (N // every, ny), from the manoeuvre's initial state unless ``x0`` (nx,) says otherwise."""
+    """The modelled outputs (N // every, ny) from ``x0`` (nx,); None: from the manoeuvre's initial state."""
     start = manoeuvre.initial_state if x0 is None else x0
     return np.asarray(_outputs_jit(model.dynamics, manoeuvre.every, manoeuvre.time, manoeuvre.inputs, start, theta))
 
@@ -112,6 +112,6 @@ def sensitivities(
     free: tuple[int, ...],
     free_states: tuple[int, ...] = (),
 ) -> Array:
-    """Exact Jacobian (N // every, ny, n) of the outputs with respect to the chosen parameters and initial states."""
+    """The exact Jacobian (N // every, ny, n) of the outputs by the chosen parameters and initial states."""
     data = (manoeuvre.time, manoeuvre.inputs, jnp.asarray(x0), jnp.asarray(theta))
     return np.asarray(_sensitivities(model.dynamics, manoeuvre.every, *data, free, free_states))

@@ -15,12 +15,12 @@ import jax.numpy as jnp
 from sysid_node.batch.likelihood.rollout import output, rk4_step
 from sysid_node.batch.models.model import ModelEquations
 
-#: Doubling steps of the Riccati equation: time constants up to 2^16 samples have settled.
+#: Doubling steps of the Riccati equation, enough for time constants of up to 2^16 samples.
 _DOUBLINGS = 16
 
 
 def steady_covariance(transition: jax.Array, observation: jax.Array, Q: jax.Array, r: jax.Array) -> jax.Array:
-    """Steady covariance (nx, nx) of the predicted state.
+    """The steady covariance (nx, nx) of the predicted state.
 
     Solves P = F (P - P C' (C P C' + R)^-1 C P) F' + Q by structure-preserving doubling (Anderson, Int. J. Control 28,
     1978), which is smooth in F ``transition`` (nx, nx), C ``observation`` (ny, nx), ``Q`` (nx, nx) and the variances
@@ -39,7 +39,7 @@ def steady_covariance(transition: jax.Array, observation: jax.Array, Q: jax.Arra
 
 
 def gain(covariance: jax.Array, observation: jax.Array, r: jax.Array) -> jax.Array:
-    """Kalman gain (nx, ny) = P C' (C P C' + R)^-1 for a predicted state's covariance P."""
+    """The Kalman gain (nx, ny) = P C' (C P C' + R)^-1 for a predicted state's covariance P."""
     cross = covariance @ observation.T
     return jnp.asarray(jnp.linalg.solve(observation @ cross + jnp.diag(r), cross.T)).T
 
@@ -54,7 +54,7 @@ def predictions(
     q: jax.Array,
     r: jax.Array,
 ) -> jax.Array:
-    """Outputs (N, ny), each predicted from all samples before it.
+    """The outputs (N, ny), each predicted from all samples before it.
 
     ``q`` (nx,) is the variance that process noise adds to each state in a second, ``r`` (ny,) the outputs' noise
     variance. The gain is the steady one of the linearisation at the first sample.
@@ -76,7 +76,7 @@ def predictions(
 def innovation_variance(
     dynamics: ModelEquations, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> jax.Array:
-    """Variance (ny,) of each output's innovation that the filter expects at one flight condition."""
+    """The variance (ny,) of the innovations that the filter expects at one flight condition."""
     covariance, observation = _linearised(dynamics, dt, u, x, theta, q, r)
     return jnp.einsum("os,st,ot->o", observation, covariance, observation) + r
 
@@ -84,9 +84,9 @@ def innovation_variance(
 def _linearised(
     dynamics: ModelEquations, dt: jax.Array, u: jax.Array, x: jax.Array, theta: jax.Array, q: jax.Array, r: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    """Steady covariance of the predicted state, and the observation matrix, about one flight condition.
+    """The steady covariance of the predicted state and the observation matrix, linearised at one flight condition.
 
-    Noise acts all the time: what it does to the state by the end of a step is integrated over it by Simpson's rule.
+    The noise is continuous: its effect on the state at the end of a step is integrated by Simpson's rule.
     """
     move = jax.jacfwd(partial(rk4_step, dynamics))
     half, whole = move(x, u, u, 0.5 * dt, theta), move(x, u, u, dt, theta)
