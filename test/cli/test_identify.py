@@ -132,3 +132,19 @@ def test_a_flight_that_never_moves_gives_no_number_marked_valid(tmp_path):
     found = json.loads((out / "summary.json").read_text())["derivatives"]
     assert not any(d["valid"] for name, d in found.items() if not name.endswith("_0"))
     assert all(d["status"] != "ok" for d in found.values() if not d["valid"])
+
+
+def test_a_kalman_filter_leaves_the_history_of_its_estimates(tmp_path):
+    """One CLI run of a filter: two states at 20 Hz are enough for the files that it must leave."""
+    out = tmp_path / "out"
+    settings = ["--set", "states=alpha,q", "--set", "rate=20", "--set", "process_noise=0.5", "--quiet"]
+    assert main(arguments(out, *settings, method="extended_kalman_filter")) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["settings"]["process_noise"] == 0.5
+    history = [row for row in rows(out / "estimates.csv") if row["name"] == "Cm_de"]
+    assert len(history) > 50
+    errors = [float(row["standard_error"]) for row in history]
+    assert errors[-1] < 0.2 * errors[0]
+    assert float(history[-1]["value"]) == pytest.approx(summary["derivatives"]["Cm_de"]["value"])
+    noise = {row["name"] for row in rows(out / "noise.csv")}
+    assert {"residual_q", "process_q", "sensor_q"} <= noise

@@ -32,7 +32,7 @@ def test_a_single_sine_has_a_relative_peak_factor_of_one():
 
 
 def test_inputs_are_orthogonal_at_every_lag():
-    """Harmonics of their own: the cross-correlation over a period vanishes not only at lag zero."""
+    """Each input has different harmonics: the cross-correlation over a period vanishes not only at lag zero."""
     waves = multisine(TIME, LENGTH, 0.1, 2.0, 3)
     spectra = np.fft.rfft(waves)
     power = np.sqrt(np.mean(waves**2, axis=1))
@@ -46,9 +46,9 @@ def test_spectrum_is_flat_on_its_harmonics_and_empty_elsewhere():
     waves = multisine(TIME, LENGTH, 0.1, 2.0, 3)
     amplitudes = np.abs(np.fft.rfft(waves)) / TIME.size
     for i, amplitude in enumerate(amplitudes):
-        own = np.arange(2, 41)[i::3]
-        assert np.ptp(amplitude[own]) < 1e-12
-        assert np.delete(amplitude, own).max() < 1e-12
+        numbers = np.arange(2, 41)[i::3]
+        assert np.ptp(amplitude[numbers]) < 1e-12
+        assert np.delete(amplitude, numbers).max() < 1e-12
 
 
 def test_begins_and_ends_at_zero_and_stays_within_one():

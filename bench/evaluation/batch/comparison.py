@@ -141,8 +141,10 @@ def _predictions(found: Found, other: Case) -> list[str]:
         return ["-"] * 10
     inputs = {s: np.interp(several[0].time, other.record.time, other.record[s]) for s in other.aircraft.control_symbols}
     merits = figures_of_merit(several[0], inputs)
-    own = [f"{merits[c]['normalised_error']:.3f}" if c in merits else "-" for c in ("CL", "CD", "CY", "Cl", "Cm", "Cn")]
+    errors = [
+        f"{merits[c]['normalised_error']:.3f}" if c in merits else "-" for c in ("CL", "CD", "CY", "Cl", "Cm", "Cn")
+    ]
     means = [
         np.mean([m[key] for m in merits.values()]) for key in ("theil", "r_squared", "whiteness", "input_correlation")
     ]
-    return [*own, *(f"{mean:.3f}" for mean in means)]
+    return [*errors, *(f"{mean:.3f}" for mean in means)]

@@ -76,9 +76,10 @@ def _filters(case: published.ReferenceCase, biased: BatchFit) -> str:
     fit = filter_error(case.model, [case.manoeuvre])
     r, q = (np.array(variances) for variances in published.HFB_FILTER_NOISE)
     start = np.full(len(case.model.states) + len(case.model.names), np.sqrt(10.0))
-    told = FilterNoise(q / case.manoeuvre.step**2, r, start)
+    noise = FilterNoise(q / case.manoeuvre.step**2, r, start)
     filters = [
-        method(case.model, [case.manoeuvre], told).final for method in (extended_kalman_filter, unscented_kalman_filter)
+        method(case.model, [case.manoeuvre], noise).final
+        for method in (extended_kalman_filter, unscented_kalman_filter)
     ]
     rows = []
     for name, value in published.HFB_FILTER_ERROR.items():
