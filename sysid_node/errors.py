@@ -1,4 +1,4 @@
-"""What a user can do wrong, said in one line."""
+"""The error for bad input."""
 
 
 class InputError(ValueError):

@@ -1,4 +1,4 @@
-"""One setting, from the text of ``--set key=value`` or from a plain value."""
+"""The value of a setting, from the text of ``--set key=value`` or from a plain value."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 from sysid_node.errors import InputError
 
-WORDS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
+BOOLEANS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
 
 
-def parsed(key: str, kind: Any, value: Any) -> Any:
+def parse_setting(key: str, kind: Any, value: Any) -> Any:
     """The value as a ``kind``: a plain type, or a tuple of frequencies (three numbers) or of names.
 
-    Raises InputError where it is not one.
+    Raises InputError where it cannot be converted.
     """
     numbers = kind == tuple[float, float, float]
     try:
@@ -23,7 +23,7 @@ def parsed(key: str, kind: Any, value: Any) -> Any:
         if kind == tuple[str, ...]:
             return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
         if kind is bool and isinstance(value, str):
-            return WORDS[value.lower()]
+            return BOOLEANS[value.lower()]
         return kind(value)
     except (KeyError, TypeError, ValueError):
         wanted = "START:STEP:STOP in Hz" if numbers else f"a {kind.__name__}"
@@ -31,7 +31,7 @@ def parsed(key: str, kind: Any, value: Any) -> Any:
 
 
 def check_frequencies(frequencies: tuple[float, float, float]) -> None:
-    """Raise InputError unless these are a first line, a step and a last line, in Hz."""
+    """Raise InputError unless these are the first frequency, the step and the last frequency, in Hz."""
     start, step, stop = frequencies
     if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
         raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected 0 < start < stop and step > 0, in Hz")

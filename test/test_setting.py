@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from sysid_node.errors import InputError
-from sysid_node.setting import check_frequencies, parsed
+from sysid_node.setting import check_frequencies, parse_setting
 
 Frequencies = tuple[float, float, float]
 Names = tuple[str, ...]
@@ -26,7 +26,7 @@ Names = tuple[str, ...]
     ],
 )
 def test_texts_and_plain_values_are_understood(kind: Any, value: Any, meant: Any) -> None:
-    assert parsed("key", kind, value) == meant
+    assert parse_setting("key", kind, value) == meant
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_texts_and_plain_values_are_understood(kind: Any, value: Any, meant: Any
 )
 def test_others_are_refused_in_one_line(kind: Any, value: Any, wanted: str) -> None:
     with pytest.raises(InputError) as refused:
-        parsed("key", kind, value)
+        parse_setting("key", kind, value)
     assert str(refused.value) == f"setting key = {value!r}: expected {wanted}"
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
 from sysid_node.errors import InputError
-from sysid_node.setting import check_frequencies, parsed
+from sysid_node.setting import check_frequencies, parse_setting
 
 #: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
 DEFAULT_LOW_PASS = 3.0
@@ -52,7 +52,7 @@ class BatchSettings:
         for key in values:
             if key not in kinds:
                 raise InputError(f"setting {key!r} is not one of a batch method; those are {', '.join(kinds)}")
-        return cls(**{key: parsed(key, kinds[key], value) for key, value in values.items()})
+        return cls(**{key: parse_setting(key, kinds[key], value) for key, value in values.items()})
 
     def as_dict(self, method: str) -> dict[str, Any]:
         """Plain values by name, for the ``summary.json`` of ``method``; only Kalman filters have ``process_noise``."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
 from sysid_node.errors import InputError
-from sysid_node.setting import check_frequencies, parsed
+from sysid_node.setting import check_frequencies, parse_setting
 
 METHODS = ("sls_rft", "iv_rft")
 MOST_LINES = 1000
@@ -57,7 +57,7 @@ class Settings:
         for key in values:
             if key not in types:
                 raise InputError(f"setting {key!r} is not known; known: {', '.join(types)}")
-        return cls(**{key: parsed(key, types[key], value) for key, value in values.items()})
+        return cls(**{key: parse_setting(key, types[key], value) for key, value in values.items()})
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values by name, for ``summary.json``."""

@@ -19,8 +19,8 @@ def write_batch_tables(folder: Path, found: Identification) -> None:
     fit = found.fit
     names = list(fit.estimates)
     _write(folder / "correlation.csv", ("", *names), zip(names, *fit.correlation.T.tolist(), strict=True))
-    own = [(i, name, value) for i, piece in enumerate(fit.nuisance) for name, value in piece.items()]
-    _write(folder / "nuisance.csv", ("piece", "name", "value"), own)
+    nuisances = [(i, name, value) for i, piece in enumerate(fit.nuisance) for name, value in piece.items()]
+    _write(folder / "nuisance.csv", ("piece", "name", "value"), nuisances)
     noise = [(f"residual_{name}", value) for name, value in fit.noise.items()]
     _write(folder / "noise.csv", ("name", "standard_deviation"), [*noise, *fit.extras.items()])
     steps = [

@@ -13,13 +13,13 @@ FAULTS, FAULTS_TYPE = "/fault_monitor/faults", "diagnostic_msgs/msg/DiagnosticAr
 ERROR = 2  # diagnostic_msgs/DiagnosticStatus
 
 
-def fault_messages(said: Sequence[FaultReport], aircraft: str) -> Iterator[tuple[int, bytes]]:
+def fault_messages(reports: Sequence[FaultReport], aircraft: str) -> Iterator[tuple[int, bytes]]:
     """Each with the time (ns) at which it is logged: the header stamp of the sample that it includes last."""
     templates = Templates(definitions_of(type_store()))
-    for moment in said:
-        header = (divmod(moment.stamp_ns, 1_000_000_000), "")
-        statuses = tuple(_status(fault, moment.time, aircraft) for fault in moment.faults)
-        yield moment.stamp_ns, templates.template(FAULTS_TYPE, (header, statuses)).text
+    for report in reports:
+        header = (divmod(report.stamp_ns, 1_000_000_000), "")
+        statuses = tuple(_status(fault, report.time, aircraft) for fault in report.faults)
+        yield report.stamp_ns, templates.template(FAULTS_TYPE, (header, statuses)).text
 
 
 def _status(fault: Fault, now: float, aircraft: str) -> Values:

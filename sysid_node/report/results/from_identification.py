@@ -92,8 +92,8 @@ def _fits(found: Identification) -> dict[str, FitQuality]:
     names = list(found.fit.estimates)
     table = {}
     for name, q in (goodness_of_fit(found.fit.responses) | goodness_of_fit(found.coefficients)).items():
-        own = sum(key.startswith(f"{name}_") for key in names)
-        freedom = float(q.samples - (own or len(names)))
+        parameters = sum(key.startswith(f"{name}_") for key in names)
+        freedom = float(q.samples - (parameters or len(names)))
         table[name] = FitQuality(name, q.r_squared, q.residual_std, freedom, q.samples)
     return table
 

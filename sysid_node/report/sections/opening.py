@@ -101,9 +101,9 @@ def _against_truth(run: RunResult, derivatives: list[DerivativeEstimate]) -> Mar
     checked = [d for d in derivatives if d.valid and d.name in run.references.truth]
     if not checked:
         return None
-    held = sum(covers(d, run.references.truth[d.name]) for d in checked)
+    covered = sum(covers(d, run.references.truth[d.name]) for d in checked)
     return Markup("The true values are known for this flight: {} of {} valid intervals contain theirs.").format(
-        held, len(checked)
+        covered, len(checked)
     )
 
 

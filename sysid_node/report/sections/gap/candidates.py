@@ -14,13 +14,13 @@ from sysid_node.report.wording.numbers import NONE, likely, number, with_interva
 
 def candidates(found: Diagnosis) -> Mapping[str, Any]:
     """The effects that were fitted alone, and the causes with their parameters."""
-    said = document(found)
+    content = document(found)
     rows = [
         (words_of(c["effect"]), NONE if c["probability"] is None else likely(c["probability"]),
          f"{100 * c['share']:.1f}", 100 * c["share"])
-        for c in said["candidates"]
+        for c in content["candidates"]
     ]  # fmt: skip
-    doubted = [_doubted(c) for c in said["doubted"]]
+    doubted = [_doubted(c) for c in content["doubted"]]
     causes = [
         {
             "name": words_of(c["label"]),
@@ -29,15 +29,15 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
             "parameters": _parameters(c),
             "rivals": ", ".join(words_of(r) for r in c["indistinguishable_from"]),
         }
-        for c in said["causes"]
+        for c in content["causes"]
     ]
     return {"rows": rows, "causes": causes, "doubted": ", ".join(doubted), "confusion": _confusion(found)}
 
 
 def _doubted(cause: Mapping[str, Any]) -> str:
     """``actuator lag (probability 0.42; time constant 0.110 ± 0.006 s)``."""
-    said = [f"probability {likely(cause['probability'])}", *map(" ".join, _parameters(cause))]
-    return f"{words_of(cause['label'])} ({'; '.join(said)})"
+    details = [f"probability {likely(cause['probability'])}", *map(" ".join, _parameters(cause))]
+    return f"{words_of(cause['label'])} ({'; '.join(details)})"
 
 
 def _parameters(cause: Mapping[str, Any]) -> list[tuple[str, str, str]]:
