@@ -37,7 +37,7 @@ loop: $(DONE)/build $(DONE)/run $(DONE)/desk  ## closed loop over DDS: something
 	@$(BIN)/python -m sysid_node.cli loop $(ARGS)
 
 docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out/docs/index.html; a warning is an error
-	@$(BIN)/python -m sphinx --quiet --jobs 2 --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
 	@echo "out/docs/index.html"
 
 test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs  ## run all tests; ARGS="test/online -x" runs some

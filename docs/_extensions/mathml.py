@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from docutils import nodes
+from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
+from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 
 
@@ -18,10 +20,19 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def _inline(translator: HTML5Translator, node: nodes.math) -> None:
-    translator.body.append(tex2mathml(node.astext(), as_block=False))
+    translator.body.append(_typeset(node, as_block=False))
     raise nodes.SkipNode
 
 
 def _display(translator: HTML5Translator, node: nodes.math_block) -> None:
-    translator.body.append(f'<div class="equation">{tex2mathml(node.astext(), as_block=True)}</div>')
+    translator.body.append(f'<div class="equation">{_typeset(node, as_block=True)}</div>')
     raise nodes.SkipNode
+
+
+def _typeset(node: nodes.Element, as_block: bool) -> str:
+    """The equation as MathML; one that cannot be typeset is a warning at its place, and shown as it is written."""
+    try:
+        return str(tex2mathml(node.astext(), as_block=as_block))
+    except MathError as error:
+        logging.getLogger(__name__).warning("equation %r: %s", node.astext(), error, location=node)
+        return f"<code>{node.astext()}</code>"
