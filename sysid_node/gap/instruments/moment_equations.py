@@ -19,6 +19,7 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit, ste
 from sysid_node.gap.estimation.spectral_weights import real_rows, weights
 from sysid_node.gap.instruments.gust_free_signals import Instruments, gust_free_instruments
 from sysid_node.gap.residuals.parameter_priors import prior
+from sysid_node.gap.residuals.prediction_cache import cache_of
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex
 
@@ -111,12 +112,12 @@ def _flight_moments(flight: FlightFit, power: Array, by: Instruments) -> FlightM
     rows = (r * ratio).reshape(r.shape[0], -1, len(CHANNELS))
     slopes = (J * ratio[:, None]).reshape(r.shape[0], -1, len(CHANNELS), J.shape[2])
     key = by.__name__.encode() + weight.tobytes()
-    return FlightMoments(model.lately(key, partial(_basis, model, weight, by)), rows, slopes)
+    return FlightMoments(cache_of(model).result(key, partial(_basis, model, weight, by)), rows, slopes)
 
 
 def _basis(model: ResidualModel, weight: Array, by: Instruments) -> dict[int, Array]:
     """Orthonormal directions (rows, m) that the instruments span, by channel that was measured."""
-    tables = model.once(f"spectra by {by.__name__}", lambda: _spectra(model, by))
+    tables = cache_of(model).constant(f"spectra by {by.__name__}", lambda: _spectra(model, by))
     found = {}
     for axis in np.flatnonzero(model.axes):
         spectra = tables[0 if axis < len(COEFFICIENTS) else 1]

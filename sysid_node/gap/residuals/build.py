@@ -1,60 +1,67 @@
-"""From a flight to what the diagnosis sees of it: its windows, the sensors' noise, and the air it flew in."""
+"""From a flight to its residual model: windows, the power of the sensors' noise, and the motion of the air."""
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import LONGITUDINAL, LONGITUDINAL_SIGNALS
+from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.flightdata import flow_angles, thrust
+from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
-from sysid_node.gap.residuals.air_motion import best_instrument_parameters, gust_speed, is_gusty, observer_memory
-from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
-from sysid_node.gap.residuals.residual_model import (
-    CHANNELS,
-    COEFFICIENTS,
+from sysid_node.gap.residuals.air_motion import (
     LONGEST_MEMORY,
-    ObserverMemory,
-    ResidualModel,
-    noiseless_model,
+    best_instrument_parameters,
+    gust_speed,
+    is_gusty,
+    observer_memory,
 )
+from sysid_node.gap.residuals.flight_path_reconstruction import READINGS, motion_of
+from sysid_node.gap.residuals.predictions import CHANNELS, ObserverMemory, PredictionInputs
+from sysid_node.gap.residuals.residual_model import Measurement, ResidualModel, joined
+from sysid_node.gap.residuals.sensor_noise import with_added_noise
 from sysid_node.gap.residuals.windowed_spectra import Windows
 from sysid_node.sim import Simulator
+from sysid_node.sim.model.layout import Scalar
+from sysid_node.sim.model.prediction import COEFFICIENTS, Accelerations, coefficients, signals_of
 
 #: Channels of a flight without lateral measurements.
 _LONGITUDINAL = frozenset({*LONGITUDINAL, *LONGITUDINAL_SIGNALS})
 
-#: Realisations of the sensors' noise that its power is averaged over.
+#: Realisations of the sensors' noise over which its power is averaged.
 _REALISATIONS = 4
 
-#: Columns each sensor's noise falls on.
-_NOISE = {
-    "accel": ("ax", "ay", "az"),
-    "gyro": ("p", "q", "r"),
-    "airspeed": ("V",),
-    "alpha": ("alpha",),
-    "beta": ("beta",),
-    "attitude": ("phi", "theta", "psi"),
-}
+#: Least power of the sensors' noise, in the channels' units squared.
+_LEAST_NOISE = 1e-18
+
+#: Flights are padded to multiples of so many samples, because each length is another program to compile.
+_BLOCK = 500
+
+#: Columns of the linear and angular accelerations that the inertial instruments measured.
+_ACCELERATIONS = (("ax", "ay", "az"), ("p_rate", "q_rate", "r_rate"))
+
+_measured_coefficients = jax.jit(coefficients)
 
 
 def residual_model_of(simulator: Simulator, flight: GapFlight, seed: int = 0) -> ResidualModel:
-    """The flight as windows and lines, with its noise floor. Raises InputError where a signal is missing."""
+    """The flight's residual model, with the power of its sensors' noise and the motion of the air.
+
+    Raises InputError where a signal is missing. ``seed`` is that of the noise's realisations.
+    """
     record = resampled(flight, simulator.rate)
     windows = Windows.over(len(record), simulator.rate)
-    axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
-    axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
-    axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
-    axes[[CHANNELS.index(name) for name in flight.inferred]] = False
-    axes[CHANNELS.index(thrust.THRUST_CHANNEL)] &= flight.metered
+    axes = _measured_channels(flight, record)
     silent = noiseless_model(simulator, flight, record, windows, axes, ObserverMemory(LONGEST_MEMORY, LONGEST_MEMORY))
-    with ThreadPoolExecutor(1) as pool:  # meanwhile: it needs the processor more than Python's lock
+    with ThreadPoolExecutor(1) as pool:  # compiling needs the processor more than Python's lock
         for program in silent.programs():
             pool.submit(program)
-        calm = _measured_noise(silent, seed)
+        calm = _with_measured_noise(silent, seed)
     instruments = best_instrument_parameters(calm)
     calm = replace(calm, gusts=gust_speed(calm, instruments))
     memory = observer_memory(calm, instruments)
@@ -62,59 +69,68 @@ def residual_model_of(simulator: Simulator, flight: GapFlight, seed: int = 0) ->
         return calm
     followed = ObserverMemory(memory, 0.0 if is_gusty(calm) else LONGEST_MEMORY)
     shorter = noiseless_model(simulator, flight, record, windows, axes, followed)
-    return _measured_noise(replace(shorter, gusts=calm.gusts), seed)
+    return _with_measured_noise(replace(shorter, gusts=calm.gusts), seed)
 
 
 def residual_model_like(model: ResidualModel, record: FlightRecord) -> ResidualModel:
-    """Another record of the same length, seen as this one: with its noise and its observer."""
-    again = noiseless_model(model.simulator, model.flight, record, model.windows, model.axes, model.given.memory)
+    """The residual model of another record of the same length, with the noise and the observer of this one."""
+    again = noiseless_model(model.simulator, model.flight, record, model.windows, model.axes, model.inputs.memory)
     return replace(again, noise=model.noise)
 
 
-def _measured_noise(model: ResidualModel, seed: int) -> ResidualModel:
+def noiseless_model(
+    simulator: Simulator,
+    flight: GapFlight,
+    record: FlightRecord,
+    windows: Windows,
+    axes: NDArray[np.bool_],
+    memory: ObserverMemory,
+) -> ResidualModel:
+    """The residual model of a record whose sensors' noise is not known: its power is one."""
+    inputs, series = _inputs(simulator, record, memory)
+    measurement = Measurement(record, windows, series, windows.transform(series), axes)
+    return ResidualModel(simulator, flight, measurement, inputs, np.ones((1, len(CHANNELS))))
+
+
+def _measured_channels(flight: GapFlight, record: FlightRecord) -> NDArray[np.bool_]:
+    """Which channels (12,) were measured."""
+    axes = np.array([flight.lateral or name in _LONGITUDINAL for name in CHANNELS])
+    axes[len(COEFFICIENTS) :] &= motion_of(record) is not None
+    axes[CHANNELS.index("psi")] &= bool(np.isfinite(record["psi"]).all())
+    axes[[CHANNELS.index(name) for name in flight.inferred]] = False
+    axes[CHANNELS.index(thrust.THRUST_CHANNEL)] &= flight.metered
+    return axes
+
+
+def _with_measured_noise(model: ResidualModel, seed: int) -> ResidualModel:
     return replace(model, noise=_noise_power(model, np.random.default_rng(seed)))
 
 
 def _noise_power(model: ResidualModel, random: np.random.Generator) -> Array:
-    """Power (L, 12) by flying through the noise of the aircraft file again, a few times."""
-    neutral = model.simulator.neutral()
+    """Power (L, 12) of the sensors' noise in the residual, from a few realisations of it added to the flight."""
+    simulator, neutral = model.simulator, model.simulator.neutral()
     clean = model.residual(neutral)
     power = np.zeros(clean.shape[1:])
     for _ in range(_REALISATIONS):
-        record = resampled(with_added_noise(model, random), model.simulator.rate)
-        again = noiseless_model(model.simulator, model.flight, record, model.windows, model.axes, model.given.memory)
+        record = resampled(with_added_noise(simulator.aircraft, model.flight, random), simulator.rate)
+        again = noiseless_model(simulator, model.flight, record, model.windows, model.axes, model.inputs.memory)
         power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / _REALISATIONS
-    return np.maximum(model.windows.smoothed(power), 1e-18)
+    return np.maximum(model.windows.smoothed(power), _LEAST_NOISE)
 
 
-def with_added_noise(model: ResidualModel, random: np.random.Generator) -> GapFlight:
-    """The flight with the sensors' noise added once more, as strong in the band as each topic's rate makes it."""
-    record, sigmas = model.flight.record, model.simulator.aircraft.noise
-    own_rate = 1.0 / float(np.median(np.diff(record.time)))
-    columns = dict(record.columns)
-    for sensor, names in _NOISE.items():
-        rate = model.flight.imu_rate if sensor in {"accel", "gyro", "attitude"} else model.flight.air_rate
-        spread = sigmas[sensor] * np.sqrt(own_rate / min(rate, own_rate))
-        for name in names:
-            if name in columns and name not in model.flight.filled:
-                columns[name] = columns[name] + spread * random.standard_normal(len(record))
-    columns |= _jittered(model, random)
-    noisy = replace(record, columns=columns)
-    if model.flight.inferred:
-        noisy = flow_angles.with_inferred_angles(
-            model.simulator.aircraft, noisy, model.flight.inferred, model.flight.source
-        )
-    if not model.flight.metered:
-        noisy = thrust.with_inferred_thrust(model.simulator.aircraft, noisy)
-    return replace(model.flight, record=noisy)
+def _inputs(simulator: Simulator, record: FlightRecord, memory: ObserverMemory) -> tuple[PredictionInputs, Array]:
+    """What predictions take from a record, padded, and the measured channels (N, 12)."""
+    signals, missing = signals_of(simulator, record), -len(record) % _BLOCK
+    motion = motion_of(record)
+    signals, motion = (jax.tree.map(lambda x: _padded(x, missing), parts) for parts in (signals, motion))
+    accelerations = [Vector(*(_padded(record[name], missing) for name in names)) for names in _ACCELERATIONS]
+    forces = joined(_measured_coefficients(simulator.model, signals, Accelerations(*accelerations)), len(record))
+    empty = jnp.zeros((len(record) + missing, len(READINGS)))
+    read = empty if motion is None else jnp.hstack([motion.air, motion.attitude])
+    inputs = PredictionInputs(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
+    return inputs, np.concatenate([forces, np.asarray(read)[: len(record)]], axis=1)
 
 
-def _jittered(model: ResidualModel, random: np.random.Generator) -> dict[str, Array]:
-    """Commands as other samples of the same rate might have caught them: a step falls anywhere between two samples."""
-    record, aircraft = model.flight.record, model.simulator.aircraft
-    period = 1.0 / model.flight.actuator_rate
-    nodes = np.arange(0.0, record.duration + period, period)
-    off = np.interp(record.time, nodes, period * (random.random(nodes.size) - 0.5))
-    symbols = [*aircraft.control_symbols, *(["thrust"] if aircraft.throttle and model.flight.metered else [])]
-    moved = [s for s in symbols if s not in model.flight.filled]
-    return {s: np.interp(record.time + off, record.time, record[s]) for s in moved}
+def _padded(series: Scalar | Array, missing: int) -> Scalar:
+    """A series (N, ...) with its last value repeated so many times."""
+    return jnp.pad(jnp.asarray(series), [(0, missing)] + [(0, 0)] * (series.ndim - 1), mode="edge")

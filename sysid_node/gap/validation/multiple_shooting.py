@@ -146,7 +146,7 @@ def course_of(model: ResidualModel, size: int) -> Course:
 
     The flight must have attitude (``simulation_error.can_be_simulated``).
     """
-    given = model.given
+    given = model.inputs
     altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
     begins = jnp.arange(altitude.size) % size == 0
     still = jnp.zeros((altitude.size, 3))

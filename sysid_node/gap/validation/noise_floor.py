@@ -16,9 +16,9 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.flightdata.gap_flight import resampled
-from sysid_node.gap.residuals.build import with_added_noise
 from sysid_node.gap.residuals.flight_path_reconstruction import Motion
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.residuals.sensor_noise import with_added_noise
 from sysid_node.gap.validation.multiple_shooting import Course, simulate_beside, simulation_error
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import Dryden
@@ -41,7 +41,7 @@ def noise_floor_errors(
     prompt[[model.simulator.names.index(name) for name in _CLOCKS]] = 0.0
     _, _, shown = simulate_beside(model, theta, course)
     for _ in range(_REALISATIONS):
-        again = resampled(with_added_noise(model, random), model.simulator.rate)
+        again = resampled(with_added_noise(model.simulator.aircraft, model.flight, random), model.simulator.rate)
         added = {n: values - model.record[n] for n, values in again.columns.items()}
         noise = np.column_stack([added.get(name, np.zeros(len(model.record))) for name in OUTPUTS])
         moving, turning = _unmeasured_air(model, course, shown, noise, random)

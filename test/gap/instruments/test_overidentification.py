@@ -98,7 +98,8 @@ def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_model: R
     nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
     fit = linearised(unfitted([plain_model], nuisances))
     alone = pooled_overidentification(fit)
-    unreadable = replace(plain_model, measured=np.full_like(plain_model.measured, np.nan))
+    nowhere = np.full_like(plain_model.measured, np.nan)
+    unreadable = replace(plain_model, measurement=replace(plain_model.measurement, spectra=nowhere))
     left_out = pooled_overidentification(fit, [HeldOutFlight(unreadable, nuisances)])
     np.testing.assert_array_equal(left_out.deviations, alone.deviations)
     again = pooled_overidentification(fit, [HeldOutFlight(plain_model, nuisances)])  # the same flight twice

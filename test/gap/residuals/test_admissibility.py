@@ -31,7 +31,8 @@ def test_a_third_of_the_lift_is_a_stall_at_large_angles_only(plain_model, alpha:
     record, series = plain_model.record, plain_model.series.copy()
     series[:, 0] = plain_model.predicted_series(plain_model.simulator.neutral())[:, 0] / 3.0
     turned = record["alpha"] - record["alpha"].mean() + alpha
-    model = replace(plain_model, series=series, record=replace(record, columns={**record.columns, "alpha": turned}))
+    record = replace(record, columns={**record.columns, "alpha": turned})
+    model = replace(plain_model, measurement=replace(plain_model.measurement, series=series, record=record))
     if stalled:
         assert require_admissible(model, exact_vane) is model
     else:

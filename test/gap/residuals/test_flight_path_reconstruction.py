@@ -63,7 +63,7 @@ def test_gusts_are_measured_by_the_vanes(aircraft, plain_model) -> None:
     gusty = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
     assert plain_model.gusts < 0.1
     assert 0.3 < gusty.gusts < 1.5
-    assert float(gusty.given.memory.observer) < float(plain_model.given.memory.observer)
+    assert float(gusty.inputs.memory.observer) < float(plain_model.inputs.memory.observer)
 
 
 def test_moment_with_the_rate_of_alpha_is_found_despite_the_vane_noise(aircraft) -> None:
@@ -81,7 +81,7 @@ def test_a_lag_is_found_despite_the_vanes_noise(aircraft) -> None:
     """Most of the flight is quiet: by the vanes alone derivatives seem smaller there, and the lag makes up for it."""
     flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, 3, manoeuvre=STEPS_ONCE, duration=60.0)
     model = residual_model_of(Simulator(aircraft, 50.0), flight)
-    by_vanes = replace(model, given=model.given._replace(memory=model.given.memory._replace(vane=jnp.zeros(()))))
+    by_vanes = replace(model, inputs=model.inputs._replace(memory=model.inputs.memory._replace(vane=jnp.zeros(()))))
     off = []
     for seen in (model, by_vanes):
         nuisances = nuisances_of(aircraft, seen)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import jax
 import numpy as np
 
-from sysid_node.gap.residuals import residual_model
-from sysid_node.gap.residuals.residual_model import kinematic_parameters
+from sysid_node.gap.residuals.predictions import all_channels, kinematic_parameters
 
 
 def test_only_noise_is_left_of_the_same_aircraft(plain_model) -> None:
@@ -36,32 +35,27 @@ def test_kinematics_depend_on_no_other_entries_than_those_named(plain_model) -> 
     )
 
 
-def test_slopes_know_what_moves_the_flow(plain_model) -> None:
-    """Slopes by what moves the flow, and by what does not in a flow that is known; truth: JAX, of everything."""
+def test_slopes_of_all_parameters_are_those_of_the_whole_prediction(plain_model) -> None:
+    """The flow is held for what does not move it, and slopes come in batches; truth: JAX, of everything at once."""
     simulator = plain_model.simulator
-    point = simulator.neutral() + 0.01 * np.random.default_rng(0).random(len(simulator.names))
+    random = np.random.default_rng(0)
+    point = simulator.neutral() + 0.01 * random.random(len(simulator.names))
     acting = np.ones(len(point), bool)
 
     @jax.jit
     def along(direction: jax.Array) -> list[jax.Array]:
         def channels(theta: jax.Array) -> list[jax.Array]:
-            return list(
-                residual_model._channels(simulator.layout, simulator.model, theta, acting, plain_model.given, None)
-            )
+            return list(all_channels(simulator.layout, simulator.model, theta, acting, plain_model.inputs, None))
 
         return jax.jvp(channels, (point,), (direction,))[1]
 
-    motion = kinematic_parameters(simulator.layout)
-    others = np.setdiff1d(np.arange(len(point)), motion).tolist()
-    assert len(others) > 60 and len(motion) > 20
-    for expected, entries in ((residual_model._forces_in, others), (residual_model._channels, motion)):
-        direction = np.zeros(len(point))
-        direction[entries] = np.random.default_rng(1).normal(size=len(entries)) * simulator.scales[entries]
-        parts = (entries[first : first + 3] for first in range(0, len(entries), 3))
-        found = sum(plain_model._slopes_along(expected, point, some) @ direction[some] for some in parts)
-        series = np.stack(along(direction), axis=1)[: len(plain_model.record)]
-        truth = plain_model.windows.transform(series)[:, :, : found.shape[2]]
-        np.testing.assert_allclose(found, truth, atol=1e-12 * np.abs(truth).max())
+    entries = list(range(len(point)))
+    assert len(entries) > 80
+    direction = random.normal(size=len(point)) * simulator.scales
+    found = plain_model.slopes(point, entries) @ direction
+    series = np.stack(along(direction), axis=1)[: len(plain_model.record)]
+    truth = plain_model.windows.transform(series)
+    np.testing.assert_allclose(found, truth, atol=1e-11 * np.abs(truth).max())
 
 
 def test_what_is_kept_along_with_slopes_is_what_is_predicted(plain_model) -> None:

@@ -60,7 +60,8 @@ def test_short_flights_begin_where_the_flight_is(plain_model) -> None:
 
 def test_no_attitude_no_short_flights(plain_model) -> None:
     columns = {n: v for n, v in plain_model.record.columns.items() if n not in ("phi", "theta")}
-    bare = replace(plain_model, record=replace(plain_model.record, columns=columns))
+    record = replace(plain_model.record, columns=columns)
+    bare = replace(plain_model, measurement=replace(plain_model.measurement, record=record))
     assert gap_of(bare, {}) is None
 
 

@@ -1,0 +1,48 @@
+"""From a flight to its residual model; truth: what is missing in the flight, and noise of known power."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.residuals.build import residual_model_like, residual_model_of
+from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.sim import Simulator
+
+
+def lacking(flight, *names: str):
+    columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in names}}
+    return replace(flight, record=replace(flight.record, columns=columns))
+
+
+def test_without_attitude_forces_are_compared_and_nothing_else(aircraft, plain) -> None:
+    model = residual_model_of(Simulator(aircraft, 50.0), lacking(plain, "phi", "theta", "psi"))
+    assert [c for c, measured in zip(CHANNELS, model.axes, strict=True) if measured] == list(CHANNELS[:6])
+    residual = model.residual(model.simulator.neutral())
+    assert np.isfinite(residual).all() and not residual[:, :, 6:].any()
+
+
+def test_a_heading_that_was_not_measured_is_not_compared(aircraft, plain) -> None:
+    model = residual_model_of(Simulator(aircraft, 50.0), lacking(plain, "psi"))
+    assert [c for c, measured in zip(CHANNELS, model.axes, strict=True) if not measured] == ["psi"]
+
+
+def test_twice_the_noise_has_four_times_the_power(aircraft, plain, plain_model) -> None:
+    """In channels that depend linearly on their sensors, up to the scatter of four realisations."""
+    louder = replace(aircraft, noise={name: 2.0 * sigma for name, sigma in aircraft.noise.items()})
+    model = residual_model_of(Simulator(louder, 50.0), plain)
+    ratio = model.noise[1:].sum(axis=0) / plain_model.noise[1:].sum(axis=0)
+    np.testing.assert_allclose(ratio[:3], 4.0, rtol=0.1)
+
+
+def test_the_same_record_seen_alike_is_the_same_model(plain_model) -> None:
+    again = residual_model_like(plain_model, plain_model.record)
+    neutral = plain_model.simulator.neutral()
+    np.testing.assert_array_equal(again.noise, plain_model.noise)
+    np.testing.assert_allclose(again.residual(neutral), plain_model.residual(neutral), atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_seed_makes_the_noise_reproducible(aircraft, plain, plain_model, seed: int) -> None:
+    model = residual_model_of(Simulator(aircraft, 50.0), plain, seed)
+    assert np.array_equal(model.noise, plain_model.noise) is (seed == 0)
