@@ -5,18 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_flights import fly
-from scipy.signal import lsim
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.gap.estimation.bounded_least_squares import upper_factor
 from sysid_node.gap.estimation.candidate_fit import linearised, unfitted
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
-from sysid_node.gap.instruments.excitation import external_excitation
 from sysid_node.gap.instruments.gust_free_signals import (
-    command_instruments,
     gust_free_instruments,
-    resonator_instruments,
 )
 from sysid_node.gap.instruments.overidentification import (
     OveridentificationTest,
@@ -68,29 +63,6 @@ def test_flights_pooled_leave_chance_as_it_is_and_add_up_what_is_in_both() -> No
         alone.append(flights[0].deviations[0])
         both.append(pooled(flights).deviations[0])
     assert np.mean(both) == pytest.approx(np.sqrt(2.0) * np.mean(alone), rel=0.1)
-
-
-def test_information_that_rounding_makes_singular_has_a_factor() -> None:
-    alike = np.array([[1.0, 1.0], [1.0, 1.0 - 1e-15]])
-    root = upper_factor(alike)
-    np.testing.assert_allclose(root.T @ root, alike, atol=1e-9)
-    clear = np.array([[1.0, 0.5], [0.5, 1.0]])
-    np.testing.assert_array_equal(upper_factor(clear), np.linalg.cholesky(clear).T)
-
-
-def foretold(table: np.ndarray, series: np.ndarray) -> float:
-    """Share of a series' power that the signals of a table hold."""
-    left = series - table @ np.linalg.lstsq(table, series, rcond=None)[0]
-    return float(1.0 - left.var() / series.var())
-
-
-def test_what_rings_after_a_step_is_foretold_by_resonators_not_by_lags(plain_model: ResidualModel) -> None:
-    """An oscillator at 1.15 Hz, between two of the resonators, of damping 0.08, driven by the elevator's command."""
-    omega, damping, rate = 2.0 * np.pi * 1.15, 0.08, plain_model.simulator.rate
-    given = external_excitation(plain_model).all[:, 0]
-    rung = lsim(([omega**2], [1.0, 2.0 * damping * omega, omega**2]), given - given[0], np.arange(given.size) / rate)[1]
-    assert foretold(resonator_instruments(plain_model)[0], rung - rung.mean()) > 0.9
-    assert foretold(command_instruments(plain_model)[0], rung - rung.mean()) < 0.75
 
 
 def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_model: ResidualModel) -> None:

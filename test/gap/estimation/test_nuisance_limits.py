@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 from gap_flights import fly
-from scipy.optimize import lsq_linear
 
-from sysid_node.gap.estimation.bounded_least_squares import bounded_least_squares
-from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted, with_candidates
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
@@ -56,26 +53,6 @@ def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
     kept = shifted.nuisances.without(frozenset({"command_delay"}), names)
     left = {names[i] for i in kept.indices}
     assert "actuator_stamp_delay.delay" not in left and "air_data_delay.delay" in left
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("size", [1e200, np.inf, np.nan])
-def test_a_prediction_that_grew_without_end_is_no_explanation(aircraft, plain_model, size) -> None:
-    problem = VariableProjection(linearised(unfitted([plain_model], nuisances_of(aircraft, plain_model))))
-    rows = problem.residual(np.zeros(0))
-    assert np.isfinite(problem.deviance(rows))
-    rows[3] = size
-    assert problem.deviance(rows) == np.inf
-
-
-@pytest.mark.parametrize("limit", [10.0, 0.5])
-def test_the_step_between_bounds_is_the_best_there(random: np.random.Generator, limit: float) -> None:
-    """Truth: SciPy's least squares on the factor itself."""
-    root = np.eye(6) + 0.2 * random.standard_normal((6, 6))
-    target = random.standard_normal(6)
-    best = lsq_linear(root, target, (-limit, limit)).x
-    ours = bounded_least_squares(root.T @ root, root.T @ target, np.full(6, -limit), np.full(6, limit))
-    np.testing.assert_allclose(ours, best, atol=1e-6)
 
 
 def test_what_a_nuisance_at_its_limit_holds_is_given_back(aircraft) -> None:

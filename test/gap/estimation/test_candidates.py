@@ -1,0 +1,56 @@
+"""Which effects may be to blame; truth: the simulator's list of effects, and what a flight can show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.estimation.candidates import PER_CONTROL, UNOBSERVABLE, Candidate, candidates_of
+from sysid_node.gap.residuals.parameter_priors import bounds
+from sysid_node.sim import EFFECTS
+
+
+@pytest.fixture(scope="module")
+def candidates(plain_model) -> list[Candidate]:
+    return candidates_of(plain_model.simulator, [plain_model])
+
+
+def test_every_effect_that_a_flight_can_show_is_a_candidate(candidates) -> None:
+    assert {c.effect for c in candidates} == EFFECTS.keys() - UNOBSERVABLE
+
+
+def test_labels_are_unique(candidates) -> None:
+    labels = [c.label for c in candidates]
+    assert len(set(labels)) == len(labels)
+
+
+def test_effects_with_an_onset_are_candidates_of_each_control(candidates, plain_model) -> None:
+    controls = plain_model.simulator.layout.controls
+    for effect in PER_CONTROL:
+        assert [c.label for c in candidates if c.effect == effect] == [f"{effect} of {control}" for control in controls]
+
+
+def test_derivatives_are_candidates_by_coefficient(candidates, plain_model) -> None:
+    names = plain_model.simulator.names
+    for candidate in (c for c in candidates if c.effect == "derivative_error"):
+        coefficient = candidate.label.rpartition(" ")[2]
+        assert not candidate.indices and candidate.widened
+        assert all(names[i].startswith(f"derivative_error.{coefficient}_") for i in candidate.widened)
+
+
+def test_every_fit_starts_within_its_bounds_and_not_at_neutral(candidates, plain_model) -> None:
+    simulator, neutral = plain_model.simulator, plain_model.simulator.neutral()
+    for candidate in (c for c in candidates if c.indices):
+        low, high = bounds(simulator, candidate.indices)
+        for start in np.array(candidate.starts):
+            inside = (low <= start) & (start <= high)
+            onset = np.array([simulator.names[i].endswith(".onset") for i in candidate.indices])
+            assert (inside | onset).all(), candidate.label
+            backlash_of_another = candidate.effect == "actuator_backlash" and not start.any()
+            assert backlash_of_another or (start != neutral[list(candidate.indices)]).any(), candidate.label
+
+
+def test_what_was_not_measured_is_not_blamed(plain_model) -> None:
+    flight = replace(plain_model.flight, metered=False)
+    effects = {c.effect for c in candidates_of(plain_model.simulator, [replace(plain_model, flight=flight)])}
+    assert not effects & {name for name, effect in EFFECTS.items() if effect.station == "propulsion"}
