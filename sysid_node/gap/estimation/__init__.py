@@ -1,6 +1,7 @@
 """Estimation: the parameters of a set of candidate effects by least squares, nuisance parameters eliminated.
 
-``nuisances`` lists what is always allowed for, ``candidates`` the effects that may be to blame, and ``fit`` estimates
-both by variable projection. ``predictive_density`` says how well a fit predicts windows and flights that it has not
-seen, ``checkpoint`` keeps finished fits on disk. ``instruments`` and ``selection`` work on these fits.
+``nuisances`` lists what may always be off, ``candidates`` the effects that may be to blame. A ``candidate_fit`` holds
+both for one or more flights; ``variable_projection`` and ``convergence`` move it to its maximum a posteriori.
+``predictive_density`` says how well a fit predicts windows and flights that it has not seen, and ``checkpoint`` keeps
+finished fits on disk. ``instruments`` and ``selection`` work on these fits.
 """

@@ -1,7 +1,7 @@
-"""Candidates: every effect of the chain with the values from which its fit may start.
+"""Candidates: every effect of the simulator's chain, with the values from which its fit may start.
 
-An effect with a corner, a state or an onset shows nothing at its neutral value, or at the wrong onset; so it starts
-from several plausible values, and the best start is polished.
+An effect with a corner, a state or an onset has no slope at its neutral value or at a wrong onset. Its fit is therefore
+started from several plausible values, of which the best is iterated to convergence.
 """
 
 from __future__ import annotations
@@ -16,57 +16,57 @@ from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import EFFECTS, Simulator
 
-#: Effects that forces and moments cannot show: what moves the air is measured by the vanes, and noise is noise.
+#: Effects that leave no residual of their own: motion of the air is measured by the vanes, and noise is no deficiency.
 UNOBSERVABLE = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 
-#: Effects of instruments that a flight without vanes has not, or shows by its airspeed alone; and the IMU's lateness,
-#: as all but the airspeed comes from it then: what it does, the commands' does (``belief``).
+#: Effects that a flight without vanes cannot show: those of the air data, and the delay of the IMU, from which all but
+#: the airspeed comes then, so that it cannot be told from a delay of the commands (``selection.causes``).
 _OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"})
 
-#: Effects of thrust, which on a flight without one is only what is left of the forward force.
+#: Effects of propulsion, which a flight without measured thrust cannot show.
 _OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")
 
-#: Parameters that only shape an effect and stay as they are: the data of one flight seldom determine them.
-_HELD = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
+#: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
+_FIXED = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
 
-#: Candidates one control each, because each has an onset of its own.
+#: Effects that are one candidate for each control, because each control has an onset of its own.
 PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
 
-#: Effects of one time, whose fingerprint turns with its size.
+#: Effects of one time constant or delay, whose slope changes direction with its size.
 TIME_EFFECTS = frozenset(
     {"actuator_lag", "command_delay", "air_data_lag", "air_data_delay", "imu_delay", "actuator_stamp_delay"}
 )
 
-#: Of these, the ones by which the response comes later than the commands: each is a rival of the others, always.
+#: Of these, the effects that delay the response to commands: each is always compared with the others.
 RESPONSE_DELAYS = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
 
-#: Onsets that are tried, as shares of the flight.
+#: Onsets from which fits start, as shares of the flight's duration.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect to blame: entries of the parameter vector that are fitted, and where their fit may start."""
+    """An effect that may be to blame: the parameters that are fitted, and the values from which their fit may start."""
 
     effect: str
     label: str  # the effect, and the control where it is one control's
-    indices: tuple[int, ...]  # none where only nuisances' priors widen
+    indices: tuple[int, ...]  # none where only priors of nuisances are widened
     starts: tuple[tuple[float, ...], ...]
-    widened: tuple[int, ...] = ()  # of these entries
+    widened: tuple[int, ...] = ()  # nuisances whose priors are widened
 
     @property
     def entries(self) -> tuple[int, ...]:
-        """All entries that it moves."""
+        """All entries of the parameter vector that it changes."""
         return (*self.indices, *self.widened)
 
     @property
     def station(self) -> str:
-        """Where in the chain it sits."""
+        """Its station in the simulator's chain."""
         return EFFECTS[self.effect].station
 
 
 def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list[Candidate]:
-    """All effects that these flights could show."""
+    """All effects on which these flights may contain information."""
     found: list[Candidate] = []
     length = max(model.windows.starts[-1] + model.windows.length for model in models)
     unseen = UNOBSERVABLE | (_OF_VANES if any(model.flight.inferred for model in models) else frozenset())
@@ -84,9 +84,9 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
 
 
 def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> Candidate:
-    """An effect with all its free parameters together."""
+    """The candidate of an effect with all its free parameters."""
     table = [(i, p) for i, (e, p) in enumerate(simulator.parameters)
-             if e == effect and f"{e}.{p.name}" not in _HELD]  # fmt: skip
+             if e == effect and f"{e}.{p.name}" not in _FIXED]  # fmt: skip
     shaped = dict(_shapes(simulator, models, effect))
     values = [
         shaped.get(p.name, (float(np.clip(p.neutral + 0.3 * simulator.scales[i], p.lower, p.upper)),)) for i, p in table
@@ -97,7 +97,7 @@ def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -
 def _shapes(
     simulator: Simulator, models: Sequence[ResidualModel], effect: str
 ) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Start values of parameters whose fingerprint depends on them."""
+    """Start values of those parameters of an effect on which its slopes depend, by the parameters' names."""
     if effect == "stall_separation":
         highest = max(float(model.record["alpha"].max()) for model in models)
         yield "alpha_star", tuple(np.clip([highest - 0.06, highest - 0.01, highest + 0.05], 0.06, 0.9).tolist())
@@ -108,7 +108,7 @@ def _shapes(
                     for v in models)  # fmt: skip
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
-        # mostly one control has it; a start that gives it to all of them looks worse than none
+        # usually one control has backlash; a start that gives it to all of them may fit worse than none
         yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
     if effect in TIME_EFFECTS:
         name = "delay" if effect.endswith("delay") else "time_constant"
@@ -120,7 +120,7 @@ def _shapes(
 
 
 def _per_coefficient(simulator: Simulator) -> list[Candidate]:
-    """Derivatives beyond their tolerances, one coefficient's at a time: all at once would pass for almost anything."""
+    """Derivatives beyond their tolerances, one coefficient's at a time: all together would fit almost anything."""
     by_coefficient: dict[str, list[int]] = {}
     for i, (effect, parameter) in enumerate(simulator.parameters):
         known = simulator.aircraft.derivatives.get(parameter.name)
@@ -133,7 +133,7 @@ def _per_coefficient(simulator: Simulator) -> list[Candidate]:
 
 
 def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:
-    """One candidate for each control, with an onset before or during the flight."""
+    """Candidates of an effect, one for each control, with an onset before or during the flight."""
     names, found = simulator.names, []
     onsets = (-10.0, *(share * length for share in _ONSETS))
     for control in simulator.layout.controls:

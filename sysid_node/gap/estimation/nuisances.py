@@ -1,9 +1,9 @@
-"""What is always allowed for: the derivatives' errors within their tolerances, biases, and clocks within one sample.
+"""Nuisance parameters: errors of the derivatives within their tolerances, biases, and clock offsets within one sample.
 
-Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value, cut off at three sigmas (a
-clock's: at one sample). The cut is what makes a tolerance a tolerance: data that know a derivative to a thousandth
-would overrule any prior, and a shifted centre of gravity would pass as a Cm_alpha ten sigmas out. Derivatives and
-clocks are shared by all flights; biases are each flight's own.
+Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value, truncated at three standard
+deviations (a clock offset at one sample). The truncation gives the tolerance its meaning: data that determine a
+derivative to a thousandth would overrule any prior, and a shifted centre of gravity would pass as an error of Cm_alpha
+of ten standard deviations. All flights share the derivatives and clock offsets; biases are each flight's own.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from sysid_node.gap.thresholds import THRESHOLDS
 #: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a wider prior.
 DERIVATIVE_ERROR = "derivative_error"
 
-#: Clocks that are known to a sample of their topic, and the effects that are such a clock's error themselves. A late
-#: IMU is late against both others, and all three together against nothing: it is measured against the air data, and
-#: the commands' clock stays as it is, for a servo's own lag must not pass for lateness.
+#: Clock offsets that are known to one sample of their topic, and the effects that replace each. Only relative delays can
+#: be observed: a delay of the IMU replaces the offset of the air data, whereas that of the commands stays a nuisance, so
+#: that a servo's lag does not pass for a delay of the IMU.
 CLOCKS = {
     "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
     "air_data_delay": ("air_data_delay", "imu_delay"),
 }
 
-#: Noise of the aircraft file that a bias may be as large as.
+#: Biases, and the sensor whose noise in the aircraft file is the bias's standard deviation.
 _BIASES = {
     **{f"imu_bias.{n}": "accel" for n in ("ax", "ay", "az")},
     **{f"imu_bias.{n}": "gyro" for n in "pqr"},
@@ -44,16 +44,16 @@ _BIASES = {
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Indices into the parameter vector, 1-sigma of each, the most each may be, and which the flights share."""
+    """Nuisance parameters of a flight: entries of the parameter vector, and their truncated Gaussian priors."""
 
     indices: tuple[int, ...]
-    sigma: Array
-    limit: Array
-    shared: NDArray[np.bool_]
+    sigma: Array  # standard deviation of each
+    limit: Array  # largest absolute value of each
+    shared: NDArray[np.bool_]  # whether all flights have the same value
     widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
 
     def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
-        """Those that do not belong to these effects; the priors of some are widened."""
+        """The nuisances without those that these effects replace; the priors of ``widened`` entries are widened."""
         gone = {e for e in effects if e != DERIVATIVE_ERROR}
         gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
@@ -88,9 +88,10 @@ class HeldOutFlight:
 
 
 def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[ResidualModel] = ()) -> Nuisances:
-    """Of one of an aircraft's flights: the same ones for all that are looked at together, by its own rates.
+    """The nuisance parameters of one of an aircraft's flights, with limits by the flight's own rates.
 
-    Raises InputError where the aircraft's file has no tolerances.
+    They are the same parameters for all flights that are diagnosed together, ``others`` included. Raises InputError
+    where the aircraft file has no tolerances.
     """
     every = (model, *others)
     tolerances = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
@@ -115,9 +116,10 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
 
 
 def _turning_air(aircraft: Aircraft) -> dict[str, float]:
-    """In gusts: the air that rises also turns, which works like a derivative with the rate of alpha, up to -C_q.
+    """Standard deviations of alpha-rate derivatives in gusts, by name: half of the file's C_q.
 
-    The pitching gust of a wing as long as the gusts are short: q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2).
+    Rising air also rotates, q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2), which acts like a derivative with respect to
+    the rate of alpha of up to -C_q.
     """
     damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
     return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}

@@ -2,5 +2,5 @@
 
 A recorded flight is low-passed and resampled to the analysis rate (``gap_flight``). Flow angles and thrust that
 nobody measured are inferred (``flow_angles``, ``thrust``), and a flight alone is cut to its manoeuvre
-(``manoeuvre_window``). The result is a ``Flight``, from which ``residuals`` makes what is compared.
+(``manoeuvre_window``). The result is a ``GapFlight``, from which ``residuals`` makes what is compared.
 """

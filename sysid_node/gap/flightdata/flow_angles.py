@@ -1,9 +1,9 @@
-"""Flow angles of flights without vanes, for the diagnosis.
+"""Flow angles of flights without vanes.
 
-They are those of the online estimator's kinematic filter (``online.reconstruction``): the IMU's integrals, held slowly
-by the aircraft file's lift and side force. So they share the IMU's clock and errors, know nothing of gusts, and are no
-readings that could be compared. Their mean is the aircraft file's, which ``nuisance`` allows for: lift passes for drag
-by as much.
+They come from the online estimator's kinematic filter (``online.alignment.flow_angle_filter``): integrals of the IMU,
+corrected slowly by the lift and side force of the aircraft file. So they share the IMU's clock and errors, do not
+contain gusts, and are no measurements that could be compared. Their mean is that of the aircraft file; its error, by
+which lift is mistaken for drag, is a nuisance parameter.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _LONGEST_STEP = 0.5  # s
 
 
 def missing_flow_angles(record: FlightRecord) -> tuple[str, ...]:
-    """The flow angles of which a record has not one value."""
+    """The flow angles of which a record has no value."""
     return tuple(name for name in ANGLES if not record.measured(name))
 
 
 def with_inferred_angles(
     aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...], source: str
 ) -> FlightRecord:
-    """The record with these angles inferred, as long as it was. Raises InputError where they cannot be."""
+    """The record with these angles (rad) inferred. Raises InputError where they cannot be."""
     absent = [name for name in _NEEDED if not np.isfinite(record[name]).all()]
     if absent:
         raise InputError(f"{source}: no {' or '.join(angles)}, and no complete {', '.join(absent)} to infer them from")
@@ -48,7 +48,7 @@ def with_inferred_angles(
 
 
 def _samples(aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...]) -> Array:
-    """(N, M) as the online estimator takes them; what is not measured counts as level: zero."""
+    """Samples (N, M) as the online estimator takes them; attitude that was not measured is set to zero."""
     step = np.gradient(record.time)
     known = {**record.columns, "air_interval": step, **dict.fromkeys(angles, np.full(len(record), np.nan))}
     columns = [known.get(name, np.zeros(len(record))) for name in (*SAMPLE_COLUMNS, *aircraft.control_symbols)]

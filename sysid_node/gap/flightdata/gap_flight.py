@@ -1,4 +1,4 @@
-"""Flights made ready for comparison: one low-passed, regular time base for what was measured and commanded."""
+"""A flight as a diagnosis takes it: loaded, completed where signals are missing, and resampled to one time base."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import flow_angles as inferred
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
 
-#: Rate at which forces are predicted (Hz): six times the highest line that is compared, and more.
+#: Rate at which forces are predicted, Hz: more than ten times the highest frequency that is compared.
 ANALYSIS_RATE = 50.0
 
-#: Corner of the zero-phase low-pass before samples are thinned to ``RATE``, Hz. Flat to 6 Hz; commands pass it too,
-#: so that a linear chain is compared with itself.
+#: Corner of the zero-phase low-pass before flights are resampled, Hz. It is flat to 6 Hz. Commands pass it, too, so
+#: that a linear chain stays the same.
 _CORNER = 11.0
 
-#: Shortest flight that can be compared, s: three windows that hold a short period each.
+#: Shortest flight that can be diagnosed, s: three windows of at least a short period each.
 SHORTEST_FLIGHT = 6.0
 
 _LATERAL = ("ay", "p", "r", "beta")
@@ -36,7 +36,7 @@ _LATERAL = ("ay", "p", "r", "beta")
 
 @dataclass(frozen=True)
 class GapFlight:
-    """A record, and how often each topic was sampled (Hz), which says how much noise lies in the band."""
+    """A record, and the rate at which each topic was sampled, Hz, from which the noise in the band follows."""
 
     record: FlightRecord
     imu_rate: float
@@ -46,12 +46,12 @@ class GapFlight:
     source: str = ""
     filled: tuple[str, ...] = field(default=())  # columns that were not measured and are taken as zero
     inferred: tuple[str, ...] = field(default=())  # flow angles that no vane measured
-    left_out: float = 0.0  # s without a manoeuvre that are not looked at
-    metered: bool = True  # whether thrust is known, or else is what the file's drag leaves of the forward force
+    left_out: float = 0.0  # s without a manoeuvre that were cut off
+    metered: bool = True  # whether thrust was measured; else it is inferred from the file's drag
 
 
 def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
-    """A flight of a bag or a log. Raises InputError: unreadable, lacking a signal, too short."""
+    """The flight of a bag or a log. Raises InputError where it is unreadable, lacks a signal or is too short."""
     if path.suffix.lower() in READERS:
         record = read_log(path)
         rate = 1.0 / float(np.median(np.diff(record.time)))
@@ -64,15 +64,17 @@ def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | 
 
 
 def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
-    """The flight with the lateral signals, where all are absent, as zeros, and a thrust where nobody metered it.
+    """The flight with what was not measured: lateral signals as zeros, flow angles and thrust inferred.
 
-    Raises InputError where a signal is missing.
+    Only its longest part without an interruption is kept. Raises InputError where another signal is missing, or where
+    the flight is too short.
     """
     flight = _with_flow_angles(aircraft, replace(flight, record=_first_run(flight.record)))
     return _with_thrust(aircraft, _with_lateral(aircraft, flight))
 
 
 def _with_lateral(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+    """The flight with zeros for the lateral signals where not all of them were measured."""
     record = flight.record
     longitudinal = ("ax", "az", "q", "V", "alpha", "rho", *aircraft.control_symbols)
     needed = [*longitudinal, *(["thrust"] if aircraft.throttle and record.measured("thrust") else [])]
@@ -94,14 +96,14 @@ def _with_lateral(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
 
 
 def _with_thrust(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
-    """The flight with a thrust that keeps its airspeed, where the aircraft has an engine that nobody metered."""
+    """The flight with an inferred thrust, where the aircraft has an engine whose thrust was not measured."""
     if not thrust_missing(aircraft, flight.record):
         return flight
     return replace(flight, record=with_inferred_thrust(aircraft, flight.record), metered=False)
 
 
 def _with_flow_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
-    """The flight with the flow angles that its aircraft has no vane for, where the six inertial instruments tell."""
+    """The flight with inferred flow angles, where no vane measured them and the inertial measurements are complete."""
     angles = inferred.missing_flow_angles(flight.record)
     if not angles or not all(np.isfinite(flight.record[name]).all() for name in ("ay", "p", "r")):
         return flight
@@ -111,7 +113,7 @@ def _with_flow_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
 
 
 def _first_run(record: FlightRecord) -> FlightRecord:
-    """The longest part without a gap in time of more than half a second."""
+    """The longest part without an interruption of more than half a second; its time begins at zero."""
     breaks = np.flatnonzero(np.diff(record.time) > 0.5)
     edges = np.concatenate([[0], breaks + 1, [len(record)]])
     longest = int(np.argmax(np.diff(edges)))
@@ -122,9 +124,9 @@ def _first_run(record: FlightRecord) -> FlightRecord:
 
 
 def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:
-    """The flight at ``rate``, low-passed with zero phase, and the gyroscopes' rates of change added.
+    """The flight at ``rate``, Hz, low-passed with zero phase, with angular accelerations.
 
-    Columns ``p_rate q_rate r_rate`` (rad/s^2) are fourth-order central differences before the low-pass.
+    Columns ``p_rate q_rate r_rate`` (rad/s^2) are fourth-order central differences of the rates before the low-pass.
     """
     record = flight.record
     factor = max(1, round(flight.imu_rate / rate))
@@ -141,26 +143,27 @@ def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:
     return FlightRecord(fine[::factor], low, record.name, record.start_ns)
 
 
-#: Columns of motion; the others (commands) are straight between samples.
+#: Columns that are interpolated by a cubic spline; the others (commands) are interpolated linearly.
 _SMOOTH = frozenset({"ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "phi", "theta"})
 
-#: Angles that jump by a full turn, which no low-pass should see.
+#: Angles that jump by a full turn and are unwrapped before the low-pass.
 _TURNING = frozenset({"phi", "psi"})
 
 
 def _on_grid(time: Array, values: Array, grid: Array, *, smooth: bool) -> Array:
-    between: Array = CubicSpline(time, values)(grid) if smooth else np.interp(grid, time, values)
-    return between
+    """A series interpolated to the times of a grid, s."""
+    interpolated: Array = CubicSpline(time, values)(grid) if smooth else np.interp(grid, time, values)
+    return interpolated
 
 
 def _slope(values: Array, rate: float) -> Array:
-    """d/dt (N,) by fourth-order central differences; the ends repeat the inner values."""
+    """Time derivative (N,) by fourth-order central differences; at the ends the nearest inner value."""
     inner = (8.0 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) * rate / 12.0
     return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
 
 
 def _low_pass(rate: float) -> Array:
-    """Taps of the linear-phase low-pass, a quarter of a second each way; one tap where the rate is too low for it."""
+    """Taps of the linear-phase low-pass, a quarter of a second to each side; one tap where the rate is too low."""
     if rate <= 2.2 * _CORNER:
         return np.ones(1)
     taps: Array = firwin(2 * round(0.25 * rate) + 1, _CORNER, fs=rate)
@@ -168,6 +171,7 @@ def _low_pass(rate: float) -> Array:
 
 
 def _filtered(values: Array, taps: Array) -> Array:
+    """A series (N,) through a symmetric filter, without delay; its ends are held."""
     half = taps.size // 2
     padded = np.pad(values, half, mode="edge")
     low: Array = fftconvolve(padded, taps, mode="valid")

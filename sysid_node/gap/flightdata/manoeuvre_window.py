@@ -1,7 +1,8 @@
-"""A flight alone is checked on its own parts; where only one of them moves, that one is parted.
+"""A flight cut down to its only manoeuvre.
 
-Most of a flight with a single manoeuvre is quiet. With the manoeuvre left out nothing could be fitted, so nothing that
-was fitted could be checked: the quiet goes, and the manoeuvre itself is fitted by parts.
+A single flight is validated on parts of itself. If it holds one short manoeuvre, most parts are quiet, and without the
+part that holds the manoeuvre nothing could be fitted. So the quiet parts are cut off, and the manoeuvre itself is
+divided.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from sysid_node.gap.thresholds import THRESHOLDS
 
 
 def step_changes(commands: Array) -> Array:
-    """Changes (N, controls) of commands from sample to sample, zero where they are no faster than usual."""
+    """Changes (N, controls) of commands from sample to sample, zero where they are not much faster than usual."""
     changes = np.diff(commands, axis=0, prepend=commands[:1])
     return np.where(np.abs(changes) > THRESHOLDS.manoeuvre.sudden * np.median(np.abs(changes), axis=0), changes, 0.0)
 
 
 def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
-    """The flight's only manoeuvre, where there is one and it is a small part of the flight; else the flight."""
+    """The part of the flight with its only manoeuvre, if that is a small part of it; else the flight itself."""
     record = resampled(flight)
     moved = [name for name in (*controls, *(["thrust"] if flight.metered else [])) if name in record.columns]
     steps = step_changes(np.column_stack([record[name] for name in moved])) ** 2
@@ -40,7 +41,7 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
 
 
 def _between(record: FlightRecord, begin: float, end: float) -> FlightRecord:
-    """Part of a record, its time from zero; begin and end in s."""
+    """The part of a record between two times, s; its own time begins at zero."""
     kept = (record.time >= begin) & (record.time <= end)
     columns = {name: values[kept] for name, values in record.columns.items()}
     start = record.start_ns + round(1e9 * begin)

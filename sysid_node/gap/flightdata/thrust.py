@@ -1,7 +1,7 @@
-"""Thrust of flights on which nobody metered it, for the diagnosis.
+"""Thrust of flights on which it was not measured.
 
-It is what the aircraft file's drag leaves of the measured forward force: so the simulator keeps the airspeed, thrust
-and drag cannot be told apart, and forward motion is no reading that could be compared.
+It is inferred from the measured forward force and the drag of the aircraft file. Thrust and drag can then not be told
+apart, and forward motion is no measurement that could be compared.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.record import Array, FlightRecord
 
-#: What shows nothing then: the channel of forces, and the readings of short flights.
+#: What contains no information then: a channel of forces, and readings of short simulated flights.
 THRUST_CHANNEL, THRUST_READINGS = "CD", frozenset({"ax", "V"})
 
 
 def thrust_missing(aircraft: Aircraft, record: FlightRecord) -> bool:
-    """Whether an aircraft with an engine has a record without one value of thrust."""
+    """Whether the aircraft has an engine and the record no value of thrust."""
     return aircraft.throttle is not None and not record.measured("thrust")
 
 
 def with_inferred_thrust(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
-    """The record with the thrust (N) that the file's lift and drag leave; may be negative, as the drag is a belief.
+    """The record with the thrust, N, that the file's lift and drag leave of the forward force.
 
-    The accelerometer is taken as at the centre of gravity and the flow as at the probe: what that is off by is forward.
+    It may be negative, because the file's drag may be too small. The accelerometer is taken as at the centre of gravity
+    and the flow as at the probe; the error of that is small in the forward direction.
     """
     x, alpha = _regressors(aircraft, record), record["alpha"]
     lift = _by_file(aircraft, "CL", x)
@@ -47,6 +48,6 @@ def _regressors(aircraft: Aircraft, record: FlightRecord) -> dict[str, Array]:
 
 
 def _by_file(aircraft: Aircraft, coefficient: str, x: dict[str, Array]) -> Array:
-    """A coefficient (N,) of the aircraft file."""
+    """A coefficient (N,) by the aircraft file's derivatives."""
     terms = {n.partition("_")[2]: d.value for n, d in aircraft.derivatives.items() if n.startswith(f"{coefficient}_")}
     return np.asarray(sum((value * x[regressor] for regressor, value in terms.items()), np.zeros_like(x["0"])))

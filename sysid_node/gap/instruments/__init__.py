@@ -1,6 +1,7 @@
 """Instrumental variables: what the commands say of a residual, free of the bias that gusts and feedback cause.
 
-``excitation`` separates external input from feedback, ``overidentification`` tests whether a residual is correlated
-with the instruments, and ``liml`` estimates sizes without that bias. ``bayes_factor`` compares two explanations by
-the part of the residual that the commands explain. ``selection`` asks these tests which candidates to accept.
+``excitation`` separates external inputs from feedback, and ``gust_free_signals`` makes instruments of them.
+``moment_equations`` are what the instruments see of a fit; ``overidentification`` tests whether a residual is
+correlated with them, ``liml`` estimates sizes without bias, and ``bayes_factor`` compares two explanations.
+``selection`` uses these to decide which candidates to accept.
 """

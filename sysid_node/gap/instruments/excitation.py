@@ -1,4 +1,4 @@
-"""What a pilot or a test program does with the commands, as against what an autopilot does against the weather."""
+"""External excitation: what a pilot or a test program commands, as against an autopilot's feedback to gusts."""
 
 from __future__ import annotations
 
@@ -13,24 +13,27 @@ from sysid_node.gap.residuals.air_motion import is_gusty, with_longest_memory
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 
-#: How long an autopilot answers to a gust, and how finely that is looked at, s.
-_ANSWER, _GRAIN = 2.0, 0.1
+#: Longest delay with which an autopilot answers a gust, and the step between the delays that are modelled, s.
+_LONGEST_DELAY, _DELAY_STEP = 2.0, 0.1
 
-#: Penalty on the answer's coefficients, as a share of the air's power: so many are no better than few.
+#: Penalty on the coefficients of the answer (ridge regression), as a share of the air's power.
 _RIDGE = 1e-3
 
 
 @dataclass(frozen=True)
 class ExternalExcitation:
-    """Signals (N, m) of what was done to the commands deliberately; ``steps`` are those that owe nothing to gusts."""
+    """Signals (N, m) of the external inputs in the commands."""
 
     all: Array
-    steps: Array
+    steps: Array  # those that are uncorrelated with gusts of any kind
 
 
 def external_excitation(model: ResidualModel) -> ExternalExcitation:
-    """Where surfaces step: their steps, forgotten after some seconds; between them an autopilot moves them with the
-    gusts. Where none steps (a multisine), the commands themselves, unless the weather moves them."""
+    """The external excitation of a flight; none where gusts drive the commands.
+
+    If surfaces step, it is their steps, which decay after some seconds, because between the steps an autopilot answers
+    gusts. If none steps (a multisine), it is the commands themselves.
+    """
     commands = model.commands
     changes = np.diff(commands, axis=0, prepend=commands[:1])
     decay = np.exp(-model.simulator.step / THRESHOLDS.instruments.memory)
@@ -46,15 +49,16 @@ def external_excitation(model: ResidualModel) -> ExternalExcitation:
 
 
 def externally_excited(model: ResidualModel) -> bool:
-    """Whether the flight shows what the aircraft does of itself: still air, or commands that are not the weather's."""
+    """Whether the aircraft's own dynamics can be identified: in still air, or with external excitation."""
     return not is_gusty(model) or bool(external_excitation(model).all.size)
 
 
 def driven_by_gusts(model: ResidualModel) -> bool:
-    """Whether the air's motion foretells most of what the surfaces do: an autopilot that answers to gusts.
+    """Whether the air's motion predicts most of the surfaces' motion: an autopilot that answers gusts.
 
-    From the motion of the last seconds, as the vanes show it beyond the inertial instruments, half of the flight
-    foretold by the other; the median of the surfaces, for rolling gusts move no vane.
+    The motion of the air in the last seconds is that which the vanes show beyond the inertial instruments. Each half of
+    the flight is predicted from a regression on the other. The median of the surfaces decides, because rolling gusts
+    move no vane.
     """
     if not is_gusty(model):
         return False
@@ -63,21 +67,23 @@ def driven_by_gusts(model: ResidualModel) -> bool:
     if not air.shape[1] or not surfaces.shape[1]:
         return False
     rate = model.simulator.rate
-    longest, grain = round(_ANSWER * rate), max(round(_GRAIN * rate), 1)
+    longest, grain = round(_LONGEST_DELAY * rate), max(round(_DELAY_STEP * rate), 1)
     lagged = np.column_stack([np.roll(air, lag, axis=0) for lag in range(0, longest, grain)])[longest:]
-    return bool(np.median(_foretold(lagged - lagged.mean(axis=0), surfaces[longest:])) > THRESHOLDS.instruments.driven)
+    return bool(
+        np.median(_predicted_share(lagged - lagged.mean(axis=0), surfaces[longest:])) > THRESHOLDS.instruments.driven
+    )
 
 
 def _air(model: ResidualModel) -> Array:
-    """Motion of the air (N, up to 3), of airspeed and flow angles, as a long memory shows it."""
+    """Motion of the air (N, up to 3) in airspeed and flow angles, by an observer with the longest memory."""
     first = len(COEFFICIENTS)
     shown = first + np.flatnonzero(model.axes[first : first + 3])
     calm = with_longest_memory(model)
     return np.asarray((model.series - calm.predicted_series(model.simulator.neutral()))[:, shown])
 
 
-def _foretold(causes: Array, series: Array) -> Array:
-    """Share (S,) of each of some series (N, S) that causes (N, K) foretell in the half not fitted."""
+def _predicted_share(causes: Array, series: Array) -> Array:
+    """Share (S,) of each series' (N, S) variance that causes (N, K) predict in the half that was not fitted."""
     series, halves = series - series.mean(axis=0), np.array_split(np.arange(len(series)), 2)
     left = np.zeros(series.shape[1])
     for fitted, unseen in (halves, halves[::-1]):

@@ -1,4 +1,4 @@
-"""Which flights can be diagnosed at all; what is wrong with the others, in one line."""
+"""Whether a flight can be diagnosed; an InputError says in one line what is wrong with it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def require_distinct_flights(flights: Sequence[GapFlight], holdouts: Sequence[Ga
 
 
 def require_admissible(model: ResidualModel, limits: Admission = THRESHOLDS.admission) -> ResidualModel:
-    """The view. Raises InputError where nothing moves, or where the flight is another aircraft's."""
+    """The model itself. Raises InputError where no surface moves, or where the lift is that of another aircraft."""
     commands = model.commands[:, :-1]
     travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
     if (travel < limits.least_travel).all():
@@ -50,11 +50,11 @@ def require_admissible(model: ResidualModel, limits: Admission = THRESHOLDS.admi
 
 
 def _or_imu(model: ResidualModel) -> str:
-    """What else may be wrong where flow angles are inferred."""
+    """What else may be wrong where the flow angles are inferred."""
     return ", or an IMU far off, from which its flow angles are inferred" if model.flight.inferred else ""
 
 
 def signal_to_noise(model: ResidualModel) -> Array:
-    """Power over the sensors' noise, by coefficient that was measured."""
+    """Ratio of signal power to the power of the sensors' noise, by channel that was measured."""
     power = (np.abs(model.measured[:, 1:]) ** 2).mean(axis=0).sum(axis=0)
     return np.asarray((power / model.noise[1:].sum(axis=0))[model.axes])

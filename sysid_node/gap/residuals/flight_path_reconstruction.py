@@ -1,11 +1,12 @@
-"""What air data and attitude should have read, given what the inertial instruments measured: no aerodynamics in it.
+"""Flight path reconstruction: air data and attitude predicted from the inertial instruments, without aerodynamics.
 
-Forces and moments say little of what lives near zero frequency, and an instrument's error passes there as an error of
-the derivatives. The motion's kinematics know no derivatives: specific force and rates, integrated, must give the
-airspeed, flow angles and attitude that were measured (flight path reconstruction: Klein & Morelli (2006), ch. 10). An
-observer keeps the integral from drifting: each prediction is corrected by a share of its error before the next, so that
-what is compared are innovations, and the errors' history counts once. How fast it forgets depends on the air: in
-turbulence the last reading says more about the wind than an integral over seconds.
+Near zero frequency, forces and moments contain little information, and an error of an instrument looks like an error of
+the derivatives. The kinematics contain no derivatives: specific force and angular rates, integrated, must give the
+measured airspeed, flow angles and attitude (Klein & Morelli (2006), Aircraft System Identification, ch. 10).
+
+An observer keeps the integral from drifting: each prediction is corrected by a share of its error before the next one
+is made. What is compared are therefore innovations, in which each error counts once. The best time constant of the
+observer depends on the air: in turbulence the last reading says more about the wind than an integral over seconds.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ from sysid_node.sim.stations import sensors
 #: Columns of ``reconstruct``: m/s and rad.
 READINGS = ("V", "alpha", "beta", "phi", "theta", "psi")
 
-#: Time after which the observer forgets the attitude, s; no wind moves it.
-_ATTITUDE_FADING = 4.0
+#: Time constant with which the observer corrects the attitude, s; the wind does not disturb it.
+_ATTITUDE_MEMORY = 4.0
 
 
 class Motion(NamedTuple):
-    """What the instruments read, N samples at a constant rate, by the messages' stamps."""
+    """Readings of the instruments, N samples at a constant rate, at the times of the messages' stamps."""
 
     force: Scalar  # (N, 3) specific force, m/s^2
     rates: Scalar  # (N, 3) rad/s
@@ -48,6 +49,8 @@ class Motion(NamedTuple):
 
 
 class _Inertial(NamedTuple):
+    """The motion by the inertial instruments, corrected for their errors."""
+
     force: Vector  # specific, at the CG
     rates: Vector
     turning: Vector  # rad/s^2
@@ -55,27 +58,29 @@ class _Inertial(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One sample of the motion, or a series of them, that the sensors' effects hide."""
+    """The motion at one sample, or at a series of them, corrected for the sensors' effects."""
 
     force: Vector  # specific, at the CG
     rates: Vector
-    velocity: Vector  # relative to the air, at the CG, as the probe has it
+    velocity: Vector  # relative to the air, at the CG, by the air data
     attitude: Vector  # Euler angles
     flow: Scalar  # (..., 3) airspeed, alpha, beta at the probe
-    probe: Scalar  # (..., 3) what a lagged probe holds of them
+    probe: Scalar  # (..., 3) output of the lagged probe
 
 
 class _State(NamedTuple):
+    """State of the observer."""
+
     velocity: Vector
     attitude: Vector
-    probe: Scalar  # (3,) what the lagged probe holds
+    probe: Scalar  # (3,) output of the lagged probe
     truth: Scalar  # (3,) the flow at the probe
 
 
 def motion_of(record: FlightRecord) -> Motion | None:
-    """A record's signals, with the rates' derivatives; None without roll and pitch angle.
+    """The readings of a record, angular accelerations included; None without roll and pitch angle.
 
-    A heading that was not measured is zero: nothing but its own prediction depends on it.
+    A heading that was not measured is set to zero: nothing but its own prediction depends on it.
     """
     if not all(np.isfinite(record[name]).all() for name in ("phi", "theta")):
         return None
@@ -96,9 +101,12 @@ def motion_of(record: FlightRecord) -> Motion | None:
 
 
 def reconstruct(
-    layout: Layout, model: Model, theta: Parameters, motion: Motion, fading: Scalar | float, step: Scalar
+    layout: Layout, model: Model, theta: Parameters, motion: Motion, memory: Scalar | float, step: Scalar
 ) -> Scalar:
-    """Readings (N, 6), columns ``READINGS``, that parameters (P,) expect, each from the samples before it; pure."""
+    """Readings (N, 6), columns ``READINGS``, that parameters (P,) predict, each from the samples before it.
+
+    ``memory`` is the time constant of the observer of the air, s; ``step`` the sample period, s. Pure.
+    """
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
     samples = corrected_motion(chain, motion)
     first = jax.tree.map(lambda series: series[0], samples)
@@ -106,7 +114,7 @@ def reconstruct(
     start = _State(first.velocity, first.attitude, flow, flow)
     before = jax.tree.map(lambda series: jnp.concatenate([series[:1], series[:-1]]), samples)
     known = jnp.arange(motion.air.shape[0]) * step
-    steps = (before, samples, jnp.minimum(known, fading), jnp.minimum(known, _ATTITUDE_FADING))
+    steps = (before, samples, jnp.minimum(known, memory), jnp.minimum(known, _ATTITUDE_MEMORY))
     _, rows = jax.lax.scan(lambda state, sample: _advance(chain, state, *sample), start, steps)
     air, attitude = rows[:, :3], rows[:, 3:]
     late_air, late_imu = (chain.effects[name]["delay"] / step for name in ("air_data_delay", "imu_delay"))
@@ -114,7 +122,7 @@ def reconstruct(
 
 
 def corrected_motion(chain: Chain, motion: Motion) -> Sample:
-    """The motion (N,) that the readings tell of, at the time of the samples."""
+    """The motion (N,) without the sensors' effects of a parameter vector, at the time of the samples."""
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
     velocity = velocity_from(velocity_of(flow.T, jnp), inertial.rates, _probe(chain))
@@ -122,7 +130,7 @@ def corrected_motion(chain: Chain, motion: Motion) -> Sample:
 
 
 class Flow(NamedTuple):
-    """The flow at the time of the samples, and how fast it changes."""
+    """The flow at the time of the samples, and its rate of change."""
 
     velocity: Vector  # (N,) relative to the air at the CG, m/s
     alpha_rate: Scalar  # (N,) rad/s at the CG
@@ -132,10 +140,10 @@ export.register_namedtuple_serialization(Flow, serialized_name="sysid.Flow")
 
 
 def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
-    """By the inertial instruments, with as much of what the vanes show beyond them as a memory (s) lets through.
+    """The flow by the inertial instruments, corrected by the vanes with a time constant ``memory``, s.
 
-    What gusts do, only the vanes show: without a memory they are followed at every sample. In still air their noise
-    would pass for motion: in a regressor it makes derivatives seem smaller, the more so the less the aircraft moves.
+    Only the vanes show gusts: with a memory of zero they are followed at every sample. In still air their noise would
+    pass for motion, and noise in a regressor biases derivatives toward zero, the more so the less the aircraft moves.
     """
     samples = corrected_motion(chain, motion)
     moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
@@ -148,11 +156,11 @@ def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
 
 
 def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar) -> tuple[Vector, Vector]:
-    """A velocity (N,) as the vanes have it, from its rate by the inertial instruments, and its rate.
+    """A velocity (N,) seen by the vanes, smoothed with its rate by the inertial instruments; and the smoothed rate.
 
-    A straight line through what the vanes show beyond that rate, over the memory: an accelerometer that is off by a
-    constant leaves nothing (Benedict & Bordner (1962), IRE Trans. Automatic Control 7(4); the gains of a line through n
-    samples).
+    The difference of the two is fitted by a straight line over the memory, so that a constant error of an accelerometer
+    leaves nothing (the alpha-beta filter of Benedict & Bordner (1962), IRE Trans. Automatic Control 7(4), with the
+    gains of a line through n samples).
     """
     readings, rates = jnp.stack(seen, 1), jnp.stack(moving, 1)
     gained = 0.5 * step * (rates + jnp.concatenate([rates[:1], rates[:-1]]))
@@ -165,7 +173,7 @@ def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar
         now = expected + sample[0] * beyond
         return jnp.concatenate([now, last[3:] + sample[1] * beyond]), now
 
-    # one row in, one row out: XLA would copy whole series at every step
+    # one array of rows: with several series XLA would copy each of them whole at every step
     table = jnp.concatenate([level[:, None], tilt[:, None], gained, readings], axis=1)
     _, velocity = jax.lax.scan(advance, jnp.concatenate([readings[0], jnp.zeros(3)]), table)
     beyond = (velocity - jnp.concatenate([readings[:1], velocity[:-1]]) - gained) / step
@@ -173,6 +181,7 @@ def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar
 
 
 def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
+    """Rates of change (N, 3) of airspeed and flow angles at the probe."""
     force, rates, turning, attitude = inertial
     velocity, probe = velocity_of(reading.T, jnp), _probe(chain)
     moving, _ = rates_of_change(velocity_from(velocity, rates, probe), attitude, force, rates)
@@ -180,7 +189,7 @@ def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
 
 
 def _inertial(chain: Chain, motion: Motion) -> _Inertial:
-    """What gyroscopes, accelerometers and attitude tell (N,)."""
+    """The motion (N,) by gyroscopes, accelerometers and attitude, moved to the CG."""
     effects, late = chain.effects, chain.effects["imu_delay"]["delay"] / chain.step
     force, rates, turning, attitude = (
         Vector(*shift_cubic(series, -late).T)
@@ -194,17 +203,18 @@ def _inertial(chain: Chain, motion: Motion) -> _Inertial:
 
 
 def _reading(chain: Chain, motion: Motion) -> Scalar:
-    """The flow (N, 3) that a probe without errors but its lag would have read."""
+    """The flow (N, 3) that the probe would have read with no error but its lag."""
     late = chain.effects["air_data_delay"]["delay"] / chain.step
     return jnp.stack(sensors.flow_from(chain.effects, *shift_cubic(motion.air, -late).T), 1)
 
 
 def _probe(chain: Chain) -> Vector:
+    """Position of the air data probe relative to the CG, m."""
     return sensors.air_data_arm(chain.model, chain.effects, chain.body)
 
 
 def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str, str]) -> Vector:
-    """A vector without scale errors and misalignment."""
+    """A reading without scale errors and misalignment."""
     scale = effects["imu_scale"]
     true = Vector(*(part / (1.0 + scale[name]) for part, name in zip(reading, names, strict=True)))
     return imu_misalignment.undo(effects["imu_misalignment"], true)
@@ -213,9 +223,9 @@ def _unscaled(effects: dict[str, Values], reading: Vector, names: tuple[str, str
 def _advance(
     chain: Chain, state: _State, before: Sample, now: Sample, air_memory: Scalar, attitude_memory: Scalar
 ) -> tuple[_State, Scalar]:
-    """Predicts the readings (6,) of now, then corrects.
+    """The observer's state after one sample, and the readings (6,) that it predicted for it.
 
-    Memories (s) begin with the flight: the first reading's noise would otherwise stay for as long as they are.
+    Memories (s) grow from zero with the flight: otherwise the first reading's noise would stay for as long.
     """
     h = chain.step
     k1 = rates_of_change(state.velocity, state.attitude, before.force, before.rates)
@@ -238,5 +248,5 @@ def rates_of_change(velocity: Vector, attitude: Vector, force: Vector, rates: Ve
 
 
 def _at_probe(chain: Chain, velocity: Vector, rates: Vector) -> Scalar:
-    """Airspeed, alpha, beta (3,) where the probe sits."""
+    """Airspeed, alpha and beta (3,) at the probe."""
     return jnp.stack(sensors.at_probe(velocity, rates, _probe(chain)))

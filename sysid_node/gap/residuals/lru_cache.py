@@ -1,4 +1,4 @@
-"""What was worked out lately, kept for whoever asks for the same again: threads share it."""
+"""A least-recently-used cache that threads share."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ _Value = TypeVar("_Value")
 
 
 class LruCache(Generic[_Value]):
-    """The ``size`` values by key that were asked for last; others are forgotten."""
+    """The ``size`` values by key that were asked for last; older ones are dropped."""
 
     def __init__(self, size: int) -> None:
         self._size, self._kept, self._lock = size, OrderedDict[bytes, _Value](), Lock()
 
     def get(self, key: bytes) -> _Value | None:
-        """What was kept under a key, or None."""
+        """The value of a key, or None."""
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
             return self._kept.get(key)
 
     def keep(self, key: bytes, value: _Value) -> _Value:
-        """Keeps a value and gives it back."""
+        """The value, which is kept under the key."""
         with self._lock:
             self._kept[key] = value
             self._kept.move_to_end(key)

@@ -1,7 +1,8 @@
-"""Windows and lines: a time series as complex amplitudes by window and frequency.
+"""Short-time Fourier transform: a time series as complex amplitudes by window and frequency line.
 
-Sine-tapered windows that overlap by half: the squares of neighbouring tapers add up to one, so that every sample counts
-once; the coefficients, twice as many as there are independent ones, each count by half (``SHARE``).
+The windows have a sine taper and overlap by half. The squares of neighbouring tapers add up to one, so that every
+sample counts once. There are twice as many coefficients as independent ones, so each counts by half
+(``INDEPENDENT_SHARE``).
 """
 
 from __future__ import annotations
@@ -16,22 +17,22 @@ from sysid_node.flight.record import Array
 
 Complex = NDArray[np.complex128]
 
-#: Length of a window, about, s: two periods of the lowest band's middle, short enough that drift stays in its mean.
+#: Approximate length of a window, s: two periods of the middle of the lowest band. Drift stays in a window's mean.
 LENGTH = 8.0
 
-#: Lengths of a window that fit into the shortest flight.
+#: Least length of a flight, in windows; in a shorter one the windows are shorter.
 LEAST_WINDOWS = 3.0
 
-#: What is left out at either end of a flight, s: late signals are made up there, by holding the first or last sample.
+#: Time that is left out at either end of a flight, s, where delayed signals are not known.
 MARGIN = 0.25
 
-#: Highest line, Hz: beyond it, vanes and rigid-body dynamics have little to say.
+#: Highest frequency, Hz: above it, vanes and rigid-body dynamics contain little information.
 HIGHEST_FREQUENCY = 4.0
 
-#: What each coefficient counts of an independent one.
+#: Number of independent coefficients for each coefficient.
 INDEPENDENT_SHARE = 0.5
 
-#: Edges of the bands in which the residual's power is smoothed, Hz; the mean is a band of its own.
+#: Edges of the bands in which the residual's power is averaged, Hz; zero frequency is a band of its own.
 BAND_EDGES = (0.0, 0.06, 0.3, 0.6, 1.0, 1.6, 2.4, HIGHEST_FREQUENCY + 0.1)
 
 
@@ -46,7 +47,7 @@ class Windows:
 
     @classmethod
     def over(cls, samples: int, rate: float, length: float = LENGTH) -> Windows:
-        """As many of about this length as fill so many samples without their ends."""
+        """Windows of about this length, s, that fill a flight of so many samples except its ends."""
         first = round(MARGIN * rate)
         inner = samples - 2 * first
         halves = max(2, round(2.0 * inner / min(length * rate, inner / LEAST_WINDOWS)))
@@ -61,7 +62,7 @@ class Windows:
 
     @property
     def starts(self) -> Array:
-        """When each window begins (W,), s."""
+        """Time at which each window begins (W,), s."""
         return (self.first + np.arange(self.count) * (self.size // 2)) / self.rate
 
     @property
@@ -77,11 +78,11 @@ class Windows:
 
     @property
     def bands(self) -> NDArray[np.intp]:
-        """Band of each line (L,)."""
+        """Number of each line's band (L,)."""
         return np.searchsorted(np.array(BAND_EDGES), self.frequencies, side="right") - 1
 
     def transform(self, series: Array) -> Complex:
-        """Amplitudes (W, L, ...) of a series (N, ...); the variance of white noise passes as it is per sample."""
+        """Amplitudes (W, L, ...) of a series (N, ...), scaled so that white noise keeps its variance."""
         lines = self.frequencies.size
         table, flat = _tapered_waves(self.size, lines), series.reshape(series.shape[0], -1)
         parts = np.stack([table @ flat[window] for window in self.slices])
@@ -97,7 +98,7 @@ class Windows:
 
 @lru_cache(maxsize=8)
 def _tapered_waves(size: int, lines: int) -> Array:
-    """Cosines, then negative sines (2 lines, size) under the taper: few lines are wanted, so a product beats an FFT."""
+    """Tapered cosines, then negative sines (2 lines, size). With so few lines a product is faster than an FFT."""
     sample = np.arange(size)
     taper = np.sin(np.pi * (sample + 0.5) / size) / np.sqrt(0.5 * size)
     phase = 2.0 * np.pi * np.outer(np.arange(lines), sample) / size
@@ -105,6 +106,6 @@ def _tapered_waves(size: int, lines: int) -> Array:
 
 
 def power_of(residual: Complex) -> Array:
-    """Power (12,) of a residual (W, L, 12); the mean, which has no imaginary part, counts half."""
+    """Power (12,) of a residual (W, L, 12). The line at zero frequency, which has no imaginary part, counts by half."""
     power = (np.abs(residual) ** 2).sum(axis=0)
     return np.asarray(power.sum(axis=0) - 0.5 * power[0])
