@@ -104,8 +104,8 @@ def _shapes(
         yield "depth", (0.8,)
         yield from (("a1", (20.0,)), ("CD_X", (0.1,)), ("Cm_X", (-0.05,)))
     if effect == "actuator_rate_limit":
-        speed = max(float(np.abs(np.diff(v.commands[:, :-1], axis=0)).max()) * v.simulator.rate
-                    for v in models)  # fmt: skip
+        fastest = [float(np.abs(np.diff(model.commands[:, :-1], axis=0)).max()) for model in models]
+        speed = max(change * model.simulator.rate for change, model in zip(fastest, models, strict=True))
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
         # usually one control has backlash; a start that gives it to all of them may fit worse than none
@@ -127,21 +127,21 @@ def _per_coefficient(simulator: Simulator) -> list[Candidate]:
         if effect == DERIVATIVE_ERROR and known is not None and known.tolerance:
             by_coefficient.setdefault(parameter.name.partition("_")[0], []).append(i)
     return [
-        Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {c}", (), ((),), tuple(own))
-        for c, own in by_coefficient.items()
+        Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {coefficient}", (), ((),), tuple(entries))
+        for coefficient, entries in by_coefficient.items()
     ]
 
 
 def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:
     """Candidates of an effect, one for each control, with an onset before or during the flight."""
-    names, found = simulator.names, []
+    names, candidates = simulator.names, []
     onsets = (-10.0, *(share * length for share in _ONSETS))
     for control in simulator.layout.controls:
-        own = [f"{effect}.{control}"]
+        fitted = [f"{effect}.{control}"]
         values: list[tuple[float, ...]] = [(0.2,)]
         if effect == "stuck_surface":
-            own.append(f"{effect}.{control}_position")
+            fitted.append(f"{effect}.{control}_position")
             values = [(1.0,), (0.0,)]
-        indices = (*(names.index(n) for n in own), names.index(f"{effect}.onset"))
-        found.append(Candidate(effect, f"{effect} of {control}", indices, tuple(product(*values, onsets))))
-    return found
+        indices = (*(names.index(n) for n in fitted), names.index(f"{effect}.onset"))
+        candidates.append(Candidate(effect, f"{effect} of {control}", indices, tuple(product(*values, onsets))))
+    return candidates

@@ -25,9 +25,9 @@ from sysid_node.gap.thresholds import THRESHOLDS
 #: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a wider prior.
 DERIVATIVE_ERROR = "derivative_error"
 
-#: Clock offsets that are known to one sample of their topic, and the effects that replace each. Only relative delays can
-#: be observed: a delay of the IMU replaces the offset of the air data, whereas that of the commands stays a nuisance, so
-#: that a servo's lag does not pass for a delay of the IMU.
+#: Clock offsets that are known to one sample of their topic, and the effects that replace each. Only relative delays
+#: can be observed: a delay of the IMU replaces the offset of the air data, whereas that of the commands stays a
+#: nuisance, so that a servo's lag does not pass for a delay of the IMU.
 CLOCKS = {
     "actuator_stamp_delay": ("command_delay", "actuator_stamp_delay"),
     "air_data_delay": ("air_data_delay", "imu_delay"),
@@ -93,18 +93,18 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
     They are the same parameters for all flights that are diagnosed together, ``others`` included. Raises InputError
     where the aircraft file has no tolerances.
     """
-    every = (model, *others)
+    models = (model, *others)
     tolerances = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
     if not tolerances:
         raise InputError(
             f"aircraft {aircraft.name!r}: no derivative has a tolerance, so what is a gap cannot be told from an "
             "honest error; give derivatives a tolerance (1 sigma) in the aircraft file"
         )
-    lateral = any(v.flight.lateral for v in every)
+    lateral = any(m.flight.lateral for m in models)
     sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
     sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
-    if any(is_gusty(v) for v in every):
+    if any(is_gusty(m) for m in models):
         sigma |= _turning_air(aircraft)
     limit = {name: THRESHOLDS.priors.limit * s for name, s in sigma.items()}
     for clock, rate in zip(CLOCKS, (model.flight.actuator_rate, model.flight.air_rate), strict=True):

@@ -122,9 +122,9 @@ def _information_without_shapes(fit: CandidateFit) -> Array:
     linear step of it would then lead anywhere.
     """
     assert fit.information is not None
-    held = ~fit.uncertain
+    fixed = ~fit.uncertain
     information = fit.information * np.outer(fit.uncertain, fit.uncertain)
-    information[held, held] = 1.0
+    information[fixed, fixed] = 1.0
     return np.asarray(information)
 
 
@@ -184,8 +184,8 @@ def fit_on_other_flight(fit: CandidateFit, flight: HeldOutFlight) -> CandidateFi
     """The fit as it stands on a flight that it has not seen, linearised there; nothing is fitted anew."""
     model, point = flight.model, transferred_parameters(fit, flight.model)
     power = residual_power(model, model.residual(point))
-    there = FlightFit(model, _kept_nuisances(fit, flight), point, power)
-    return linearised(replace(fit, flights=(there,)))
+    flight_fit = FlightFit(model, _kept_nuisances(fit, flight), point, power)
+    return linearised(replace(fit, flights=(flight_fit,)))
 
 
 def exported_parameters(fit: CandidateFit, point: Array) -> Array:

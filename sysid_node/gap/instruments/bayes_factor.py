@@ -30,17 +30,17 @@ def log_bayes_factor(fit: CandidateFit, other: CandidateFit) -> float:
     model that is not exact is no more certain than it predicts (quasi-likelihood: Burnham & Anderson (2002), Model
     Selection and Multimodel Inference, sect. 2.5).
     """
-    left = overidentification_of(fit)
-    scatter = 1.0 + left.coherent / (0.5 * left.chance**2)
+    test = overidentification_of(fit)
+    scatter = 1.0 + test.coherent / (0.5 * test.chance**2)
     powers = tuple(power * scatter for power in fit.powers)
     return _log_evidence(fit, powers) - _log_evidence(other, powers)
 
 
 def _log_evidence(fit: CandidateFit, powers: Sequence[Array]) -> float:
     """Log evidence, up to a constant, in noise of these powers (L, 12) by flight."""
-    seen = moment_equations(fit, powers, command_instruments, whole=True)
-    step = limited_step(seen, fit)
-    squares = seen.constant - 2.0 * float(seen.right @ step) + float(step @ seen.information @ step)
+    equations = moment_equations(fit, powers, command_instruments, whole=True)
+    step = limited_step(equations, fit)
+    squares = equations.constant - 2.0 * float(equations.right @ step) + float(step @ equations.information @ step)
     precision, _ = prior_terms(fit)
-    _, volume = np.linalg.slogdet(seen.information)
+    _, volume = np.linalg.slogdet(equations.information)
     return -0.5 * (squares + float(volume) - float(np.log(precision).sum()))

@@ -85,11 +85,11 @@ def _air(model: ResidualModel) -> Array:
 def _predicted_share(causes: Array, series: Array) -> Array:
     """Share (S,) of each series' (N, S) variance that causes (N, K) predict in the half that was not fitted."""
     series, halves = series - series.mean(axis=0), np.array_split(np.arange(len(series)), 2)
-    left = np.zeros(series.shape[1])
+    unexplained = np.zeros(series.shape[1])
     for fitted, unseen in (halves, halves[::-1]):
         X = causes[fitted]
         power = X.T @ X
         known = power + _RIDGE * np.trace(power) / len(power) * np.eye(len(power))
         weights = np.linalg.solve(known, X.T @ series[fitted])
-        left += ((series[unseen] - causes[unseen] @ weights) ** 2).sum(axis=0)
-    return np.asarray(1.0 - left / (series**2).sum(axis=0))
+        unexplained += ((series[unseen] - causes[unseen] @ weights) ** 2).sum(axis=0)
+    return np.asarray(1.0 - unexplained / (series**2).sum(axis=0))

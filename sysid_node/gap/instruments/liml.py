@@ -38,10 +38,10 @@ def k_class_step(fit: CandidateFit) -> CandidateFit:
 
     Its information is the inverse of the estimate's covariance (Bekker's, without third and fourth moments).
     """
-    seen = moment_equations(fit, fit.powers)
-    channels = channel_products(seen)
-    step, corrected = _solved(fit, seen, channels)
-    scores = seen.information.copy()
+    equations = moment_equations(fit, fit.powers)
+    channels = channel_products(equations)
+    step, corrected = _solved(fit, equations, channels)
+    scores = equations.information.copy()
     for channel in channels:
         beyond, excess = channel.scatter(step), channel.excess(step)
         scores += (beyond - 1.0) * channel.coherent[:-1, :-1] + beyond * excess**2 * channel.rest[:-1, :-1]
@@ -67,11 +67,11 @@ def moment_weights(fit: CandidateFit) -> tuple[Sequence[Array], Array]:
     if not _in_moving_air(fit):
         assert fit.information is not None
         return [flight.slopes for flight in fit.flights], fit.information
-    seen = moment_equations(fit, fit.powers)
-    channels = channel_products(seen)
-    step, corrected = _solved(fit, seen, channels)
+    equations = moment_equations(fit, fit.powers)
+    channels = channel_products(equations)
+    step, corrected = _solved(fit, equations, channels)
     found, order = [], iter(channels)
-    for flight, moments in zip(fit.flights, seen.flights, strict=True):
+    for flight, moments in zip(fit.flights, equations.flights, strict=True):
         J = moments.slopes
         known = np.zeros_like(J)
         known[:, 0] = flight.slopes.reshape(J.shape)[:, 0]
@@ -88,13 +88,13 @@ def _in_moving_air(fit: CandidateFit) -> bool:
 
 
 def _solved(
-    fit: CandidateFit, seen: MomentEquations, channels: Sequence[ChannelProducts]
+    fit: CandidateFit, equations: MomentEquations, channels: Sequence[ChannelProducts]
 ) -> tuple[Array, MomentEquations]:
     """The step (unknowns,), and the corrected equations that it solves."""
     precision, _ = prior_terms(fit)
-    step, corrected = limited_step(seen, fit), seen
+    step, corrected = limited_step(equations, fit), equations
     for _ in range(_ROUNDS):
-        corrected = without_chance(seen, channels, step, precision)
+        corrected = without_chance(equations, channels, step, precision)
         step = limited_step(corrected, fit)
     return step, corrected
 
@@ -122,10 +122,10 @@ class ChannelProducts:
         return float(direction @ self.coherent @ direction), float(direction @ self.rest @ direction)
 
 
-def channel_products(seen: MomentEquations) -> list[ChannelProducts]:
+def channel_products(equations: MomentEquations) -> list[ChannelProducts]:
     """The products of all channels that have instruments, flight by flight."""
     found = []
-    for flight in seen.flights:
+    for flight in equations.flights:
         table = np.concatenate([flight.slopes, flight.rows[..., None]], axis=3)
         for axis, directions in flight.basis.items():
             columns, count = table[:, :, axis].reshape(-1, table.shape[3]), directions.shape[1]
@@ -137,18 +137,18 @@ def channel_products(seen: MomentEquations) -> list[ChannelProducts]:
 
 
 def without_chance(
-    seen: MomentEquations, channels: Sequence[ChannelProducts], step: Array, precision: Array
+    equations: MomentEquations, channels: Sequence[ChannelProducts], step: Array, precision: Array
 ) -> MomentEquations:
     """The equations without what the instruments see by chance at a step (unknowns,).
 
     ``precision`` (unknowns,) of the priors: no less is known than before the flight.
     """
-    information, right = seen.information.copy(), seen.right.copy()
+    information, right = equations.information.copy(), equations.right.copy()
     for channel in channels:
         excess = channel.excess(step)
         information -= excess * channel.rest[:-1, :-1]
         right -= excess * channel.rest[:-1, -1]
-    return replace(seen, information=at_least_prior(information, precision), right=right)
+    return replace(equations, information=at_least_prior(information, precision), right=right)
 
 
 def at_least_prior(information: Array, precision: Array) -> Array:

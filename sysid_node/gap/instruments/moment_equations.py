@@ -76,9 +76,9 @@ def moment_equations(
     return MomentEquations(flights, information, right, constant)
 
 
-def limited_step(seen: MomentEquations, fit: CandidateFit) -> Array:
+def limited_step(equations: MomentEquations, fit: CandidateFit) -> Array:
     """The step (unknowns,) that solves moment equations with every unknown within its limits."""
-    return bounded_least_squares(seen.information, seen.right, *step_limits(fit))
+    return bounded_least_squares(equations.information, equations.right, *step_limits(fit))
 
 
 def prior_terms(fit: CandidateFit) -> tuple[Array, Array]:

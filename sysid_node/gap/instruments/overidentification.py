@@ -60,8 +60,8 @@ def pooled_overidentification(fit: CandidateFit, held_out: Sequence[HeldOutFligh
     By channel with the gust-free instruments, or with resonators where these find more, and more than chance. A flight
     on which the fit has no finite linearisation is left out.
     """
-    every = [fit, *(fit_on_other_flight(fit, flight) for flight in held_out)]
-    fits = [f for f in every if f.information is not None and np.isfinite(f.information).all()]
+    on_each = [fit, *(fit_on_other_flight(fit, flight) for flight in held_out)]
+    fits = [f for f in on_each if f.information is not None and np.isfinite(f.information).all()]
     usual, resonant = (
         pooled([overidentification_of(f, reweighted_powers(f, by), by) for f in fits])
         for by in (gust_free_instruments, resonator_instruments)
@@ -89,13 +89,13 @@ def overidentification_of(
     ``powers`` (L, 12) by flight are those of the noise: with the same ones, residuals of several fits compare. Without
     them they are the fit's own.
     """
-    seen = moment_equations(fit, powers or fit.powers, by)
-    step = limited_step(seen, fit)
+    equations = moment_equations(fit, powers or fit.powers, by)
+    step = limited_step(equations, fit)
     coherent, total, size, others = (np.zeros(len(CHANNELS)) for _ in range(4))
-    for flight in seen.flights:
-        left = flight.rows - flight.slopes @ step
+    for flight in equations.flights:
+        remainder = flight.rows - flight.slopes @ step
         for axis, directions in flight.basis.items():
-            series = left[:, :, axis].ravel()
+            series = remainder[:, :, axis].ravel()
             coherent[axis] += float(np.sum((directions.T @ series) ** 2))
             total[axis] += float(np.sum(series**2))
             size[axis] += directions.shape[1]
@@ -111,11 +111,11 @@ def reweighted_powers(fit: CandidateFit, by: Instruments) -> tuple[Array, ...]:
     frequencies would stand out of a noise that is too low there (Hansen (1982): the covariance must be that at the true
     parameters).
     """
-    seen, powers = moment_equations(fit, fit.powers, by), []
-    step = limited_step(seen, fit)
-    for flight, moments in zip(fit.flights, seen.flights, strict=True):
-        left = (moments.rows - moments.slopes @ step).reshape(len(moments.rows), -1)
-        power = residual_power(flight.model, amplitudes(left, weights_without_mean(flight.model, flight.power)))
+    equations, powers = moment_equations(fit, fit.powers, by), []
+    step = limited_step(equations, fit)
+    for flight, moments in zip(fit.flights, equations.flights, strict=True):
+        remainder = (moments.rows - moments.slopes @ step).reshape(len(moments.rows), -1)
+        power = residual_power(flight.model, amplitudes(remainder, weights_without_mean(flight.model, flight.power)))
         power[0] = flight.power[0]
         powers.append(power)
     return tuple(powers)

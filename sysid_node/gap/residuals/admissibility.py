@@ -15,13 +15,13 @@ from sysid_node.gap.thresholds import THRESHOLDS, Admission
 
 def require_distinct_flights(flights: Sequence[GapFlight], holdouts: Sequence[GapFlight]) -> None:
     """Raises InputError where a held-out flight is one of those that are fitted."""
-    for held in holdouts:
+    for holdout in holdouts:
         for flight in flights:
-            a, b = held.record, flight.record
+            a, b = holdout.record, flight.record
             same = a.start_ns == b.start_ns and len(a) == len(b) and np.array_equal(a["az"], b["az"])
-            if same or held.source == flight.source:
+            if same or holdout.source == flight.source:
                 raise InputError(
-                    f"--holdout {held.source}: is the same flight as {flight.source}; hold out a flight that is not "
+                    f"--holdout {holdout.source}: is the same flight as {flight.source}; hold out a flight that is not "
                     "fitted, or leave --holdout away to check on parts of the flight"
                 )
 
