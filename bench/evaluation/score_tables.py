@@ -15,9 +15,9 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import ComparisonTable, is_accepted
 from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, is_supported_but_misspecified
-from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.comparison import Comparison
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.replacement import AlternativeTable, PositionTable, next_step
 from sysid_node.gap.selection.retention import CauseTable, next_challenge
 from sysid_node.gap.thresholds import Thresholds

@@ -12,8 +12,9 @@ from functools import cached_property
 
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
-from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.replacement import next_step
 from sysid_node.gap.thresholds import THRESHOLDS
 

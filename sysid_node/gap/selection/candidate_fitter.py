@@ -14,8 +14,9 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidate
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
-from sysid_node.gap.estimation.predictive_density import Evidence, competing_evidence
+from sysid_node.gap.estimation.predictive_density import competing_evidence
 from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.onset import search_onset
 from sysid_node.gap.selection.screening import Screened, ScreenedPair, screened_or_infinite
 
@@ -24,15 +25,6 @@ Progress = Callable[[float, str], None]
 
 _Work = TypeVar("_Work")
 _Result = TypeVar("_Result")
-
-
-@dataclass(frozen=True)
-class FittedSet:
-    """A set of candidates fitted, with its evidence; ``added`` is the candidate that the smaller set lacked."""
-
-    fit: CandidateFit
-    evidence: Evidence
-    added: Candidate | None = None
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,9 @@ from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
 from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, evidence_of, prior_odds
-from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison, power_left
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.misspecification import misspecification_of
 from sysid_node.gap.selection.retention import (
     CauseTable,

@@ -22,7 +22,7 @@ from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
-from sysid_node.gap.selection.candidate_fitter import FittedSet
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.sim import EFFECTS
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.spectral_weights import real_rows
-from sysid_node.gap.selection.candidate_fitter import FittedSet
+from sysid_node.gap.selection.fitted_set import FittedSet
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,10 @@ from sysid_node.gap.instruments.overidentification import (
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import is_accepted, predicts_better
-from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet, Progress
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.selection.comparison import Comparison, probability_against
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.screening import best_screened, with_found_onsets
 from sysid_node.gap.thresholds import THRESHOLDS
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidate
 from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.parameter_priors import bounds
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
-
-if TYPE_CHECKING:
-    from sysid_node.gap.selection.candidate_fitter import FittedSet
 
 
 class Screened(NamedTuple):

@@ -26,8 +26,8 @@ from sysid_node.gap.flightdata.gap_flight import resampled
 from sysid_node.gap.residuals.build import residual_model_like
 from sysid_node.gap.residuals.parameter_priors import prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.candidate_fitter import FittedSet
 from sysid_node.gap.selection.causes import Cause
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 from sysid_node.sim import Simulator

@@ -11,7 +11,8 @@ from sysid_node.gap.estimation.candidates import Candidate, candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.candidate_fitter import CandidateFitter, FittedSet
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.screening import Screened, ScreenedPair
 from sysid_node.sim import Simulator
 
