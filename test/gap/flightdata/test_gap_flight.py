@@ -1,10 +1,59 @@
-"""Flights made ready: what is filtered is what was flown."""
+"""Flights made ready; truth: sines, whose derivatives and amplitudes are known, and what was taken away."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from sysid_node.gap.flightdata.gap_flight import resampled
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.flight.record import FlightRecord
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, completed_flight, resampled
+
+RATE, DURATION = 200.0, 20.0
+NAMES = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "phi", "theta", "psi", "thrust")
+
+
+def flight_with(aircraft: Aircraft, **columns: np.ndarray) -> GapFlight:
+    """A flight at 200 Hz of constant signals but those given."""
+    time = np.arange(round(DURATION * RATE) + 1) / RATE
+    constant = {name: np.full(time.size, 0.1) for name in (*NAMES, *aircraft.control_symbols)}
+    return GapFlight(FlightRecord(time, {**constant, **columns}), RATE, RATE, RATE, source="made by hand")
+
+
+def without(flight: GapFlight, *names: str) -> GapFlight:
+    columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in names}}
+    return replace(flight, record=replace(flight.record, columns=columns))
+
+
+@pytest.fixture
+def time() -> np.ndarray:
+    return np.arange(round(DURATION * RATE) + 1) / RATE
+
+
+def test_angular_accelerations_are_the_derivatives_of_the_rates(aircraft, time) -> None:
+    omega = 2.0 * np.pi * 2.0
+    record = resampled(flight_with(aircraft, q=np.sin(omega * time)))
+    inner = slice(25, -25)
+    expected = omega * np.cos(omega * record.time)
+    np.testing.assert_allclose(record["q_rate"][inner], expected[inner], atol=2e-3 * omega)
+
+
+@pytest.mark.parametrize(("frequency", "passed"), [(0.5, 1.0), (4.0, 1.0), (20.0, 0.0)])
+def test_what_is_compared_passes_the_low_pass_without_delay_and_the_rest_does_not(
+    aircraft, time, frequency: float, passed: float
+) -> None:
+    sine = np.sin(2.0 * np.pi * frequency * time)
+    record = resampled(flight_with(aircraft, q=sine))
+    inner = slice(25, -25)
+    expected = passed * np.sin(2.0 * np.pi * frequency * record.time)
+    np.testing.assert_allclose(record["q"][inner], expected[inner], atol=0.01)
+
+
+def test_the_time_base_is_regular(aircraft) -> None:
+    record = resampled(flight_with(aircraft))
+    np.testing.assert_allclose(np.diff(record.time), 1.0 / ANALYSIS_RATE)
+    assert record.duration == pytest.approx(DURATION, abs=1.0 / ANALYSIS_RATE)
 
 
 def test_a_heading_through_south_is_not_smeared(plain) -> None:
@@ -14,3 +63,31 @@ def test_a_heading_through_south_is_not_smeared(plain) -> None:
               for psi in (heading, (heading + np.pi) % (2.0 * np.pi) - np.pi))  # fmt: skip
     whole, jumping = (record["psi"] for record in turned)
     np.testing.assert_allclose(jumping, whole, atol=1e-9)
+
+
+def test_only_the_longest_part_without_an_interruption_is_kept(aircraft, time) -> None:
+    flight = flight_with(aircraft)
+    interrupted = time + 3.0 * (time > 6.0)
+    kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
+    assert kept.record.duration == pytest.approx(DURATION - 6.0, abs=2.0 / RATE)
+    assert kept.record.time[0] == 0.0
+
+
+def test_lateral_signals_that_were_not_measured_are_zero(aircraft) -> None:
+    flight = completed_flight(aircraft, without(flight_with(aircraft), "ay", "p", "r", "beta"))
+    assert not flight.lateral and set(flight.filled) == {"ay", "p", "r", "beta"}
+    assert not flight.record["ay"].any() and flight.record["q"].all()
+
+
+@pytest.mark.parametrize("name", ["az", "V", "de"])
+def test_a_signal_that_is_needed_is_named(aircraft, name: str) -> None:
+    with pytest.raises(InputError, match=rf"no complete {name}"):
+        completed_flight(aircraft, without(flight_with(aircraft), name))
+
+
+def test_a_flight_that_is_too_short_is_refused(aircraft, time) -> None:
+    flight = flight_with(aircraft)
+    columns = {name: values[time < 5.0] for name, values in flight.record.columns.items()}
+    short = replace(flight, record=FlightRecord(time[time < 5.0], columns))
+    with pytest.raises(InputError, match=r"5\.0 s of flight; the gap needs 6 s or more"):
+        completed_flight(aircraft, short)

@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
+from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre, step_changes
 
 CONTROLS = ("de", "da", "dr")
 
@@ -37,3 +38,13 @@ def test_a_throttle_that_steps_later_belongs_to_the_manoeuvres(aircraft) -> None
     stepped = replace(flight, record=replace(record, columns={**record.columns, "thrust": thrust}))
     assert cut_to_manoeuvre(flight, CONTROLS).left_out > 30.0
     assert cut_to_manoeuvre(stepped, CONTROLS) is stepped
+
+
+def test_steps_are_told_from_smooth_motion() -> None:
+    """Truth: a sine with one step of 0.2 in it, and a sine alone."""
+    time = np.arange(0.0, 20.0, 0.02)
+    smooth = 0.05 * np.sin(2.0 * np.pi * 0.3 * time)
+    changes = step_changes(np.column_stack([smooth + 0.2 * (time > 7.0), smooth]))
+    (place,) = np.flatnonzero(changes[:, 0])
+    assert time[place] == pytest.approx(7.02, abs=0.02) and changes[place, 0] == pytest.approx(0.2, abs=0.01)
+    assert not changes[:, 1].any()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Windows
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Windows, power_of
 
 
 def test_white_noise_keeps_its_variance(random) -> None:
@@ -26,3 +26,26 @@ def test_coefficients_count_each_sample_once() -> None:
     assert INDEPENDENT_SHARE * 2 * windows.count * (windows.frequencies.size - 1) == pytest.approx(
         independent, rel=0.02
     )
+
+
+def test_windows_fill_the_flight_and_overlap_by_half() -> None:
+    windows = Windows.over(2000, 50.0)
+    first, second, *_, last = windows.slices
+    assert second.start - first.start == windows.size // 2
+    assert 2000 - windows.first - last.stop < windows.size // 2
+    np.testing.assert_allclose(windows.starts, [s.start / 50.0 for s in windows.slices])
+
+
+def test_power_is_averaged_within_each_band_and_nowhere_else(random) -> None:
+    windows = Windows.over(2000, 50.0)
+    power = random.uniform(1.0, 2.0, (windows.frequencies.size, 3))
+    smoothed = windows.smoothed(power)
+    for band in set(windows.bands.tolist()):
+        inside = windows.bands == band
+        np.testing.assert_allclose(smoothed[inside], power[inside].mean(axis=0, keepdims=True).repeat(inside.sum(), 0))
+    np.testing.assert_array_equal(smoothed[0], power[0])  # the mean is a band of its own
+
+
+def test_the_power_of_a_residual_is_its_sum_of_squares_with_the_mean_by_half() -> None:
+    residual = np.ones((4, 5, 12), complex)
+    np.testing.assert_allclose(power_of(residual), 4 * (0.5 + 4.0))
