@@ -168,9 +168,9 @@ def monitored(seed: int, identified: bool) -> MonitorState:
     if not identified:
         return monitor.init(believed(seed), FaultMonitorSettings())
     state = monitor.init(AIRCRAFT, FaultMonitorSettings())
-    off = np.random.default_rng(2000 + seed).standard_normal(len(state.held.values))
-    state.held.errors = IDENTIFIED * np.abs(state.held.values) + 1e-5
-    state.held.values = state.held.values + state.held.errors * off
+    off = np.random.default_rng(2000 + seed).standard_normal(len(state.reference.values))
+    state.reference.errors = IDENTIFIED * np.abs(state.reference.values) + 1e-5
+    state.reference.values = state.reference.values + state.reference.errors * off
     return state
 
 

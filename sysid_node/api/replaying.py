@@ -98,7 +98,7 @@ class Replay(EstimatedRun):
             aircraft=self.aircraft.name,
             method=self.settings.method,
             frame_id=self.streams.imu.frame_id,
-            faults=self.faults.said if self.faults else (),
+            faults=self.faults.reports if self.faults else (),
         )
         return folder / REPORT
 

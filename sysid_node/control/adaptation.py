@@ -1,9 +1,10 @@
-"""From estimates to the gains that are flown: gates, margins over the corners of the intervals, bounded movement.
+"""Adapts the gains of an axis to new estimates, within gain and phase margins and at a bounded rate.
 
-A derivative is used where its estimate is valid, its interval tight and its equation holds; the others stay as they are
-flown. The regulator's gains for them are flown only if every corner of the used intervals is stable with margins; else
-those of a more cautious regulator, and else what was flown before. The corners are looked at a few at every step, so
-that no command is late for them. Gains and derivatives then move in a straight line, at a bounded rate.
+An estimate is used where it is valid, its interval is narrow and R^2 of its equation is large; the other derivatives
+keep their values. The new gains are flown only if the loop is stable with margins at every corner of the used
+intervals. Otherwise gains of a regulator with a larger weight on the surfaces are tried, and else the old gains are
+kept. A few corners are checked at each step, so that no command is delayed. Gains and derivatives then move to the new
+values on a straight line at a bounded rate.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ from sysid_node.control.types import IdentifiedDerivative
 
 Array = NDArray[np.float64]
 
-#: Corners of at most so many derivatives' intervals (those that move the motion most) are looked at, so many a step.
+#: The number of derivatives whose intervals have corners (those with the largest effect), and corners checked a step.
 CORNERED, A_STEP = 8, 16
 
-#: Weights on the surfaces that are tried in turn, in that of the baseline.
+#: Weights on the surfaces that are tried in turn, relative to the baseline's.
 CAUTIONS = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 #: s between two checks of an axis.
 PERIOD = 0.5
 
-#: s of a lapse of estimates or sensors, after which what was flown before it is no longer taken up again.
+#: s without estimates or sensors, after which the parameters flown before are not flown again.
 LAPSE = 5.0
 
-#: Surfaces that do less, in what the file's do (for two, the product), or the opposite, are not relied on.
+#: Least effect of the surfaces relative to the file's (for two, the determinant); estimates with less are not used.
 LEAST_AUTHORITY = 0.1
 
 
 class AxisParameters(NamedTuple):
-    """What the law flies on: derivatives (D,) for the feedforward, gains (m, n) for the feedback."""
+    """The parameters of the control law: derivatives (D,) for the feedforward, gains (m, n) for the feedback."""
 
     values: Array
     gains: Array
@@ -49,40 +50,40 @@ class AxisParameters(NamedTuple):
 
 @dataclass
 class MarginCheck:
-    """Gains under test: the corners (N, D) of the intervals, how many have passed, and with how much caution."""
+    """Gains whose margins are being checked at the corners (N, D) of the intervals, ``passed`` of which are done."""
 
     values: Array  # (D,)
     corners: Array
     gains: Array
     passed: int = 0
-    caution: int = 0
+    caution: int = 0  # place in ``CAUTIONS``
 
 
 @dataclass
 class AxisAdaptation:
-    """Of one axis."""
+    """The state of the adaptation of one axis."""
 
     axis: Axis
     flown: AxisParameters
     target: AxisParameters
     check: MarginCheck | None = None
     checked_at: float = -math.inf  # s
-    used: tuple[str, ...] = ()  # derivatives whose estimates are in the target
+    used: tuple[str, ...] = ()  # derivatives of the target that are estimates
     verdict: str = "baseline"
     accepted: int = 0
     refused: int = 0
-    left: AxisParameters | None = None  # the target that was left for the baseline, to be taken up again
+    left: AxisParameters | None = None  # the target before the baseline, to which it may return
     left_at: float = math.nan  # s
 
 
 def init(axis: Axis) -> AxisAdaptation:
-    """Flying the baseline."""
+    """An axis that flies the baseline."""
     baseline = AxisParameters(axis.believed, axis.baseline)
     return AxisAdaptation(axis, baseline, baseline)
 
 
 def fall_back(state: AxisAdaptation, why: str, now: float) -> None:
-    """Head for the baseline at a time (s)."""
+    """Make the baseline the target, at a time (s)."""
     if state.left is None:
         state.left, state.left_at = state.target, now
     state.check, state.verdict = None, f"baseline: {why}"
@@ -90,7 +91,7 @@ def fall_back(state: AxisAdaptation, why: str, now: float) -> None:
 
 
 def resume(state: AxisAdaptation, now: float) -> None:
-    """All is well again: head for what was flown before, if that is not long ago; it has passed its check."""
+    """Return to the target before the baseline, which has passed its check, unless that was too long ago."""
     if state.left is None:
         return
     if abs(now - state.left_at) <= LAPSE:
@@ -101,16 +102,16 @@ def resume(state: AxisAdaptation, now: float) -> None:
 
 
 def consider(
-    state: AxisAdaptation, beliefs: Mapping[str, IdentifiedDerivative], settings: ControllerSettings, now: float
+    state: AxisAdaptation, estimates: Mapping[str, IdentifiedDerivative], settings: ControllerSettings, now: float
 ) -> None:
-    """Begin the check of what new estimates ask for, if none is under way and the last is long enough ago."""
+    """Begin to check gains for new estimates, if no check is under way and the last one is long enough ago."""
     if state.check is not None or abs(now - state.checked_at) < PERIOD:
         return
     values, half, used = state.target.values.copy(), np.zeros(len(state.axis.derivatives)), []
     for i, name in enumerate(state.axis.derivatives):
-        belief = beliefs.get(name)
-        if belief is not None and _usable(belief, settings.tightness * state.axis.sizes[i], settings.explained):
-            values[i], half[i] = belief.value, 0.5 * (belief.upper - belief.lower)
+        estimate = estimates.get(name)
+        if estimate is not None and _usable(estimate, settings.tightness * state.axis.sizes[i], settings.explained):
+            values[i], half[i] = estimate.value, 0.5 * (estimate.upper - estimate.lower)
             used.append(name)
     if not used:
         return
@@ -126,24 +127,25 @@ def consider(
 
 
 def advance(state: AxisAdaptation, settings: ControllerSettings, step: float) -> None:
-    """Look at some corners, and move for ``step`` (s) towards the target."""
+    """Check some corners, and move the parameters towards the target for ``step`` (s)."""
     if state.check is not None:
-        _look(state, state.check, settings)
+        _check_corners(state, state.check, settings)
     state.flown = _moved(state.axis, state.flown, state.target, settings.gain_rate * step)
 
 
-def _usable(belief: IdentifiedDerivative, half: float, explained: float) -> bool:
-    """Whether an estimate may be used; NaN never is.
+def _usable(estimate: IdentifiedDerivative, half: float, explained: float) -> bool:
+    """Whether an estimate may be used; NaN never may.
 
-    In a closed loop an estimate is biased by the share of the surfaces' motion that answers to disturbances (Ljung,
-    "System Identification", 2nd ed. (1999), sect. 13.4), which its interval does not know of: hence ``explained``.
+    In closed loop an estimate is biased by the part of the surfaces' motion that responds to disturbances (Ljung,
+    "System Identification", 2nd ed. (1999), sect. 13.4). Its interval does not include this bias, so that a least R^2,
+    ``explained``, is required.
     """
-    tight = math.isfinite(belief.value) and 0.5 * (belief.upper - belief.lower) <= half
-    return belief.valid and tight and belief.explained >= explained
+    tight = math.isfinite(estimate.value) and 0.5 * (estimate.upper - estimate.lower) <= half
+    return estimate.valid and tight and estimate.r_squared >= explained
 
 
 def interval_corners(axis: Axis, values: Array, half: Array) -> Array:
-    """(N, D) the corners of the intervals that matter most, each other derivative at its value."""
+    """(N, D) the corners of the intervals with the largest effect, with all other derivatives at their values."""
     widest = np.argsort(-half * axis.signals)[:CORNERED]
     chosen = widest[half[widest] > 0.0]
     signs = np.array(list(product((-1.0, 1.0), repeat=chosen.size)))
@@ -152,11 +154,11 @@ def interval_corners(axis: Axis, values: Array, half: Array) -> Array:
     return np.vstack([values, corners])
 
 
-def _look(state: AxisAdaptation, check: MarginCheck, settings: ControllerSettings) -> None:
-    """The next few corners with the gains under test."""
+def _check_corners(state: AxisAdaptation, check: MarginCheck, settings: ControllerSettings) -> None:
+    """Check the next few corners."""
     corners = check.corners[check.passed : check.passed + A_STEP]
     if not _have_margins(state.axis, corners, check.gains, settings):
-        _be_more_cautious(state, check)
+        _raise_caution(state, check)
         return
     check.passed += len(corners)
     if check.passed == len(check.corners):
@@ -173,7 +175,7 @@ def _have_margins(axis: Axis, corners: Array, gains: Array, settings: Controller
     return bool(found.enough(settings.gain_margin, settings.phase_margin).all())
 
 
-def _be_more_cautious(state: AxisAdaptation, check: MarginCheck) -> None:
+def _raise_caution(state: AxisAdaptation, check: MarginCheck) -> None:
     check.caution, check.passed = check.caution + 1, 0
     if check.caution == len(CAUTIONS):
         state.check, state.refused, state.verdict = None, state.refused + 1, "kept: no margins at the corners"
@@ -182,7 +184,7 @@ def _be_more_cautious(state: AxisAdaptation, check: MarginCheck) -> None:
 
 
 def _gains(axis: Axis, values: Array, caution: float) -> Array:
-    """The regulator's gains, NaN where there are none: those have no margins."""
+    """The regulator's gains; NaN, which fails the check of margins, where it has none."""
     try:
         return axis.gains(values, caution)
     except np.linalg.LinAlgError:
@@ -190,10 +192,10 @@ def _gains(axis: Axis, values: Array, caution: float) -> Array:
 
 
 def _same_sense(axis: Axis, gains: Array) -> bool:
-    """Whether the integral acts as the baseline's does; NaN gains fail their margins anyway.
+    """Whether the integral acts in the direction of the baseline's; NaN gains fail the check of margins anyway.
 
-    Its gain has the sign of what a steady deflection does in the end, to a climb or a turn: where that is turned round
-    an estimate is wrong by more than its interval, and on the way from one sign to the other there is no feedback.
+    The sign of its gain is that of the steady response to a deflection, a climb or a turn. Where it is reversed, an
+    estimate is wrong by more than its interval, and on the way from one sign to the other there is no feedback.
     """
     return not float(gains[:, axis.integral] @ axis.baseline[:, axis.integral]) <= 0.0
 
@@ -203,8 +205,8 @@ def _between(start: AxisParameters, end: AxisParameters, share: float) -> AxisPa
 
 
 def _moved(axis: Axis, flown: AxisParameters, target: AxisParameters, most: float) -> AxisParameters:
-    """Towards the target by at most ``most`` of the baseline's gains, or of a derivative's size."""
-    size = np.abs(axis.baseline).max(axis=0)  # (n,) by what each state is fed back
+    """The parameters after a move to the target by at most ``most``, relative to the baseline's gains and the sizes."""
+    size = np.abs(axis.baseline).max(axis=0)  # (n,) the largest gain of each state
     gains = np.abs(target.gains - flown.gains).max(axis=0) / np.maximum(size, 0.1 * size.max())
     length = max(float(np.max(np.abs(target.values - flown.values) / axis.sizes)), float(gains.max()))
     return target if length <= most else _between(flown, target, most / length)

@@ -1,4 +1,4 @@
-"""From controls to actuator joints: the aircraft file's map turned round (of many solutions the smallest)."""
+"""Joint positions from controls: the inverse of the aircraft file's map, the smallest of several solutions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Allocation:
-    """Joint names, and how their positions (rad, throttle 0..1 or N) follow from the aircraft's controls and thrust."""
+    """The map from controls and thrust to the positions of the joints (rad; throttle 0..1 or N)."""
 
     joints: tuple[str, ...]
     offsets: Array  # (M,) rad
@@ -37,6 +37,6 @@ class Allocation:
         )
 
     def positions(self, controls: Sequence[float], thrust: float) -> list[float]:
-        """Of the aircraft's controls (M,) rad, in its file's order, and thrust (N)."""
+        """The positions of the joints for controls (M,) rad, in the file's order, and thrust (N)."""
         joints: list[float] = (self.inverse @ (np.asarray(controls) - self.offsets)).tolist()
         return joints if self.thrust is None else [*joints, thrust / self.thrust]

@@ -1,9 +1,9 @@
-"""An axis of control: its linear model, its baseline gains, and the gains that suit another aircraft.
+"""A control axis: its linear model, its baseline gains, and its gains for other values of the derivatives.
 
-A linear quadratic regulator scheduled on the identified model, the indirect self-tuning regulator of Astrom &
-Wittenmark, "Adaptive Control", 2nd ed. (1995), ch. 3 and 4: the regulator's weights stay, its model is the identified
-one. The weight on the surfaces counts the accelerations that they make, not their angles, so that a surface that has
-lost half its effect gets twice the gain, and where the estimates are the file's the gains are the baseline's.
+The gains are those of a linear quadratic regulator with constant weights and the identified model, the indirect
+self-tuning regulator of Astrom & Wittenmark, "Adaptive Control", 2nd ed. (1995), ch. 3 and 4. The weight on the
+surfaces applies to the accelerations that they cause, not to their angles: a surface that lost half of its effect gets
+twice the gain. With the file's derivatives the gains are the baseline's.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from sysid_node.control.plant import Linear, Scales, Values
 
 Array = NDArray[np.float64]
 
-#: Deviations that count alike, rad, rad/s, rad s: alpha, q, theta, its integral; beta, p, r, phi, its integral.
+#: Deviations with equal weight (Bryson's rule), rad, rad/s, rad s: alpha, q, theta and its integral; beta, p, r, phi
+#: and its integral.
 _PITCH = (math.inf, 1.0, 0.2, 0.2)
 _LATERAL = (0.3, 2.0, 0.5, 0.3, 0.6)
 
@@ -33,29 +34,29 @@ class Axis:
 
     name: str
     derivatives: tuple[str, ...]
-    believed: Array  # (D,) the file's values
-    sizes: Array  # (D,) what an error counts against: the file's value, or twice its tolerance where that is more
+    believed: Array  # (D,) the values of the aircraft file
+    sizes: Array  # (D,) scale of errors: the file's value, or twice its tolerance where that is larger
     signals: Array  # (D,) plausible size of each derivative's regressor
-    moments: slice  # motion's equations that the surfaces govern
+    moments: slice  # the states whose equations hold the surfaces' moments
     motion: Callable[[Values], Linear]  # without the surfaces' lag
-    lag: float  # s, of the surfaces
+    lag: float  # s, of the surfaces, first-order
     delay: float  # s, of the commands
     Q: Array  # (n,) weight on the states
     weight: float  # on the surfaces
 
     @property
     def integral(self) -> int:
-        """Which state is the integral of an attitude: the last before the surfaces."""
+        """The place of the integral of an attitude among the states: the last before the surfaces."""
         return self.Q.size - len(range(*self.moments.indices(self.Q.size))) - 1
 
     @cached_property
     def baseline(self) -> Array:
-        """Gains (m, n) of the file's aircraft."""
+        """Gains (m, n) for the aircraft file."""
         return self.gains(self.believed, 1.0)
 
     @cached_property
     def effect(self) -> Array:
-        """(m, m) accelerations that the file's surfaces make."""
+        """(m, m) angular accelerations per rad of the surfaces, by the aircraft file."""
         return np.asarray(self.motion(self.named(self.believed)).B[self.moments])
 
     def named(self, values: Array) -> dict[str, Array]:
@@ -63,24 +64,27 @@ class Axis:
         return {name: values[..., i] for i, name in enumerate(self.derivatives)}
 
     def model(self, values: Array) -> Linear:
-        """The aircraft of derivatives (..., D), surfaces included."""
+        """The linear model for derivatives (..., D), with the surfaces' lag."""
         return plant.behind_actuators(self.motion(self.named(values)), self.lag)
 
     def authority(self, values: Array) -> Array:
-        """(m, m) what the surfaces of an aircraft of derivatives (D,) do, in what the file's do: 1 = the same."""
+        """(m, m) effect of the surfaces for derivatives (D,), relative to the file's; the unit matrix if equal."""
         return np.asarray(np.linalg.solve(self.effect, self.motion(self.named(values)).B[self.moments]))
 
     def gains(self, values: Array, caution: float) -> Array:
-        """Gains (m, n) for an aircraft of derivatives (D,), with ``caution`` times the baseline's weight on surfaces.
+        """Gains (m, n) for derivatives (D,), with ``caution`` times the baseline's weight on the surfaces.
 
-        Raises LinAlgError where there are none.
+        Raises LinAlgError where the regulator has no solution.
         """
         share = self.authority(values)
         return regulator.gains(self.model(values), self.Q, caution * self.weight * share.T @ share)
 
 
 def axes(aircraft: Aircraft, lag: float, delay: float) -> tuple[Axis, Axis]:
-    """Pitch and lateral axis at the reference condition. Raises InputError where the file or the aircraft cannot."""
+    """Pitch and lateral axis at the reference condition.
+
+    Raises InputError where the file is incomplete or none is stable.
+    """
     plant.check(aircraft)
     reference = aircraft.reference
     scales = Scales.of(aircraft, reference.airspeed, reference.air_density)
@@ -109,8 +113,8 @@ def _axis(
     delay: float,
 ) -> Axis:
     known = tuple(d for d in derivatives if d in aircraft.derivatives)
-    beliefs = [aircraft.derivatives[d] for d in known]
-    values = np.array([belief.value for belief in beliefs])
+    file = [aircraft.derivatives[d] for d in known]
+    values = np.array([derivative.value for derivative in file])
     whole = plant.behind_actuators(motion(dict(zip(known, values.tolist(), strict=True))), lag)
     Q = np.zeros(whole.A.shape[-1])
     Q[: len(allowed)] = 1.0 / np.array(allowed) ** 2
@@ -118,7 +122,7 @@ def _axis(
         name=name,
         derivatives=known,
         believed=values,
-        sizes=np.array([max(abs(b.value), 2.0 * (b.tolerance or 0.0), 1e-6) for b in beliefs]),
+        sizes=np.array([max(abs(b.value), 2.0 * (b.tolerance or 0.0), 1e-6) for b in file]),
         signals=np.array([_SIGNALS[d.partition("_")[2]] for d in known]),
         moments=moments,
         motion=motion,
@@ -134,7 +138,7 @@ _SIGNALS = {"alpha": 0.05, "beta": 0.05, "p": 0.04, "q": 0.01, "r": 0.02, "de": 
 
 
 def level_flight(aircraft: Aircraft, pressure: float) -> tuple[float, float]:
-    """Alpha and elevator (rad) of level flight, by the file, at a share of the reference dynamic pressure."""
+    """Alpha and elevator (rad) in level flight, by the file, at ``pressure`` times the reference dynamic pressure."""
     d = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
     reference = aircraft.reference
     load = 0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S * pressure

@@ -1,10 +1,10 @@
-"""The adaptive controller: ``init``, ``hear`` whenever estimates come, ``step`` for every command.
+"""The adaptive controller: ``init``, ``receive_estimates`` for new estimates, ``step`` for every command.
 
     state = init(aircraft, settings)
-    hear(state, time, beliefs)                            # {"Cm_de": Belief(...), ...}
-    command = step(state, sensed, set_points)             # rad, N
+    receive_estimates(state, time, estimates)             # {"Cm_de": IdentifiedDerivative(...), ...}
+    command = step(state, measured, set_points)           # rad, N
 
-Without estimates, with old ones, or where a sensor is silent, it flies the gains of the aircraft file.
+Without recent estimates, or where a sensor is silent, it flies the baseline: the gains for the aircraft file.
 """
 
 from __future__ import annotations
@@ -27,58 +27,61 @@ FIRST_STEP = 0.005  # s
 
 @dataclass
 class ControllerState:
-    """All that the controller remembers."""
+    """The state of the controller."""
 
     settings: ControllerSettings
     axes: tuple[AxisAdaptation, AxisAdaptation]  # pitch, lateral
     law: LawState
     time: float = math.nan  # s, of the last step
-    heard: float = -math.inf  # s, of the last estimates
-    stale: str = "no estimates yet"  # why the baseline is flown; empty where estimates are used
+    estimates_time: float = -math.inf  # s, of the last estimates
+    stale: str = "no estimates yet"  # the reason why the baseline is flown; empty where estimates are used
 
 
 def init(aircraft: Aircraft, settings: ControllerSettings) -> ControllerState:
-    """A controller that flies the baseline. Raises InputError where the aircraft's file or actuators do not do."""
+    """A controller that flies the baseline.
+
+    Raises InputError where the aircraft file or the actuators do not suffice.
+    """
     pitch, lateral = (adaptation.init(axis) for axis in axes(aircraft, settings.actuator_lag, settings.delay))
     return ControllerState(settings, (pitch, lateral), law.init(aircraft, settings))
 
 
-def receive_estimates(state: ControllerState, time: float, beliefs: Mapping[str, IdentifiedDerivative]) -> None:
-    """Estimates that came at a time (s) of the sensors' clock."""
-    state.heard = time
+def receive_estimates(state: ControllerState, time: float, estimates: Mapping[str, IdentifiedDerivative]) -> None:
+    """Take new estimates at a time (s, by the sensors' clock)."""
+    state.estimates_time = time
     if state.settings.adapt and not state.stale:
         for axis in state.axes:
-            adaptation.consider(axis, beliefs, state.settings, time)
+            adaptation.consider(axis, estimates, state.settings, time)
 
 
 def step(
-    state: ControllerState, sensed: Measurements, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION
+    state: ControllerState, measured: Measurements, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION
 ) -> Command:
-    """The command at ``sensed.time``; ``excitation`` (rad) of elevator, aileron and rudder comes on top."""
-    passed = sensed.time - state.time
-    duration = min(passed, LONGEST_STEP) if passed > 0.0 else FIRST_STEP
-    state.time = sensed.time
-    state.stale = _why_not(state, sensed)
+    """The command at ``measured.time``; ``excitation`` (rad) of elevator, aileron and rudder is added to it."""
+    elapsed = measured.time - state.time
+    duration = min(elapsed, LONGEST_STEP) if elapsed > 0.0 else FIRST_STEP
+    state.time = measured.time
+    state.stale = _stale_reason(state, measured)
     for axis in state.axes:
         if state.stale:
-            adaptation.fall_back(axis, state.stale, sensed.time)
+            adaptation.fall_back(axis, state.stale, measured.time)
         else:
-            adaptation.resume(axis, sensed.time)
+            adaptation.resume(axis, measured.time)
     for axis in state.axes:
         adaptation.advance(axis, state.settings, duration)
     pitch, lateral = state.axes
-    flown = ((pitch.axis, pitch.flown), (lateral.axis, lateral.flown))
-    return law.step(state.law, sensed, points, flown, excitation, duration)
+    parameters = ((pitch.axis, pitch.flown), (lateral.axis, lateral.flown))
+    return law.step(state.law, measured, points, parameters, excitation, duration)
 
 
-def _why_not(state: ControllerState, sensed: Measurements) -> str:
-    """Why the baseline is flown: a silent sensor, old estimates; empty where estimates may be used."""
-    silent = [name for name, value in sensed._asdict().items() if not math.isfinite(value)]
+def _stale_reason(state: ControllerState, measured: Measurements) -> str:
+    """Why the baseline must be flown: a silent sensor or old estimates; empty where estimates may be used."""
+    silent = [name for name, value in measured._asdict().items() if not math.isfinite(value)]
     if silent:
         return f"{silent[0]} not measured"
     if not state.settings.adapt:
         return "adaptation is off"
-    age = abs(sensed.time - state.heard)  # the clock may step back
+    age = abs(measured.time - state.estimates_time)  # the clock may step back
     if age > state.settings.stale_after:
         return f"no estimates for {age:.1f} s" if math.isfinite(age) else "no estimates yet"
     return ""

@@ -1,10 +1,10 @@
-"""The control law: feedforward by inversion of the moments' equations, feedback of the motion's errors, within limits.
+"""The control law: feedforward by inversion of the moment equations, feedback of the errors, limits.
 
     u = trim + G^-1 (reference's accelerations - f(reference's motion)) - K (motion - reference's motion)
 
-The feedforward is dynamic inversion along the reference with the derivatives that are flown (Lombaerts, Huisman, Chu,
+The feedforward is dynamic inversion along the reference motion with the present derivatives (Lombaerts, Huisman, Chu,
 Mulder & Joosten, "Nonlinear reconfiguring flight control based on online physical model identification", J. Guidance
-32(3), 2009); the motion is compared with the reference as late as the actuators are (Johnson & Calise's hedging).
+32(3), 2009). The motion is compared with the reference after the actuators' delay and lag (hedging, Johnson & Calise).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ LONGEST_STEP = 0.1  # s
 SPEED_GAIN, SPEED_INTEGRAL = 0.6, 0.1  # 1/s, 1/s^2: of the airspeed loop
 SPEED_FILTER = 1.0  # s, of the airspeed that gains are scheduled by
 MOST_INTEGRAL = 1.0  # rad s
-PRESSURES = (0.4, 2.5)  # dynamic pressure over the reference one, within which gains are scheduled
+PRESSURES = (0.4, 2.5)  # range of dynamic pressure, relative to the reference, in which gains are scheduled
 
 
 @dataclass
 class LawState:
-    """What the law remembers."""
+    """The state of the control law."""
 
     aircraft: Aircraft
     settings: ControllerSettings
@@ -50,14 +50,14 @@ class LawState:
     integrals: Array = field(default_factory=lambda: np.zeros(2))  # of theta's and phi's errors, rad s
     thrust: float = 0.0  # N, of the airspeed's integral
     command: Array | None = None  # (3,) rad, the last
-    surfaces: Array = field(default_factory=lambda: np.zeros(3))  # rad, what feedback has moved them by
+    surfaces: Array = field(default_factory=lambda: np.zeros(3))  # rad, deflections due to feedback, by the servo model
     gains: tuple[Array, ...] = ()  # (m, n) of both axes, the last
-    coming: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback on its way to the actuators
-    wanted: ReferenceMotion | None = None  # the reference that the motion is compared with
+    pending: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback within the actuators' delay
+    wanted: ReferenceMotion | None = None  # the delayed reference, with which the motion is compared
 
 
 def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
-    """Nothing flown yet."""
+    """The state before the first step."""
     throttle = aircraft.throttle
     weight = aircraft.mass * GRAVITY
     limits = np.array([aircraft.controls[c].limit or settings.command_limit for c in ("elevator", "aileron", "rudder")])
@@ -67,54 +67,54 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
 
 def step(
     law: LawState,
-    sensed: Measurements,
+    measured: Measurements,
     points: SetPoints,
     flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]],
     excitation: Sequence[float],
     step: float,
 ) -> Command:
-    """The command of this instant, ``step`` (s) after the last one; ``excitation`` (3,) rad comes on top."""
-    scales = _condition(law, sensed, points, step)
+    """The command now, ``step`` (s) after the last one; ``excitation`` (3,) rad is added to it."""
+    scales = _condition(law, measured, points, step)
     pressure = _pressure(law)
     level, trim = level_flight(law.aircraft, pressure)
     speed = law.aircraft.reference.airspeed
     points = reference.limited(points, level, speed, law.settings)
     if law.reference is None:
-        law.reference = ReferenceState(_finite(sensed.theta, level), _finite(sensed.phi, 0.0))
+        law.reference = ReferenceState(_finite(measured.theta, level), _finite(measured.phi, 0.0))
     pitch, side = (dict(zip(axis.derivatives, f.values.tolist(), strict=True)) for axis, f in flown)
     flight = reference.FlightCondition(
         law.airspeed, level, scales.force * side.get("CY_beta", 0.0), law.settings.bandwidth
     )
     wanted = reference.advance(law.reference, points, step, flight)
     forward = _feedforward(law.reference, wanted, pitch, side, scales, step)
-    late = law.wanted = reference.follow(law.behind, sensed.time, wanted, step)
-    errors = _errors(law, sensed, late, level)
-    _bear_new_gains(law, errors, flown)
+    late = law.wanted = reference.follow(law.behind, measured.time, wanted, step)
+    errors = _errors(law, measured, late, level)
+    _transfer_bumplessly(law, errors, flown)
     back = np.concatenate([f.gains @ e for (_, f), e in zip(flown, errors, strict=True)]) / pressure
     planned = np.array([trim, 0.0, 0.0]) + forward + np.asarray(excitation, dtype=float)
-    command, held = _limited(law, planned - back, step)
-    _follow_surfaces(law, sensed.time, command - planned, step)
-    _integrate(law, errors, held, step)
+    command, limited = _limited(law, planned - back, step)
+    _follow_surfaces(law, measured.time, command - planned, step)
+    _integrate(law, errors, limited, step)
     elevator, aileron, rudder = command.tolist()
-    return Command(elevator, aileron, rudder, _thrust(law, sensed, points, late, level, step))
+    return Command(elevator, aileron, rudder, _thrust(law, measured, points, late, level, step))
 
 
-def _condition(law: LawState, sensed: Measurements, points: SetPoints, step: float) -> Scales:
-    """The flight condition, filtered; where the airspeed is not measured, the last, or what is asked for."""
+def _condition(law: LawState, measured: Measurements, points: SetPoints, step: float) -> Scales:
+    """The filtered flight condition; without a measured airspeed the last one, or the set-point."""
     known = law.aircraft.reference
     if math.isnan(law.airspeed):
-        law.airspeed = _finite(sensed.airspeed, _finite(points.airspeed, known.airspeed))
+        law.airspeed = _finite(measured.airspeed, _finite(points.airspeed, known.airspeed))
         law.density = known.air_density
-    if math.isfinite(sensed.airspeed):
-        law.airspeed += min(step / SPEED_FILTER, 1.0) * (sensed.airspeed - law.airspeed)
+    if math.isfinite(measured.airspeed):
+        law.airspeed += min(step / SPEED_FILTER, 1.0) * (measured.airspeed - law.airspeed)
     law.airspeed = min(max(law.airspeed, 0.5 * known.airspeed), 2.0 * known.airspeed)
-    if 0.1 < sensed.density < 2.0:
-        law.density = sensed.density
+    if 0.1 < measured.density < 2.0:
+        law.density = measured.density
     return Scales.of(law.aircraft, law.airspeed, law.density)
 
 
 def _pressure(law: LawState) -> float:
-    """Dynamic pressure over the reference one."""
+    """Dynamic pressure relative to the reference, within ``PRESSURES``."""
     known = law.aircraft.reference
     share = law.density * law.airspeed**2 / (known.air_density * known.airspeed**2)
     return min(max(share, PRESSURES[0]), PRESSURES[1])
@@ -128,7 +128,10 @@ def _feedforward(
     scales: Scales,
     step: float,
 ) -> Array:
-    """(3,) rad: the surfaces whose moments make the reference's accelerations, and the angle of attack that follows."""
+    """(3,) rad: the surfaces that cause the reference's angular accelerations.
+
+    Moves the reference angle of attack on.
+    """
     rate = wanted.q + wanted.turn
     q = rate * scales.chord
     elevator = wanted.q_rate / scales.pitch - pitch["Cm_alpha"] * ref.alpha - pitch["Cm_q"] * q
@@ -147,13 +150,13 @@ def _feedforward(
     return np.array([elevator, aileron, rudder])
 
 
-def _errors(law: LawState, sensed: Measurements, late: ReferenceMotion, level: float) -> tuple[Array, Array]:
-    """Of alpha, q, theta, its integral; of beta, p, r, phi, its integral; and what feedback has moved surfaces by.
+def _errors(law: LawState, measured: Measurements, late: ReferenceMotion, level: float) -> tuple[Array, Array]:
+    """Errors of alpha, q, theta and its integral; of beta, p, r, phi and its integral; and the surfaces' feedback.
 
-    What is not measured has no error.
+    The error of what is not measured is zero.
     """
-    pitch = (sensed.alpha - level - late.alpha, sensed.q - late.q - late.turn, sensed.theta - late.theta)
-    side = (sensed.beta - late.beta, sensed.p - late.p, sensed.r - late.r, sensed.phi - late.phi)
+    pitch = (measured.alpha - level - late.alpha, measured.q - late.q - late.turn, measured.theta - late.theta)
+    side = (measured.beta - late.beta, measured.p - late.p, measured.r - late.r, measured.phi - late.phi)
     first, second = (np.nan_to_num(np.array(x), nan=0.0, posinf=0.0, neginf=0.0) for x in (pitch, side))
     return (
         np.concatenate([first, law.integrals[:1], law.surfaces[:1]]),
@@ -161,13 +164,14 @@ def _errors(law: LawState, sensed: Measurements, late: ReferenceMotion, level: f
     )
 
 
-def _bear_new_gains(
+def _transfer_bumplessly(
     law: LawState, errors: tuple[Array, Array], flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]]
 ) -> None:
-    """Set the integrals, in ``errors`` too, so that gains that move do not move the surfaces (bumpless transfer).
+    """Set the integrals, also in ``errors``, so that a change of gains does not move the surfaces (bumpless transfer).
 
-    What the integrals hold is a deflection, such as that which trims a shifted centre of gravity; times other gains it
-    would be another one, until they have wound up anew (Astrom & Hagglund, "PID Controllers" (1995), sect. 3.5).
+    An integral times its gain is a deflection, such as that which trims a shifted centre of gravity. With other gains
+    it would be another deflection until the integral has settled again (Astrom & Hagglund, "PID Controllers" (1995),
+    sect. 3.5).
     """
     gains = tuple(f.gains for _, f in flown)
     for i, ((axis, _), error, now, before) in enumerate(zip(flown, errors, gains, law.gains, strict=False)):
@@ -178,13 +182,13 @@ def _bear_new_gains(
 
 
 def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -> None:
-    """Move the surfaces' model behind the delay and the lag of the actuators."""
-    late = reference.delayed(law.coming, time, feedback, law.settings.delay)
+    """Advance the model of the surfaces' deflections, with the delay and lag of the actuators."""
+    late = reference.delayed(law.pending, time, feedback, law.settings.delay)
     law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (late - law.surfaces)
 
 
 def _limited(law: LawState, asked: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
-    """The command (3,) within amplitude and rate, and which of it was held back."""
+    """The command (3,) within its limits of amplitude and rate, and which surfaces are limited."""
     within = np.clip(asked, -law.limits, law.limits)
     if law.command is not None:
         reach = law.settings.command_rate * step
@@ -193,24 +197,24 @@ def _limited(law: LawState, asked: Array, step: float) -> tuple[Array, NDArray[n
     return within, np.abs(within - asked) > 1e-9
 
 
-def _integrate(law: LawState, errors: tuple[Array, Array], held: NDArray[np.bool_], step: float) -> None:
-    """Errors of theta and phi add up while their surface has travel left: no winding up."""
-    for i, (error, stuck) in enumerate(zip((errors[0][2], errors[1][3]), held[:2], strict=True)):
+def _integrate(law: LawState, errors: tuple[Array, Array], limited: NDArray[np.bool_], step: float) -> None:
+    """Integrate the errors of theta and phi, unless their surface is limited (anti-windup)."""
+    for i, (error, stuck) in enumerate(zip((errors[0][2], errors[1][3]), limited[:2], strict=True)):
         if not stuck:
             law.integrals[i] = min(max(law.integrals[i] + step * error, -MOST_INTEGRAL), MOST_INTEGRAL)
 
 
 def _thrust(
-    law: LawState, sensed: Measurements, points: SetPoints, late: ReferenceMotion, level: float, step: float
+    law: LawState, measured: Measurements, points: SetPoints, late: ReferenceMotion, level: float, step: float
 ) -> float:
-    """N: level flight's drag, the climb's weight, and what the airspeed's error asks for."""
+    """Thrust (N): drag in level flight, weight along the climb, and feedback of the airspeed."""
     if law.most_thrust == 0.0:
         return 0.0
     d = {name: derivative.value for name, derivative in law.aircraft.derivatives.items()}
     load = 0.5 * law.density * law.airspeed**2 * law.aircraft.geometry.S
     weight = law.aircraft.mass * GRAVITY
     drag = d.get("CD_0", 0.0) + d.get("CD_alpha", 0.0) * level + d.get("CD_k", 0.0) * (weight / load) ** 2
-    error = _finite(points.airspeed - sensed.airspeed, 0.0)
+    error = _finite(points.airspeed - measured.airspeed, 0.0)
     asked = load * drag + weight * math.sin(late.theta - level - late.alpha) + law.thrust
     asked += SPEED_GAIN * law.aircraft.mass * error
     given = min(max(asked, 0.0), law.most_thrust)

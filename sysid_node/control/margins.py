@@ -1,10 +1,9 @@
-"""Is a loop stable, and with what margins? For many aircraft at once, delay included.
+"""Stability, gain margin and phase margin of closed loops with delay, for many aircraft at once.
 
-Margins are those of classical control, one loop at a time at its actuator while the others are closed: by how much its
-gain may grow or fall, and by how much it may lag, until the loop oscillates (Stevens, Lewis & Johnson (2016), sect.
-4.2). Transfer functions come from the resolvent by Faddeev and Leverrier's algorithm (Gantmacher, "The Theory of
-Matrices", vol. 1 (1959), ch. IV sect. 5), which knows no defective matrix; stability from the eigenvalues, the delay by
-Pade's second-order approximation.
+Margins are the classical ones, of one loop at a time at its actuator while the others are closed (Stevens, Lewis &
+Johnson (2016), sect. 4.2). Transfer functions follow from the resolvent by the algorithm of Faddeev and Leverrier
+(Gantmacher, "The Theory of Matrices", vol. 1 (1959), ch. IV sect. 5), which also holds for defective matrices.
+Stability follows from the eigenvalues, with the delay by Pade's second-order approximation.
 """
 
 from __future__ import annotations
@@ -19,28 +18,28 @@ from sysid_node.control.plant import Linear
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Frequencies looked at, rad/s: crossings are interpolated between them.
+#: Frequencies, rad/s; crossings are interpolated between them.
 OMEGA = np.geomspace(0.05, 150.0, 120)
 
-_LEAST_DELAY = 1e-3  # s, in the eigenvalues
+_LEAST_DELAY = 1e-3  # s, in Pade's approximation
 
 
 @dataclass(frozen=True)
 class Margins:
-    """(...,) of each aircraft: the least gain margin of all loops, either way (factor), phase margin (rad), stable."""
+    """(...,) for each aircraft: the least gain margin (a factor, up or down) and phase margin (rad) of all loops."""
 
     gain: Array
     phase: Array
     stable: NDArray[np.bool_]
 
     def enough(self, gain: float, phase: float) -> NDArray[np.bool_]:
-        """(...,) whether it is stable with these margins."""
+        """(...,) whether the loops are stable with at least these margins."""
         good: NDArray[np.bool_] = self.stable & (self.gain >= gain) & (self.phase >= phase)
         return good
 
 
 def margins(plant: Linear, K: Array, delay: float) -> Margins:
-    """Of u = -K x (m, n) around plants A (..., n, n), B (..., n, m), every input late by a ``delay`` (s)."""
+    """Margins of u = -K x (m, n) with plants A (..., n, n), B (..., n, m) and a ``delay`` (s) of every input."""
     loops = one_at_a_time(transfer(plant, K, OMEGA) * np.exp(-1j * OMEGA * delay)[:, None, None])
     gain, phase = crossings(loops)
     return Margins(gain.min(axis=-1), phase.min(axis=-1), stable(plant, K, delay))
@@ -96,7 +95,7 @@ def _phase(a: Complex, b: Complex) -> Array:
 
 
 def stable(plant: Linear, K: Array, delay: float) -> NDArray[np.bool_]:
-    """(...,) whether the closed loop is."""
+    """(...,) whether the closed loop is stable."""
     closed = closed_loop(plant, K, delay)
     found: NDArray[np.bool_] = np.linalg.eigvals(closed).real.max(axis=-1) < 0.0
     return found

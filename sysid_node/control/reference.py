@@ -1,7 +1,7 @@
-"""The motion that is asked of the aircraft: set-points through reference models, as a trajectory that it can fly.
+"""The reference motion: the response of reference models to the set-points, which the aircraft is to follow.
 
-Second-order models of pitch and roll, a first-order one of sideslip; yaw rate and angle of attack follow from the turn
-and from the aircraft's own equations (explicit model following: Stevens, Lewis & Johnson (2016), sect. 5.6).
+Pitch and roll have second-order models, sideslip a first-order one. Yaw rate and angle of attack follow from the turn
+and from the aircraft's equations (explicit model following: Stevens, Lewis & Johnson (2016), sect. 5.6).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MOST_RATE, MOST_ACCELERATION = 1.5, 8.0  # rad/s, rad/s^2
 
 
 class ReferenceMotion(NamedTuple):
-    """The reference motion at one instant, rad, rad/s; accelerations rad/s^2. ``alpha`` from level flight's."""
+    """The reference motion at one instant, rad, rad/s, rad/s^2; ``alpha`` is relative to level flight."""
 
     theta: float
     q: float
@@ -34,11 +34,11 @@ class ReferenceMotion(NamedTuple):
     q_rate: float = 0.0
     p_rate: float = 0.0
     r_rate: float = 0.0
-    turn: float = 0.0  # pitch rate of the turn, rad/s
+    turn: float = 0.0  # pitch rate due to the turn, rad/s
 
 
 class FlightCondition(NamedTuple):
-    """What the reference depends on."""
+    """The flight condition that the reference depends on."""
 
     airspeed: float  # m/s
     level: float  # rad, angle of attack of level flight
@@ -48,7 +48,7 @@ class FlightCondition(NamedTuple):
 
 @dataclass
 class ReferenceState:
-    """What the models remember, rad and rad/s; ``alpha`` from level flight's."""
+    """The states of the reference models, rad and rad/s; ``alpha`` is relative to level flight."""
 
     theta: float
     phi: float = 0.0
@@ -60,16 +60,16 @@ class ReferenceState:
 
 @dataclass
 class DelayedReference:
-    """The reference as late as the actuators make the aircraft: what its motion is compared with."""
+    """The reference after the delay and lag of the actuators, with which the motion is compared."""
 
     lag: float  # s
     delay: float  # s
-    coming: deque[tuple[float, ReferenceMotion]] = field(default_factory=deque)
+    pending: deque[tuple[float, ReferenceMotion]] = field(default_factory=deque)
     now: ReferenceMotion | None = None
 
 
 def limited(points: SetPoints, level: float, speed: float, settings: ControllerSettings) -> SetPoints:
-    """Set-points that may be flown; ``level`` pitch (rad) and reference ``speed`` (m/s) stand for NaN."""
+    """The set-points within their limits; ``level`` pitch (rad) and reference ``speed`` (m/s) replace NaN."""
 
     def within(value: float, otherwise: float, most: float) -> float:
         return otherwise if math.isnan(value) else min(max(value, -most), most)
@@ -84,13 +84,13 @@ def limited(points: SetPoints, level: float, speed: float, settings: ControllerS
 
 
 def advance(state: ReferenceState, points: SetPoints, step: float, flight: FlightCondition) -> ReferenceMotion:
-    """The motion one ``step`` (s) on, but for alpha, which follows from the elevator: the caller moves it."""
+    """The reference motion a ``step`` (s) later. The caller moves alpha on, which follows from the elevator."""
     w, level, airspeed = flight.bandwidth, flight.level, flight.airspeed
     q_rate = _pitch_acceleration(state, points, w)
-    p_rate = _toward(w * w * (points.roll - state.phi) - 2.0 * DAMPING * w * state.p, MOST_ACCELERATION)
+    p_rate = _within(w * w * (points.roll - state.phi) - 2.0 * DAMPING * w * state.p, MOST_ACCELERATION)
     beta_rate = w * (points.sideslip - state.beta)
-    state.q = _toward(state.q + q_rate * step, MOST_RATE)
-    state.p = _toward(state.p + p_rate * step, MOST_RATE)
+    state.q = _within(state.q + q_rate * step, MOST_RATE)
+    state.p = _within(state.p + p_rate * step, MOST_RATE)
     state.theta += state.q * step
     state.phi += state.p * step
     state.beta += beta_rate * step
@@ -105,27 +105,27 @@ def advance(state: ReferenceState, points: SetPoints, step: float, flight: Fligh
 
 def _pitch_acceleration(state: ReferenceState, points: SetPoints, w: float) -> float:
     if math.isnan(points.pitch_rate):
-        return _toward(w * w * (points.pitch - state.theta) - 2.0 * DAMPING * w * state.q, MOST_ACCELERATION)
-    return _toward(2.0 * w * (points.pitch_rate - state.q), MOST_ACCELERATION)
+        return _within(w * w * (points.pitch - state.theta) - 2.0 * DAMPING * w * state.q, MOST_ACCELERATION)
+    return _within(2.0 * w * (points.pitch_rate - state.q), MOST_ACCELERATION)
 
 
-def _toward(value: float, most: float) -> float:
+def _within(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
-def delayed(coming: deque[tuple[float, T]], time: float, value: T, delay: float) -> T:
-    """What was given ``delay`` (s) before, or the oldest known; ``value`` is given now (s)."""
-    if coming and coming[-1][0] > time:
-        coming.clear()  # the clock has stepped back
-    coming.append((time, value))
-    while len(coming) > 1 and coming[1][0] <= time - delay:
-        coming.popleft()
-    return coming[0][1]
+def delayed(pending: deque[tuple[float, T]], time: float, value: T, delay: float) -> T:
+    """The value given ``delay`` (s) ago, or the oldest known; ``value`` is the present one, at ``time`` (s)."""
+    if pending and pending[-1][0] > time:
+        pending.clear()  # the clock was set back
+    pending.append((time, value))
+    while len(pending) > 1 and pending[1][0] <= time - delay:
+        pending.popleft()
+    return pending[0][1]
 
 
 def follow(state: DelayedReference, time: float, wanted: ReferenceMotion, step: float) -> ReferenceMotion:
-    """The reference ``wanted`` now (s), behind delay and lag."""
-    late = delayed(state.coming, time, wanted, state.delay)
+    """The reference after delay and lag, where ``wanted`` is the present one, at ``time`` (s)."""
+    late = delayed(state.pending, time, wanted, state.delay)
     if state.now is None:
         state.now = late
     share = 1.0 - math.exp(-step / state.lag)

@@ -1,6 +1,6 @@
-"""Gains for a linear model: the linear quadratic regulator, and how much the surfaces' travel may cost.
+"""Gains for a linear model by the linear quadratic regulator, and the choice of its weight on the surfaces.
 
-Stevens, Lewis & Johnson (2016), sect. 5.3 and 5.4: attitude errors with their integrals, weights by Bryson's rule.
+Stevens, Lewis & Johnson (2016), sect. 5.3 and 5.4: attitude errors and their integrals, weights by Bryson's rule.
 """
 
 from __future__ import annotations
@@ -15,13 +15,16 @@ from sysid_node.errors import InputError
 
 Array = NDArray[np.float64]
 
-#: Margins that the baseline leaves: 12 dB and 60 deg, so that adapted gains have room above 6 dB and 45 deg.
+#: Margins of the baseline: 12 dB and 60 deg, more than the 6 dB and 45 deg that adapted gains must have.
 GAIN_MARGIN, PHASE_MARGIN = 10.0 ** (12.0 / 20.0), np.deg2rad(60.0)
-_WEIGHTS = np.logspace(-3.0, 6.0, 91)  # among which the weight on the surfaces is sought
+_WEIGHTS = np.logspace(-3.0, 6.0, 91)  # that are tried on the surfaces
 
 
 def gains(plant: Linear, Q: Array, R: Array) -> Array:
-    """K (m, n) of u = -K x that minimises the integral of x'Qx + u'Ru; Q (n,) the diagonal. LinAlgError: none does."""
+    """K (m, n) of u = -K x that minimises the integral of x'Qx + u'Ru.
+
+    Q (n,) is a diagonal. Raises LinAlgError without a solution.
+    """
     try:
         P = solve_continuous_are(plant.A, plant.B, np.diag(Q), R)
     except ValueError as error:  # not finite
@@ -30,7 +33,10 @@ def gains(plant: Linear, Q: Array, R: Array) -> Array:
 
 
 def least_weight(plant: Linear, Q: Array, delay: float) -> float:
-    """The least weight on the surfaces' squares that leaves good margins: as fast as is safe. InputError: none does."""
+    """The least weight on the squared deflections that gives the baseline's margins.
+
+    Raises InputError where none does.
+    """
     eye = np.eye(plant.B.shape[-1])
     for weight in _WEIGHTS.tolist():
         found = margins(plant, gains(plant, Q, weight * eye), delay)

@@ -1,4 +1,4 @@
-"""What can be set of the controller."""
+"""Settings of the controller."""
 
 from __future__ import annotations
 
@@ -32,20 +32,18 @@ RANGES: Mapping[str, tuple[float, float]] = {
 class ControllerSettings:
     """Settings of the controller; defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
-    adapt: bool = True  # false: the gains of the aircraft file, whatever is identified
+    adapt: bool = True  # false: always the gains for the aircraft file
     actuator_lag: float = 0.05  # s, first-order, of the surfaces
     delay: float = 0.02  # s, from a reading to its command's arrival at the actuator
-    gain_margin: float = 2.0  # factor (6 dB) that every loop must leave
-    phase_margin: float = math.pi / 4.0  # rad that every loop must leave
-    tightness: float = 0.4  # half an interval over a derivative's believed size, beyond which it is not used
-    explained: float = (
-        0.9  # share of a coefficient's motion that the model must explain, for its derivatives to be used
-    )
-    gain_rate: float = 1.0  # 1/s: how fast gains move, in baseline gains a second
-    stale_after: float = 0.5  # s without estimates, after which the baseline is flown
+    gain_margin: float = 2.0  # least gain margin of every loop, a factor (6 dB)
+    phase_margin: float = math.pi / 4.0  # rad, least phase margin of every loop
+    tightness: float = 0.4  # half an interval over the derivative's size, beyond which the estimate is not used
+    explained: float = 0.9  # least R^2 of a coefficient's equation, for its derivatives to be used
+    gain_rate: float = 1.0  # 1/s, rate of change of the gains relative to the baseline's
+    stale_after: float = 0.5  # s without estimates, after which the baseline gains are flown
     command_rate: float = 4.0  # rad/s, of a surface's command
     command_limit: float = 0.35  # rad, of a surface's command where the aircraft file gives no limit
-    bandwidth: float = 2.5  # rad/s, of the attitude that is asked of the aircraft
+    bandwidth: float = 2.5  # rad/s, of the reference model of the attitude
     largest_roll: float = 0.8  # rad
     largest_pitch: float = 0.4  # rad
     largest_sideslip: float = 0.15  # rad
@@ -58,6 +56,6 @@ class ControllerSettings:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> ControllerSettings:
-        """Those of the values that are settings. Raises InputError on impossible ones."""
+        """The settings among the values. Raises InputError on impossible ones."""
         names = {field.name for field in fields(cls)}
         return cls(**{name: value for name, value in values.items() if name in names})

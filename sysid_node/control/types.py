@@ -1,4 +1,4 @@
-"""What goes into and comes out of the controller. SI, radians, body axes forward-right-down."""
+"""Inputs and outputs of the controller. SI units, radians, body axes forward-right-down."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Measurements(NamedTuple):
-    """What the sensors say at a time (s). NaN = not measured, or too old."""
+    """The measurements at a time (s). NaN = not measured, or too old."""
 
     time: float
     p: float  # rad/s
@@ -22,7 +22,7 @@ class Measurements(NamedTuple):
 
 
 class SetPoints(NamedTuple):
-    """What is asked for. NaN: roll and sideslip zero, pitch of level flight, the reference airspeed.
+    """Set-points. NaN stands for zero roll and sideslip, the pitch of level flight, and the reference airspeed.
 
     A finite ``pitch_rate`` (rad/s) is tracked instead of ``pitch`` (rad).
     """
@@ -35,13 +35,13 @@ class SetPoints(NamedTuple):
 
 
 class IdentifiedDerivative(NamedTuple):
-    """A derivative as the identifier has it, with its 95 % interval, and how well its equation holds."""
+    """An identified derivative with its 95 % interval, and R^2 of its coefficient's equation."""
 
     value: float
     lower: float
     upper: float
     valid: bool
-    explained: float  # 0..1, share of its coefficient's motion that the model explains
+    r_squared: float  # 0..1, share of the coefficient's variance that the model explains
 
 
 class Command(NamedTuple):

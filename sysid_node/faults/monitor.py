@@ -1,12 +1,12 @@
-"""The fault monitor: ``init``, ``update`` with every aligned sample, ``hear`` the identifier's estimates.
+"""The fault monitor: ``init``, ``update`` with each aligned sample, ``receive_estimates`` of the identifier.
 
-    state = init(aircraft, Settings())
-    fault = update(state, time, sample)        # as ``online.estimator.update`` takes it; None while nothing is wrong
+    state = init(aircraft, FaultMonitorSettings())
+    fault = update(state, time, sample)        # as ``online.estimator.update`` takes it; None without a fault
 
-Ten times a second the last half to eight seconds are weighed against the model that is held (``evidence``). The first
-Bayes factor beyond the threshold is an alarm. From then on all that is learned is held, the fault's onset is where the
-evidence begins, and all that has come since is weighed anew: which fault, how large. When the last seconds no longer
-speak of it, the alarm ends.
+Ten times a second the hypotheses are tested on intervals of the last 0.5 to 8 s against the reference model. The first
+Bayes factor above the threshold raises an alarm. From then on the reference model is frozen, the onset is estimated,
+and all blocks since the onset decide which fault it is and how large. The alarm ends when the last seconds contradict
+it.
 """
 
 from __future__ import annotations
@@ -49,36 +49,36 @@ from sysid_node.online.frequency.regression_signals import OFFSET
 
 Array = NDArray[np.float64]
 
-EVERY = 5  # a span of n times so many blocks is looked at with every n-th block
-EXPLAINED = 0.9  # share of a coefficient's motion, for it to be learned from
-PATIENT = 20  # blocks that a vane must have stood still
+EVERY = 5  # a span of n times so many blocks is tested at every n-th block
+EXPLAINED = 0.9  # least R^2 of a coefficient that is learned from
+PATIENT = 20  # blocks for which a vane must have been still
 LEAST = 3  # blocks that a fault must have lasted
-RENEWED = 10  # blocks after which hypotheses and whitening are made anew
-SETTLED = 0.5  # share of the learning, after which the residuals' colour is known well enough to learn by
+RENEWED = 10  # blocks between updates of hypotheses and whitening
+SETTLED = 0.5  # share of the learning time, after which the whitening is good enough to learn the model
 OFFSETS = 30.0  # s over which offsets are learned
-USUAL = 60.0  # s over which the usual size of a statistic is
-DATED = 5.0  # s after an alarm in which its onset is sought
-MUCH, LITTLE = 0.2, 1.5  # share of the largest Bayes factor's logarithm; times the least energy left
-CHANCE = 10.0  # energy, in that of a block's noise, that chance may leave more or less
-OUTLIER = 10.0  # a statistic beyond this is no usual one
+USUAL = 60.0  # s, time constant of a statistic's mean
+DATED = 5.0  # s after an alarm in which its onset is estimated
+MUCH, LITTLE = 0.2, 1.5  # share of the largest log Bayes factor; multiple of the least residual energy
+CHANCE = 10.0  # residual energy due to chance, in units of a block's noise energy
+OUTLIER = 10.0  # statistics enter their mean with at most this value
 
 
 def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> MonitorState:
-    """A monitor that has seen nothing."""
+    """A monitor before the first sample."""
     made = blocks.init(aircraft)
     known = terms(aircraft, made.layout)
-    colour = residual_whitening.init(settings.memory, PERIOD)
-    return MonitorState(aircraft, settings, known, made, reference_model.init(known), colour)
+    whitening = residual_whitening.init(settings.memory, PERIOD)
+    return MonitorState(aircraft, settings, known, made, reference_model.init(known), whitening)
 
 
 def receive_estimates(state: MonitorState, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
-    """The identifier's estimates at a time (s, as of the samples)."""
+    """Take the identifier's estimates at a time (s, as the samples')."""
     if state.alarm is None:
-        reference_model.receive_estimates(state.held, time, known)
+        reference_model.receive_estimates(state.reference, time, known)
 
 
 def update(state: MonitorState, time: float, sample: Sequence[float]) -> Fault | None:
-    """Take in a sample; returns what is wrong at present."""
+    """Take a sample; returns the present fault, or None."""
     block = blocks.add(state.blocks, time, sample)
     if block is not None:
         take(state, block)
@@ -86,17 +86,17 @@ def update(state: MonitorState, time: float, sample: Sequence[float]) -> Fault |
 
 
 def take(state: MonitorState, block: Block) -> None:
-    """Take in a block."""
+    """Take a block."""
     if not block.follows:
         state.raw.clear()
         state.pieces.clear()
-    design, residual = _against_held(state, block)
+    design, residual = _compare_with_reference(state, block)
     state.count += 1
     learning = state.count * PERIOD <= state.settings.learning
     if learning:
         _learn(state, block, residual)
         if state.count % RENEWED == 0:
-            residual_whitening.settle(state.colour)
+            residual_whitening.settle(state.whitening)
     if len(state.raw) == ORDER:
         piece = _piece(state, block, design, residual)
         state.pieces.append(piece)
@@ -104,26 +104,26 @@ def take(state: MonitorState, block: Block) -> None:
             _judge(state, piece)
         elif state.count * PERIOD > SETTLED * state.settings.learning:
             _learn_model(state)
-    state.raw.append(_against_held(state, block))
+    state.raw.append(_compare_with_reference(state, block))
 
 
-def _against_held(state: MonitorState, block: Block) -> tuple[Array, Array]:
-    """A block's regressors by term (6, D), and its residual (6,) against the held values."""
+def _compare_with_reference(state: MonitorState, block: Block) -> tuple[Array, Array]:
+    """The regressors of a block by term (6, D), and its residual (6,) of the reference model."""
     design = np.zeros((6, len(state.terms.names)))
     design[state.terms.output, np.arange(design.shape[1])] = block.regressors[state.terms.column]
-    return design, block.outputs - design @ state.held.values
+    return design, block.outputs - design @ state.reference.values
 
 
 def _piece(state: MonitorState, block: Block, design: Array, residual: Array) -> WhitenedBlock:
-    """The block, whitened."""
+    """The whitened block."""
     k = block.regressors[OFFSET]
-    off = residual - k * state.held.offsets
+    off = residual - k * state.reference.offsets
     designs = [design]
-    for (earlier, before), share in zip(reversed(state.raw), state.colour.filter, strict=True):
+    for (earlier, before), share in zip(reversed(state.raw), state.whitening.filter, strict=True):
         designs.append(designs[-1] - share[:, None] * earlier)
-        off = off - share * (before - k * state.held.offsets)
-    *begun, A = (state.colour.unmix @ one for one in designs)
-    b = state.colour.unmix @ off
+        off = off - share * (before - k * state.reference.offsets)
+    *begun, A = (state.whitening.unmix @ one for one in designs)
+    b = state.whitening.unmix @ off
     return WhitenedBlock(block, residual, A, tuple(begun), b, A.T @ A, A.T @ b)
 
 
@@ -142,19 +142,19 @@ def _judge(state: MonitorState, piece: WhitenedBlock) -> None:
 
 
 def _learn(state: MonitorState, block: Block, residual: Array) -> None:
-    """From a block of sound flight."""
-    residual_whitening.learn(state.colour, residual, block.follows)
-    known = state.held
+    """Learn autocorrelation, offsets and mean regressors from a block without a fault."""
+    residual_whitening.learn(state.whitening, residual, block.follows)
+    known = state.reference
     weight = max(PERIOD / OFFSETS, 1.0 / (state.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
     known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
 
 
 def _learn_model(state: MonitorState) -> None:
-    """From the block that is old enough, the coefficients whose motion the model explains in the time after it.
+    """Learn the terms of the coefficients with a large R^2, from the block that is old enough.
 
-    In a closed loop surfaces answer to gusts, and where gusts make the motion least squares are biased by that (Ljung,
-    "System Identification", 2nd ed. (1999), sect. 13.4).
+    In closed loop the surfaces respond to gusts. Where gusts cause most of the motion, least squares are biased (Ljung,
+    "System Identification", 2nd ed. (1999), sect. 13.4), and R^2 is small.
     """
     if len(state.pieces) <= LAG:
         return
@@ -162,11 +162,11 @@ def _learn_model(state: MonitorState) -> None:
         last = islice(state.pieces, len(state.pieces) - LAG - 1, None)
         state.explained = _explained(state.terms, [piece.block for piece in last])
     old = state.pieces[-LAG - 1]
-    reference_model.learn(state.held, old.J, old.v, state.explained)
+    reference_model.learn(state.reference, old.J, old.v, state.explained)
 
 
 def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
-    """(D,) terms of the coefficients whose motion their regressors explain, whatever the derivatives."""
+    """(D,) the terms of the coefficients whose regression on their regressors has a large R^2 in these blocks."""
     outputs, regressors = (np.array([getattr(b, name) for b in last]) for name in ("outputs", "regressors"))
     found = np.zeros(len(terms.names), dtype=bool)
     for output in set(terms.output.tolist()):
@@ -180,31 +180,33 @@ def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
 
 
 def _renew(state: MonitorState, now: Block) -> None:
-    """What is held, and how it could fail, from what has been learned."""
-    residual_whitening.settle(state.colour)
-    if reference_model.adopt_estimates(state.held, now.time):
+    """Update reference model, prior and hypotheses by what has been learned."""
+    residual_whitening.settle(state.whitening)
+    if reference_model.adopt_estimates(state.reference, now.time):
         _rebuild(state)
     variances = vane_noise(state, now.samples)
     noise = {
-        vane: reference_model.noise_of(state.terms, state.colour, vane, variance)
+        vane: reference_model.noise_of(state.terms, state.whitening, vane, variance)
         for vane, variance in variances.items()
     }
-    state.belief = reference_model.model_prior(
-        state.held, sum(noise.values()) * state.held.blocks, state.settings.slack
+    state.prior = reference_model.model_prior(
+        state.reference, sum(noise.values()) * state.reference.blocks, state.settings.slack
     )
-    believed = state.held.values + state.belief.shift
+    believed = state.reference.values + state.prior.shift
     state.flattened = {vane: (variances[vane], added @ believed) for vane, added in noise.items()}
-    state.hypotheses = hypotheses(state.aircraft, state.terms, reference_model.whole(state.held, state.belief.shift))
+    state.hypotheses = hypotheses(
+        state.aircraft, state.terms, reference_model.whole(state.reference, state.prior.shift)
+    )
     state.shifts = Shifts([hypothesis.shift for hypothesis in state.hypotheses])
 
 
 def _rebuild(state: MonitorState) -> None:
-    """Make the last pieces anew, against other values; the first ones go, whose past is not known any more."""
+    """Whiten the last blocks again, with new reference values; the first ones, whose past is lost, are dropped."""
     last = [piece.block for piece in state.pieces]
     state.pieces.clear()
     state.raw.clear()
     for block in last:
-        design, residual = _against_held(state, block)
+        design, residual = _compare_with_reference(state, block)
         if len(state.raw) == ORDER:
             state.pieces.append(_piece(state, block, design, residual))
         state.raw.append((design, residual))
@@ -212,7 +214,7 @@ def _rebuild(state: MonitorState) -> None:
 
 
 def _watch(state: MonitorState) -> None:
-    """Look for a fault in the spans that are due."""
+    """Test the spans that are due for a fault."""
     new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses)))
     for row, span in enumerate(SPANS):
         if state.count % max(span // EVERY, 1) or span > len(state.pieces):
@@ -229,7 +231,7 @@ def _watch(state: MonitorState) -> None:
 
 
 def _proven(state: MonitorState, over: FlightInterval, usual: Array, squares: Array) -> float:
-    """The largest logarithm of a Bayes factor; those that may matter with the residuals' own variance."""
+    """The largest log Bayes factor; large ones are computed with the variance of the interval's own residuals."""
     threshold = state.settings.threshold
     whole = np.array([hypothesis.whole for hypothesis in state.hypotheses])
     usual = gust_correlation.usual_size_in_gusts(whole, usual, len(over.pieces))
@@ -246,23 +248,23 @@ def _proven(state: MonitorState, over: FlightInterval, usual: Array, squares: Ar
 
 
 def _alarm(state: MonitorState, over: FlightInterval, usual: Array) -> None:
-    """Something has failed."""
+    """Raise an alarm."""
     now, earliest = over.pieces[-1].block.time, state.pieces[-min(len(state.pieces), LAG)].block.time - PERIOD
-    state.alarm = Alarm(now, earliest, earliest, usual, over.belief)
+    state.alarm = Alarm(now, earliest, earliest, usual, over.prior)
     _follow(state, state.alarm)
 
 
 def _follow(state: MonitorState, alarm: Alarm) -> None:
-    """Weigh what has come since the onset; end the alarm where the last seconds speak of nothing.
+    """Compare the hypotheses on all blocks since the onset; end the alarm where the last seconds contradict it.
 
-    Damage explains any single moment as well as the surface that made it: it is not said before more has come.
+    Damage explains the first blocks as well as a failed surface does, so that it is reported only after more blocks.
     """
     if len(state.pieces) < LEAST:
         return  # after a gap
     now = state.pieces[-1].block.time
     if now - alarm.found <= DATED:
-        alarm.since, alarm.belief = _onset(state, alarm)
-    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)), alarm.belief)
+        alarm.since, alarm.prior = _onset(state, alarm)
+    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)), alarm.prior)
     found = explained(state, over, alarm.usual)
     factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
     place = int(np.argmax(factors))
@@ -278,36 +280,36 @@ def _follow(state: MonitorState, alarm: Alarm) -> None:
 
 
 def _sure(state: MonitorState, factors: Array, place: int) -> float:
-    """The probability of a hypothesis among all, together with those that are called the same."""
+    """The posterior probability of a fault: of all hypotheses with the same kind and part."""
     names = [*((h.kind, h.part) for h in state.hypotheses), *((VANE_STUCK, vane) for vane in VANES)]
     share = np.exp(factors - factors[place])
     return float(share[[name == names[place] for name in names]].sum() / share.sum())
 
 
 def _since(state: MonitorState, time: float) -> int:
-    """Blocks since a time (s)."""
+    """The number of blocks since a time (s)."""
     return sum(piece.block.time > time + 0.5 * PERIOD for piece in state.pieces)
 
 
 def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
-    """Since when (s), and what is believed then: the likelihood's maximum over the onset, of what explains the rest.
+    """The onset (s) and the prior at it: the maximum of the likelihood over the onset.
 
-    One with much freedom explains the moment of the change, too, and so sets in too early: of the hypotheses that
-    explain much, the earliest onset counts from which on little is left to be explained.
+    Hypotheses with many parameters also explain blocks before the change, so that their onset is too early. Therefore
+    the latest onset is taken that one of the well supported hypotheses has, and that leaves little residual energy.
     """
     latest = max(_since(state, alarm.found), LEAST)
     counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
     spans = onsets(state, counts, counts[-1])
 
     def at(place: int) -> tuple[float, ModelPrior]:
-        return state.pieces[-counts[place]].block.time - PERIOD, spans[place].belief
+        return state.pieces[-counts[place]].block.time - PERIOD, spans[place].prior
 
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
     vanes = stuck_vanes(state, spans[-1].pieces, counts)
     if vanes.max() > factors.max():
         return at(int(vanes.max(axis=1).argmax()))
     if not factors.max() > 0.0:
-        return alarm.since, alarm.belief
+        return alarm.since, alarm.prior
     much = factors.max(axis=0) > MUCH * factors.max()
     best = sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True)
     left = [_left(state, spans[i], alarm.usual) for i in best]
@@ -315,14 +317,14 @@ def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
 
 
 def _left(state: MonitorState, over: FlightInterval, usual: Array) -> float:
-    """The least energy beyond the noise's that a hypothesis leaves in a stretch, and what chance may make of it."""
+    """The least residual energy above the noise's of all hypotheses in an interval, plus an allowance for chance."""
     found = enumerate(weights(state, over, usual))
     share = min(excess(state, over, place, weighed) for place, weighed in found)
     return max(share - 1.0, 0.0) * len(over.pieces) + CHANCE
 
 
 def _over(state: MonitorState, place: int, alarm: Alarm) -> bool:
-    """Whether the last seconds speak against the fault."""
-    over = last_interval(state, min(LAG, len(state.pieces)), alarm.belief)
+    """Whether the last seconds contradict the fault."""
+    over = last_interval(state, min(LAG, len(state.pieces)), alarm.prior)
     factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over.pieces)[0]]
     return bool(factors[place] < 0.0)

@@ -1,7 +1,7 @@
-"""A recorded flight through the fault monitor: what the live node would have said of it, and when.
+"""Replays a recorded flight through the fault monitor: what the live node would have reported, and when.
 
-Messages are taken in the order in which they were recorded, and the recorder's clock tells what was silent. The
-identifier's estimates are heard as soon as the sample that they are stamped with has been taken.
+Messages are taken in the order in which they were recorded; the recorder's clock shows which topic was silent. The
+identifier's estimates are taken directly after the sample with their stamp.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _SECOND = 1e9  # ns
 
 
 class RecordedEstimates(NamedTuple):
-    """What the identifier said of the sample with a header stamp."""
+    """The identifier's estimates at the sample with a header stamp."""
 
     stamp_ns: int
     known: Mapping[str, IdentifierEstimate]
 
 
 class FaultReport(NamedTuple):
-    """What was said after the sample with a header stamp, at a time (s since the first IMU message)."""
+    """The faults reported after the sample with a header stamp, at a time (s since the first IMU message)."""
 
     stamp_ns: int
     time: float
@@ -40,7 +40,7 @@ class FaultReport(NamedTuple):
 
 
 class Episode(NamedTuple):
-    """A fault as it was last described, and the time (s) from which on it was no longer there; None: to the end."""
+    """A fault as last reported, and the time (s) at which it ended; None: it lasted to the end."""
 
     fault: Fault
     until: float | None
@@ -54,15 +54,15 @@ class Episode(NamedTuple):
 
 @dataclass(frozen=True)
 class FaultVerdict:
-    """Of a flight: seconds that were judged, all that was said, and each fault in the order in which it was found."""
+    """The result for a flight: seconds checked, all reports, and each fault in the order in which it was found."""
 
     judged: float
-    said: Sequence[FaultReport] = ()
+    reports: Sequence[FaultReport] = ()
     episodes: Sequence[Episode] = ()
 
     @property
     def sentences(self) -> list[str]:
-        """Each fault in one line; without one, for how long there was something to judge."""
+        """Each fault in one line; without faults, how long the flight was checked."""
         if self.episodes:
             return [episode.text for episode in self.episodes]
         if not self.judged:
@@ -78,11 +78,14 @@ def judge(
     estimates: Iterable[RecordedEstimates] = (),
     progress: Callable[[float], None] | None = None,
 ) -> FaultVerdict:
-    """Let the monitor hear a recording; ``commands`` in log order, ``progress`` hears the share that is done."""
+    """The monitor's verdict on a recording.
+
+    ``commands`` are in log order, ``progress`` is told the share that is done.
+    """
     watch, speech = watching.init(aircraft, settings, STALE_AFTER), Announcements()
-    said: list[FaultReport] = []
-    heard = iter(estimates)
-    coming = next(heard, None)
+    reports: list[FaultReport] = []
+    remaining = iter(estimates)
+    pending = next(remaining, None)
     messages = _messages(streams, commands)
     begin, end = messages[0].log_ns, messages[-1].log_ns
     looks = 0
@@ -90,38 +93,38 @@ def judge(
         now = (message.log_ns - begin) / _SECOND
         while (looks + 1) * PERIOD < now:
             looks += 1
-            faults = watching.wrong(watch, looks * PERIOD)
+            faults = watching.present_faults(watch, looks * PERIOD)
             if speech.due(faults, looks * PERIOD):
-                said.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
+                reports.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
         message.take(watch, now)
-        while coming is not None and coming.stamp_ns <= watch.stamp_ns:
-            watching.on_estimates(watch, coming.known)
-            coming = next(heard, None)
+        while pending is not None and pending.stamp_ns <= watch.stamp_ns:
+            watching.on_estimates(watch, pending.known)
+            pending = next(remaining, None)
         if progress is not None:
             progress((message.log_ns - begin) / max(end - begin, 1))
-    return FaultVerdict(watch.judged, said, episodes(said))
+    return FaultVerdict(watch.judged, reports, episodes(reports))
 
 
-def episodes(said: Sequence[FaultReport]) -> list[Episode]:
-    """The faults among all that was said, each once."""
+def episodes(reports: Sequence[FaultReport]) -> list[Episode]:
+    """Each fault among the reports, once."""
     found: dict[tuple[str, float, str], Episode] = {}
-    there: set[tuple[str, float, str]] = set()
-    for moment in said:
+    present: set[tuple[str, float, str]] = set()
+    for moment in reports:
         now = {_key(fault): fault for fault in moment.faults}
-        for key in there - now.keys():
+        for key in present - now.keys():
             found[key] = found[key]._replace(until=moment.time)
         found |= {key: Episode(fault, None) for key, fault in now.items()}
-        there = set(now)
+        present = set(now)
     return sorted(found.values(), key=lambda episode: episode.fault.found)
 
 
 def _key(fault: Fault) -> tuple[str, float, str]:
-    """What stays the same of a fault: the name of one that only forces speak of may change."""
+    """What identifies a fault. The part of one that was found by forces may change between reports."""
     return fault.source, fault.found, "" if fault.source == FORCES else fault.part
 
 
 class _Message(NamedTuple):
-    """A recorded message, its place among those recorded at the same time, and how it is taken."""
+    """A recorded message, its place among those recorded at the same time, and the function that takes it."""
 
     log_ns: int
     order: int
@@ -129,7 +132,7 @@ class _Message(NamedTuple):
 
 
 def _messages(streams: Streams, commands: Sequence[JointMessage]) -> list[_Message]:
-    """All messages in the order in which they were recorded; of the same moment, commands come last."""
+    """All messages in the order in which they were recorded; commands come last among those of the same time."""
     names = streams.actuators.names
 
     def on_actuators(watch: MessageWatch, now: float, stamp_ns: int, positions: tuple[float, ...]) -> None:

@@ -1,4 +1,4 @@
-"""From the hypothesis that explains most to a fault in words and numbers."""
+"""The fault that a hypothesis describes, in words and numbers."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VA
 
 Array = NDArray[np.float64]
 
-WIDE = 1.96
-AT_LIMIT = 0.9  # share of its travel beyond which a stuck surface is hard over
-SURE = 3.0  # standard errors beyond which a derivative has changed for sure
+WIDE = 1.96  # standard errors of a 95 % interval
+AT_LIMIT = 0.9  # share of its travel, beyond which a stuck surface is hard over
+SURE = 3.0  # standard errors, beyond which the change of a derivative is significant
 
 
 class Detection(NamedTuple):
@@ -29,28 +29,28 @@ class Detection(NamedTuple):
 
 
 def fault_of(hypothesis: Hypothesis, weighed: Weighed, terms: Terms, found: Detection) -> Fault:
-    """The fault that a hypothesis stands for, as it was weighed."""
+    """The fault of a hypothesis, with its estimated size."""
     kind, part, freely = hypothesis.kind, hypothesis.part, weighed.size.size == 1
     if kind == DAMAGE or not freely:
         changes = _changes(hypothesis, weighed, terms)
         return Fault(kind, part, math.nan, math.nan, math.nan, "", *found, changes)
     middle, wide = float(weighed.size[0]), WIDE * math.sqrt(float(weighed.covariance[0, 0]))
-    ends = [_said(kind, x) for x in (middle, middle - wide, middle + wide)]
+    ends = [_reported_size(kind, x) for x in (middle, middle - wide, middle + wide)]
     unit = "1" if kind in (LOSS, AIRSPEED) else "rad"
     if kind == STUCK and abs(middle) >= AT_LIMIT * hypothesis.limit:
         kind = HARD_OVER
     return Fault(kind, part, ends[0], min(ends[1:]), max(ends[1:]), unit, *found)
 
 
-def _said(kind: str, size: float) -> float:
-    """What is reported: of an airspeed by what share it reads wrong, of a vane how far off it reads."""
+def _reported_size(kind: str, size: float) -> float:
+    """The reported size: for an airspeed the relative error of its reading, for a vane the error of its reading."""
     if kind == AIRSPEED:
         return 1.0 / math.sqrt(max(1.0 + size, 0.01)) - 1.0
     return -size if kind == VANE_OFFSET else size
 
 
 def _changes(hypothesis: Hypothesis, weighed: Weighed, terms: Terms) -> tuple[Change, ...]:
-    """The derivatives that have changed for sure, the surest first."""
+    """The derivatives with a significant change, most significant first."""
     errors = np.sqrt(np.diag(weighed.covariance))
     which = np.flatnonzero(hypothesis.shift.free.any(axis=1))
     sureness = np.abs(weighed.size) / errors

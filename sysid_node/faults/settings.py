@@ -1,4 +1,4 @@
-"""What can be set of the fault monitor."""
+"""Settings of the fault monitor."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "actuator_lag": (0.005, 1.0),
     "servo_error": (0.005, 1.0),
 }
-TESTS_AN_HOUR = 36000.0 * 40.0  # blocks, times hypotheses and spans
+TESTS_AN_HOUR = 36000.0 * 40.0  # blocks in an hour, times hypotheses and spans
 
 
 @dataclass(frozen=True)
 class FaultMonitorSettings:
     """Settings of the monitor; defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
-    false_alarms: float = 0.02  # an hour, that chance may make
-    learning: float = 20.0  # s at the start in which nothing is judged
-    memory: float = 60.0  # s over which the residuals' colour is learned
-    slack: float = 0.03  # share of each derivative that counts as no change: no model is exact
+    false_alarms: float = 0.02  # 1/h, expected number of false alarms by chance
+    learning: float = 20.0  # s at the start in which no fault is reported
+    memory: float = 60.0  # s, time constant of the residuals' autocorrelation estimate
+    slack: float = 0.03  # change of each derivative, as a share, that is no fault, as no model is exact
     actuator_lag: float = 0.05  # s, first-order, of the surfaces behind their commands
     servo_error: float = 0.035  # rad between a surface and where its command should have taken it
 
@@ -39,8 +39,8 @@ class FaultMonitorSettings:
 
     @property
     def threshold(self) -> float:
-        """Logarithm of the Bayes factor that counts as proof.
+        """Logarithm of the Bayes factor above which a fault is reported.
 
-        Where nothing has failed a Bayes factor exceeds K with a probability of at most 1/K (Markov's inequality).
+        Without a fault a Bayes factor exceeds K with a probability of at most 1/K (Markov's inequality).
         """
         return math.log(TESTS_AN_HOUR / self.false_alarms)

@@ -1,4 +1,4 @@
-"""What the fault monitor remembers."""
+"""The state of the fault monitor."""
 
 from __future__ import annotations
 
@@ -21,54 +21,56 @@ from sysid_node.faults.types import Fault
 
 Array = NDArray[np.float64]
 
-SPANS = (5, 10, 20, 40, 80)  # blocks looked back over
-LAG = SPANS[-1]  # blocks that must have shown nothing before what is older is learned
-LONGEST = 200  # blocks of a fault that are weighed
+SPANS = (5, 10, 20, 40, 80)  # blocks, lengths of the intervals that are tested for a fault
+LAG = SPANS[-1]  # blocks without a fault, after which the block before them is learned from
+LONGEST = 200  # blocks since the onset of a fault that are used at most
 
 
 class WhitenedBlock(NamedTuple):
-    """A block against the held model."""
+    """A block compared with the reference model."""
 
     block: Block
-    residual: Array  # (6,) without the learned offsets; raw
+    residual: Array  # (6,) of the reference model, before offsets and whitening
     design: Array  # (6, D) whitened
-    begun: tuple[Array, ...]  # (6, D) the same for what set in with this block, or with the one before
-    whitened: Array  # (6,) residual
-    J: Array  # (D, D)
-    v: Array  # (D,)
+    begun: tuple[Array, ...]  # (6, D) the same for a change that began with this block, or with the one before
+    whitened: Array  # (6,) residual, whitened
+    J: Array  # (D, D) information
+    v: Array  # (D,) score
 
 
 @dataclass
 class Alarm:
-    """A fault under way: when it was found, the earliest it can have begun, and since when it is taken to be (s)."""
+    """An alarm: when it was raised, the earliest onset that is possible, and the estimated onset (s)."""
 
     found: float
     earliest: float
     since: float
-    usual: Array  # (H,) size of the statistics before it
-    belief: ModelPrior  # what is weighed against
+    usual: Array  # (H,) mean of the statistics before it
+    prior: ModelPrior  # of the model without a fault
 
 
 @dataclass
 class MonitorState:
-    """All that the monitor remembers."""
+    """The state of the monitor."""
 
     aircraft: Aircraft
     settings: FaultMonitorSettings
     terms: Terms
     blocks: BlockAverager
-    held: ReferenceModel
-    colour: WhiteningFilter
+    reference: ReferenceModel
+    whitening: WhiteningFilter
     pieces: deque[WhitenedBlock] = field(default_factory=lambda: deque(maxlen=LONGEST))
     raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
     hypotheses: list[Hypothesis] = field(default_factory=list)
-    shifts: Shifts | None = None  # the hypotheses'
-    belief: ModelPrior | None = None  # what the blocks are weighed against
+    shifts: Shifts | None = None  # of the hypotheses
+    prior: ModelPrior | None = None  # of the model without a fault
     flattened: dict[str, tuple[float, Array]] = field(
         default_factory=dict
     )  # by vane: its noise's variance, and (D,) ...
-    explained: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))  # (D,) terms that are learned
-    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) by block
+    explained: NDArray[np.bool_] = field(
+        default_factory=lambda: np.empty(0, dtype=bool)
+    )  # (D,) terms with a large R^2, which are learned
+    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) mean statistics by block
     count: int = 0
     alarm: Alarm | None = None
     fault: Fault | None = None

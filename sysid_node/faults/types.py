@@ -1,4 +1,4 @@
-"""What the fault monitor says. SI, radians."""
+"""Faults, as the fault monitor reports them. SI units, radians."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-#: Kinds of faults. The first five are of a surface, then of a sensor, then of the airframe.
+#: Kinds of faults: five of a surface, four of a sensor, one of the airframe.
 LOSS, STUCK, HARD_OVER, SHIFTED = "loss of effectiveness", "stuck surface", "hard-over", "surface shifted"
 NOT_FOLLOWING = "surface does not follow"
 AIRSPEED, VANE_OFFSET, VANE_STUCK, SILENT = "airspeed wrong", "vane offset", "vane stuck", "sensor silent"
 DAMAGE = "structural damage"
-#: What a fault was found by.
+#: The evidence by which a fault was found.
 FORCES, POSITION, ARRIVAL = "forces", "position", "arrival"
 
 
 class Change(NamedTuple):
-    """By how much a derivative has changed, with its 95 % interval."""
+    """The change of a derivative, with its 95 % interval."""
 
     name: str
     value: float
@@ -26,23 +26,23 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault: what, of what, how much, since when (s of the samples' time), and how sure."""
+    """A fault: its kind, part, size, onset (s of the samples' time) and probability."""
 
     kind: str
     part: str  # elevator; airspeed, alpha, beta; longitudinal, lateral
     size: float  # see ``unit``
-    lower: float  # 95 % interval of the size; NaN where it has none
+    lower: float  # 95 % interval of the size; NaN where there is none
     upper: float
     unit: str
     since: float
     found: float  # s, when it was found
     probability: float  # among all hypotheses
-    changes: tuple[Change, ...] = ()  # of a damage: the derivatives that changed for sure, the surest first
+    changes: tuple[Change, ...] = ()  # for damage: the derivatives with a significant change, most significant first
     source: str = FORCES
 
     @property
     def text(self) -> str:
-        """In one line."""
+        """The fault in one line."""
         words = f"{self.part}: {self.kind}"
         if not math.isnan(self.size):
             words += f", {amount(self.size, self.unit)}"
@@ -53,7 +53,7 @@ class Fault:
         return words
 
     def values(self, now: float) -> dict[str, str]:
-        """All of it for a diagnostic_msgs/DiagnosticStatus, at a time (s, as ``since``)."""
+        """All values as texts for a diagnostic_msgs/DiagnosticStatus, at a time (s, as ``since``)."""
         found: dict[str, object] = {"kind": self.kind, "part": self.part, "size": self.size}
         found |= {"lower": self.lower, "upper": self.upper, "unit": self.unit, "probability": self.probability}
         found |= {"since (s)": self.since, "found (s)": self.found, "now (s)": now}
@@ -62,7 +62,7 @@ class Fault:
 
 
 def amount(value: float, unit: str) -> str:
-    """A size in words: rad as degrees, a share as per cent."""
+    """A size as text: rad in degrees, a share in per cent."""
     if unit == "rad":
         return f"{math.degrees(value):+.1f} deg"
     return f"{100.0 * value:.0f} %" if unit == "1" else f"{value:.3g} {unit}".strip()

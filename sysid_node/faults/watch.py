@@ -1,11 +1,11 @@
-"""The whole fault monitor: messages as they come to what is wrong at present; from forces, servos and silences.
+"""The complete fault monitor, from messages to the present faults: by forces, servo positions and silent topics.
 
-    watch = init(aircraft, Settings(), stale_after=0.5)
+    watch = init(aircraft, FaultMonitorSettings(), stale_after=0.5)
     on_imu(watch, arrived, stamp_ns, values)            # and so on, for every message in the order of arrival
-    faults = wrong(watch, now)
+    faults = present_faults(watch, now)
 
-The live node and the replay of a recording call these functions; ``arrived`` and ``now`` are s of one clock that only
-runs on, the node's own or the recorder's. A fault's times are those of the samples: s since the first IMU message.
+The live node and the replay of a recording call these functions. ``arrived`` and ``now`` are s of one clock that never
+jumps, the node's or the recorder's. A fault's times are those of the samples: s since the first IMU message.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.alignment import streaming as intake
 from sysid_node.online.alignment.streaming import Complete, IntakeState
 
-PERIOD = 0.1  # s between looks at what is to be said
-REPEATED = 1.0  # s after which the same is said again
-STALE_AFTER = 0.5  # s without a message, by default
+PERIOD = 0.1  # s between checks whether to report
+REPEATED = 1.0  # s after which the same faults are reported again
+STALE_AFTER = 0.5  # s without a message, after which a topic is silent, by default
 _SECOND = 1e9  # ns
 
 
 @dataclass
 class MessageWatch:
-    """What is remembered of the messages."""
+    """The state of the complete monitor."""
 
     state: MonitorState
     servos: ServoState
@@ -45,17 +45,17 @@ class MessageWatch:
     now: float = 0.0  # s, of the last sample
     stamp_ns: int = 0  # header stamp of the last sample
     heard: dict[str, tuple[float, float]] = field(default_factory=dict)  # by topic: arrival (s), ``now`` then
-    moved: float = math.nan  # s, of the last positions
-    off_command: list[Fault] = field(default_factory=list)  # surfaces
+    moved: float = math.nan  # s, time of the last positions
+    off_command: list[Fault] = field(default_factory=list)  # of surfaces that are not where they were commanded
 
     @property
     def judged(self) -> float:
-        """Seconds of flight that were judged."""
+        """Seconds of flight that were checked for faults."""
         return max(0.0, self.state.count * blocks.PERIOD - self.state.settings.learning)
 
 
 def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:
-    """Nothing heard; a topic that was heard and then is silent for ``stale_after`` s is a fault."""
+    """A monitor before the first message. A topic that falls silent for ``stale_after`` s is a fault."""
     taken = intake.init(aircraft, blocks.MOST_GAP)
     return MessageWatch(monitor.init(aircraft, settings), servos.init(aircraft, settings), taken, stale_after)
 
@@ -85,7 +85,7 @@ def on_actuators(
 
 
 def on_command(watch: MessageWatch, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
-    """Take what the joints are told; without a stamp it counts from the last positions on."""
+    """Take a command to the joints; without a stamp, it has the time of the last positions."""
     controls = _controls(watch.intake.actuation, names, positions)
     moment = _time_of(watch.intake, stamp_ns) if stamp_ns and watch.intake.bases else watch.moved
     if controls and math.isfinite(moment):
@@ -97,8 +97,8 @@ def on_estimates(watch: MessageWatch, known: Mapping[str, IdentifierEstimate]) -
     monitor.receive_estimates(watch.state, watch.now, known)
 
 
-def wrong(watch: MessageWatch, now: float) -> list[Fault]:
-    """All faults at a time ``now`` (s, of the arrivals' clock). While a topic is silent forces speak of nothing."""
+def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
+    """All faults at a time (s, by the arrivals' clock). While a topic is silent, none is found by forces."""
     silent = [
         Fault(
             SILENT,
@@ -120,13 +120,13 @@ def wrong(watch: MessageWatch, now: float) -> list[Fault]:
 
 @dataclass
 class Announcements:
-    """Says what is wrong when it is news, and once a second."""
+    """Decides when faults are reported: when they change, and once a second."""
 
-    news: str = ""
-    at: float = -math.inf  # s, when it was last said
+    news: str = ""  # the faults that were last reported
+    at: float = -math.inf  # s, when they were
 
     def due(self, faults: Sequence[Fault], now: float) -> bool:
-        """Whether these are to be said at a time (s)."""
+        """Whether these faults are to be reported at a time (s)."""
         news = " ".join(f"{fault.part} {fault.kind}" for fault in faults)
         if news == self.news and now - self.at < REPEATED - 0.5 * PERIOD:
             return False
@@ -141,12 +141,12 @@ def _take(watch: MessageWatch, samples: Sequence[Complete]) -> None:
 
 
 def _time_of(taken: IntakeState, stamp_ns: int) -> float:
-    """s since the first IMU message, as the samples count them."""
+    """Seconds since the first IMU message, the samples' time."""
     base = taken.bases[-1]
     return (stamp_ns - base.stamp + base.since) / _SECOND
 
 
 def _controls(actuation: Actuation, names: Sequence[str], positions: Sequence[float]) -> tuple[float, ...]:
-    """Controls (rad) of joint positions; empty where they are no such."""
+    """Controls (rad) of joint positions; empty where these are rejected."""
     found = actuation.of_message(actuation.places(names), positions)
     return () if isinstance(found, str) else found[1:]

@@ -77,7 +77,7 @@ class FaultMonitor(LoopNode):
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
         """The present faults."""
-        faults, judged = watching.wrong(self._watch, time.monotonic()), self._watch.judged
+        faults, judged = watching.present_faults(self._watch, time.monotonic()), self._watch.judged
         p50, p99 = self._work.percentiles()
         values: dict[str, object] = {"update p50 (us)": 1e6 * p50, "update p99 (us)": 1e6 * p99}
         values |= {"faults": len(faults), "judged for (s)": judged}
@@ -115,7 +115,7 @@ class FaultMonitor(LoopNode):
     def _on_time(self) -> None:
         """Publish the faults: at once where they changed, else once a second."""
         now, before = time.monotonic(), self._speech.news
-        faults = watching.wrong(self._watch, now)
+        faults = watching.present_faults(self._watch, now)
         if not self._speech.due(faults, now):
             return
         if self._speech.news != before:

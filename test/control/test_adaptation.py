@@ -61,7 +61,7 @@ def test_a_surface_of_less_effect_gets_more_gain(state: controller.ControllerSta
 
 @pytest.mark.parametrize(
     "changes",
-    [{"valid": False}, {"explained": 0.5}, {"value": NAN}, {"lower": -math.inf}, {"lower": NAN, "upper": NAN}],
+    [{"valid": False}, {"r_squared": 0.5}, {"value": NAN}, {"lower": -math.inf}, {"lower": NAN, "upper": NAN}],
 )
 def test_what_is_not_to_be_trusted_is_not_used(state: controller.ControllerState, changes: dict[str, float]) -> None:
     flown(state, 3.0, beliefs(ELEVATOR, **changes))
@@ -148,14 +148,14 @@ def test_after_a_short_lapse_what_was_flown_is_taken_up_again(state: controller.
     adapted = state.axes[0].flown.gains
     end = flown(state, 1.0, None, end)
     assert not np.allclose(state.axes[0].flown.gains, adapted)
-    flown(state, 3.0, beliefs(ELEVATOR, explained=0.0), end)
+    flown(state, 3.0, beliefs(ELEVATOR, r_squared=0.0), end)
     np.testing.assert_allclose(state.axes[0].flown.gains, adapted)
 
 
 def test_after_a_long_one_it_is_not(state: controller.ControllerState) -> None:
     end = flown(state, 6.0, beliefs(ELEVATOR, half=0.02))
     end = flown(state, 8.0, None, end)
-    flown(state, 3.0, beliefs(ELEVATOR, explained=0.0), end)
+    flown(state, 3.0, beliefs(ELEVATOR, r_squared=0.0), end)
     assert baseline(state)
 
 
@@ -171,8 +171,8 @@ def test_the_clock_may_step_back(state: controller.ControllerState) -> None:
     flown(state, 1.0, beliefs(half=0.02), 100.0)
     flown(state, 8.0, beliefs(ELEVATOR, half=0.02), 3.0)
     np.testing.assert_allclose(state.axes[0].flown.gains[0, 1], 2.5 * state.axes[0].axis.baseline[0, 1], rtol=0.01)
-    assert len(state.law.coming) < 10
-    assert len(state.law.behind.coming) < 10
+    assert len(state.law.pending) < 10
+    assert len(state.law.behind.pending) < 10
 
 
 def test_adaptation_can_be_switched_off() -> None:

@@ -68,7 +68,7 @@ class Maker:
 def monitored(seed: int, **settings: float) -> tuple[MonitorState, Maker]:
     """A monitor that knows the derivatives to 2 %, and a maker of flights."""
     state = monitor.init(AIRCRAFT, FaultMonitorSettings(**settings))
-    state.held.errors = 0.02 * np.abs(state.held.values) + 1e-5
+    state.reference.errors = 0.02 * np.abs(state.reference.values) + 1e-5
     return state, Maker(seed, state.blocks.layout.names)
 
 

@@ -204,13 +204,13 @@ def test_the_last_good_derivatives_are_held() -> None:
         state, ONSET, {"Cm_de": IdentifierEstimate(-0.47, 0.004, True), "CL_alpha": IdentifierEstimate(9.9, 0.1, False)}
     )
     fly(state, maker, 12.0)
-    assert state.held.values[place] == -0.47
-    assert state.held.errors[place] == 0.004
-    assert state.held.values[state.terms.names.index("CL_alpha")] == AIRCRAFT.derivatives["CL_alpha"].value
+    assert state.reference.values[place] == -0.47
+    assert state.reference.errors[place] == 0.004
+    assert state.reference.values[state.terms.names.index("CL_alpha")] == AIRCRAFT.derivatives["CL_alpha"].value
     fly(state, maker, 8.0, lost("de", 0.6))
     monitor.receive_estimates(state, 60.0, {"Cm_de": IdentifierEstimate(-0.19, 0.004, True)})
     fly(state, maker, 20.0, lost("de", 0.6))
-    assert state.held.values[place] == -0.47
+    assert state.reference.values[place] == -0.47
 
 
 def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
@@ -222,7 +222,7 @@ def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
         {"Cm_de": IdentifierEstimate(-0.4606 * 1.01, 0.01, True), "CL_alpha": IdentifierEstimate(3.02, 0.05, True)},
     )
     assert fly(state, maker, 60.0) is None
-    assert state.held.values[state.terms.names.index("CL_alpha")] == 3.02
+    assert state.reference.values[state.terms.names.index("CL_alpha")] == 3.02
 
 
 def test_samples_of_another_rate_or_with_holes_are_averaged_alike() -> None:

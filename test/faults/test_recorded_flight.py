@@ -72,14 +72,14 @@ def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, v
     for stream, i, take, names in sorted(calls, key=lambda call: call[0].arrival.order[call[1]]):
         now = (int(stream.arrival.log_ns[i]) - start) / 1e9
         while 0.1 * tick < now:
-            faults = watching.wrong(watch, 0.1 * tick)
+            faults = watching.present_faults(watch, 0.1 * tick)
             if speech.due(faults, 0.1 * tick):
                 said.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
             tick += 1
         values = stream.positions if names else stream.values
         take(watch, now, int(stream.arrival.stamp_ns[i]), *names, tuple(values[i].tolist()))
-    assert [moment.stamp_ns for moment in said] == [moment.stamp_ns for moment in verdict.said]
-    assert [[f.text for f in moment.faults] for moment in said] == [[f.text for f in m.faults] for m in verdict.said]
+    assert [moment.stamp_ns for moment in said] == [moment.stamp_ns for moment in verdict.reports]
+    assert [[f.text for f in moment.faults] for moment in said] == [[f.text for f in m.faults] for m in verdict.reports]
 
 
 def test_what_is_silent_and_what_does_not_follow(flight: Streams) -> None:

@@ -51,29 +51,29 @@ def only(faults: list[Fault]) -> Fault:
 @pytest.mark.parametrize("topic", ["imu/data", "air_data", "actuators"])
 def test_a_silent_topic_is_said_until_it_speaks_again(watch: MessageWatch, topic: str) -> None:
     flown(watch, 0.0, 2.0)
-    assert watching.wrong(watch, 2.0) == []
+    assert watching.present_faults(watch, 2.0) == []
     flown(watch, 2.0, 3.0, silent=topic)
-    fault = only(watching.wrong(watch, 3.0))
+    fault = only(watching.present_faults(watch, 3.0))
     assert (fault.kind, fault.part, fault.source) == (SILENT, topic, ARRIVAL)
     assert fault.size == pytest.approx(1.01, abs=1e-9)  # its last message came at 1.99 s
     assert fault.since == pytest.approx(1.99, abs=2 * STEP)
     assert fault.found == pytest.approx(fault.since + 0.5)
     flown(watch, 3.0, 3.1)
-    assert watching.wrong(watch, 3.1) == []
+    assert watching.present_faults(watch, 3.1) == []
 
 
 def test_what_never_spoke_is_not_silent(watch: MessageWatch) -> None:
     flown(watch, 0.0, 2.0, silent="air_data")
-    assert watching.wrong(watch, 2.0) == []
+    assert watching.present_faults(watch, 2.0) == []
 
 
 @pytest.mark.parametrize("stamped", [True, False])
 def test_a_jammed_servo_by_the_samples_clock(watch: MessageWatch, stamped: bool) -> None:
     """Its times count from the first IMU message, as those of all faults do."""
     flown(watch, 0.0, 2.0, stamped=stamped)
-    assert watching.wrong(watch, 2.0) == []
+    assert watching.present_faults(watch, 2.0) == []
     flown(watch, 2.0, 4.0, stuck=True, stamped=stamped)
-    fault = only(watching.wrong(watch, 4.0))
+    fault = only(watching.present_faults(watch, 4.0))
     assert (fault.kind, fault.part, fault.source) == (STUCK, "elevator", POSITION)
     assert 2.0 <= fault.since <= fault.found <= 4.0
 

@@ -1,17 +1,17 @@
-"""How strongly a stretch of flight speaks for a change of the aircraft or its sensors: Bayes factors.
+"""Bayes factors of changes of the aircraft or its sensors, from an interval of flight.
 
-The stretch's whitened residuals against the model that is held are summed up by an information matrix J (D, D) and a
-score v (D,) over the derivatives. The held ones are known with a covariance P; what that allows for is taken out,
+The whitened residuals of the reference model are summed up by an information matrix J (D, D) and a score v (D,) for the
+derivatives. The reference derivatives have a covariance P, which is integrated out:
 
     J' = J - J (J + P^-1)^-1 J,    v' = v - J (J + P^-1)^-1 v.
 
-A fault shifts the derivatives by s + B phi, phi ~ N(0, diag(spread^2)). The logarithm of its Bayes factor against no
-fault is, with G = B'J'B and g = B'(v' - J's),
+A fault shifts the derivatives by s + B phi, phi ~ N(0, diag(spread^2)). The logarithm of its Bayes factor relative to
+no fault is, with G = B'J'B and g = B'(v' - J's),
 
     s'v' - s'J's / 2 + g'(G + L)^-1 g / 2 - log(|G + L| / |L|) / 2,     L = diag(spread^-2),
 
-the generalised likelihood ratio of Willsky & Jones (IEEE Trans. Automatic Control 21, 1976) with its price for freedom
-(Kass & Raftery, "Bayes factors", J. American Statistical Association 90, 1995).
+the generalised likelihood ratio of Willsky & Jones (IEEE Trans. Automatic Control 21, 1976) with a penalty for the
+number of parameters (Kass & Raftery, "Bayes factors", J. American Statistical Association 90, 1995).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Shift:
-    """What a fault does to the derivatives: s (D,), B (D, m), and how large phi may be (m,)."""
+    """The shift of the derivatives by a fault: s (D,), B (D, m), and the prior standard deviation of phi (m,)."""
 
     fixed: Array
     free: Array
@@ -37,7 +37,7 @@ class Shift:
 
 @dataclass(frozen=True)
 class Weighed:
-    """Logarithm of the Bayes factor, and phi with its covariance."""
+    """The logarithm of a Bayes factor, and the estimate of phi with its covariance."""
 
     factor: float
     size: Array  # (m,)
@@ -45,13 +45,13 @@ class Weighed:
 
 
 def marginal(J: Array, v: Array, precision: Array) -> tuple[Array, Array]:
-    """J' and v' of the module's text; ``precision`` (D, D) is P^-1."""
+    """J' and v' as defined above; ``precision`` (D, D) is P^-1."""
     solved = np.linalg.solve(J + precision, np.column_stack([J, v]))
     return J - J @ solved[:, :-1], v - J @ solved[:, -1]
 
 
 def weigh(J: Array, v: Array, shift: Shift, excess: float = 1.0) -> Weighed:
-    """Of a marginal J and v, whose residuals have ``excess`` times the variance that they were whitened by."""
+    """The Bayes factor for J' and v', of residuals with ``excess`` times the variance assumed in the whitening."""
     s, B = shift.fixed, shift.free
     pulled = J @ s
     prior = shift.spread**-2
@@ -68,7 +68,7 @@ _IMPOSSIBLE = Weighed(-math.inf, np.empty(0), np.empty((0, 0)))
 
 
 class Shifts:
-    """Many shifts: ``each``, and side by side those with one free direction, which can be weighed at once."""
+    """Many shifts; those with one free direction stand in arrays side by side."""
 
     def __init__(self, shifts: Sequence[Shift]) -> None:
         self.each = tuple(shifts)
@@ -82,9 +82,9 @@ class Shifts:
 
 
 def most(shifts: Shifts, squares: Array, excess: Array) -> Array:
-    """(H,) what the factors of shifts without a fixed part cannot exceed, by their ``score_squares`` (H,).
+    """(H,) an upper bound of the log Bayes factors of shifts without a fixed part, by their ``score_squares`` (H,).
 
-    The likelihood's own maximum, without the price for freedom.
+    It is the maximum of the log likelihood ratio, without the penalty for parameters.
     """
     return np.asarray(0.5 * shifts.freedom * squares / excess)
 
@@ -92,9 +92,9 @@ def most(shifts: Shifts, squares: Array, excess: Array) -> Array:
 def weigh_each(
     J: Array, v: Array, shifts: Shifts, excess: Array, worth: NDArray[np.bool_] | None = None
 ) -> list[Weighed]:
-    """``weigh`` for many shifts, each by its own ``excess`` (H,).
+    """``weigh`` for many shifts, each with its own ``excess`` (H,).
 
-    Those with several free directions are only weighed where it is ``worth`` it (H,), else taken for impossible.
+    Shifts with several free directions are computed only where ``worth`` (H,) is true; else they count as impossible.
     """
     share = 1.0 / excess[shifts.single]
     JS = J @ shifts.fixed
@@ -111,9 +111,10 @@ def weigh_each(
 
 
 def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness: Array, excess: float) -> Weighed:
-    """As ``weigh``, of J and v that are not marginal, where a fault may differ from its shift by ``looseness`` (D,).
+    """As ``weigh``, with J and v, where a fault may differ from its shift by ``looseness`` (D,), 1 sigma.
 
-    A fault is hardly ever as simple as its hypothesis: without this, one with more freedom would explain the rest.
+    A fault is hardly ever as simple as its hypothesis. Without this allowance, a hypothesis with more parameters would
+    win by fitting the difference.
     """
     s, m = shift.fixed, shift.spread.size
     none = _evidence(J / excess, v / excess, precision)
@@ -128,7 +129,7 @@ def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness:
 
 
 def _evidence(G: Array, g: Array, prior: Array) -> tuple[float, Array, Array]:
-    """Of parameters with a normal prior of this precision: log evidence over that of none, mean, covariance."""
+    """Log Bayes factor of parameters with a normal prior of this precision against zero; their mean and covariance."""
     covariance = np.asarray(np.linalg.inv(G + prior), dtype=np.float64)
     mean = covariance @ g
     freedom = np.linalg.slogdet(G + prior)[1] - np.linalg.slogdet(prior)[1]
@@ -136,7 +137,7 @@ def _evidence(G: Array, g: Array, prior: Array) -> tuple[float, Array, Array]:
 
 
 def score_squares(J: Array, v: Array, shifts: Shifts) -> Array:
-    """(H,) mean square of the score along each shift: 1 where nothing has failed and the whitening holds."""
+    """(H,) mean square of the score along each shift: 1 without a fault, where the whitening is right."""
     found = np.empty(len(shifts.each))
     information = (shifts.free * (J @ shifts.free)).sum(axis=0)
     found[shifts.single] = (v @ shifts.free) ** 2 / np.maximum(information, 1e-300)

@@ -1,12 +1,11 @@
-"""What may have failed, as shifts of the derivatives that are held.
+"""The faults that are considered, as shifts of the reference derivatives.
 
-Every one of these leaves the equations linear: a surface that does the share 1 - l of its effect takes l of its
-derivatives away; one that stands at an angle takes all of them away and puts the angle's moments into the offsets; a
-vane that reads off, too, moves offsets; an airspeed that is wrong scales all that dynamic pressure multiplies. So every
-surface and sensor has a direction of its own in the space of all coefficients' derivatives, and that tells them apart.
-Damage is any shift of an axis's derivatives; and, as what explains less but asks for less proof, a share of the
-stiffness about an axis, of the damping, or of both, which is what a shifted mass or a torn-off part of a tail does
-first of all.
+Each fault keeps the equations linear. A surface that lost the share l of its effect loses l of its derivatives. A
+surface that is stuck at an angle loses all of them, and the moments at that angle are added to the offsets. A vane with
+an offset changes the offsets, too. A wrong airspeed scales all terms with dynamic pressure. Every surface and sensor
+has therefore a direction of its own in the space of all derivatives, by which faults are distinguished. Damage is any
+shift of the derivatives of an axis. As a simpler hypothesis, which needs less evidence, it is a change of stiffness, of
+damping, or of both, which a shifted mass or the loss of a part of the tail causes first.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ from sysid_node.faults.types import AIRSPEED, DAMAGE, LOSS, SHIFTED, STUCK, VANE
 
 Array = NDArray[np.float64]
 
-#: How large a fault may be, 1 sigma: share of a surface's effect, rad, share of dynamic pressure, rad, share of a
-#: derivative.
+#: Prior standard deviations: share of a surface's effect, angle of a surface (rad), share of dynamic pressure, angle
+#: of a vane (rad), share of a derivative.
 LOST, MOVED, PRESSURE, TURNED, CHANGED = 0.5, 0.1, 0.5, 0.1, 0.5
 LIMIT = 0.35  # rad, where the aircraft file gives no limit
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
@@ -34,32 +33,32 @@ _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A fault of a part."""
+    """A kind of fault of a part, and its shift of the derivatives."""
 
     kind: str
     part: str
     shift: Shift
     limit: float = 0.0  # rad, of a surface's travel
-    whole: bool = False  # all derivatives of an axis, which can take up anything
+    whole: bool = False  # all derivatives of an axis, which can fit any change
 
 
-def hypotheses(aircraft: Aircraft, terms: Terms, held: Array) -> list[Hypothesis]:
-    """All faults about the held derivatives (D,)."""
+def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array) -> list[Hypothesis]:
+    """All hypotheses for the reference derivatives (D,)."""
     found = []
     for name, control in aircraft.controls.items():
         if terms.of(control.symbol).any():
-            found += _of_surface(name, control.symbol, control.limit or LIMIT, terms, held)
-    found.append(Hypothesis(AIRSPEED, "airspeed", _free([_pressure(terms, held)], [PRESSURE])))
+            found += _of_surface(name, control.symbol, control.limit or LIMIT, terms, reference)
+    found.append(Hypothesis(AIRSPEED, "airspeed", _free([_pressure(terms, reference)], [PRESSURE])))
     for vane in ("alpha", "beta"):
         if terms.of(vane).any():
-            found.append(Hypothesis(VANE_OFFSET, vane, _free([_turned(vane, terms, held)], [TURNED])))
+            found.append(Hypothesis(VANE_OFFSET, vane, _free([_turned(vane, terms, reference)], [TURNED])))
     for axis, names in _AXES:
         columns = _columns(names, terms)
         if columns.size:
-            found.append(Hypothesis(DAMAGE, axis, _changed(columns, terms, held), whole=True))
+            found.append(Hypothesis(DAMAGE, axis, _changed(columns, terms, reference), whole=True))
     for axis, those in _STIFFNESS:
         present = [[terms.names.index(name) for name in names] for names in those if set(names) <= set(terms.names)]
-        found += [Hypothesis(DAMAGE, axis, _changed(np.array(columns), terms, held)) for columns in present]
+        found += [Hypothesis(DAMAGE, axis, _changed(np.array(columns), terms, reference)) for columns in present]
     return found
 
 
@@ -71,10 +70,10 @@ _STIFFNESS = (
 )
 
 
-def _of_surface(name: str, symbol: str, limit: float, terms: Terms, held: Array) -> list[Hypothesis]:
-    lost = np.where(terms.of(symbol), -held, 0.0)
-    moved = _offsets(symbol, terms, held)
-    none = np.zeros_like(held)
+def _of_surface(name: str, symbol: str, limit: float, terms: Terms, reference: Array) -> list[Hypothesis]:
+    lost = np.where(terms.of(symbol), -reference, 0.0)
+    moved = _offsets(symbol, terms, reference)
+    none = np.zeros_like(reference)
     return [
         Hypothesis(LOSS, name, _free([lost], [LOST]), limit),
         Hypothesis(STUCK, name, Shift(lost, moved[:, None], np.array([limit])), limit),
@@ -82,41 +81,44 @@ def _of_surface(name: str, symbol: str, limit: float, terms: Terms, held: Array)
     ]
 
 
-def _offsets(regressor: str, terms: Terms, held: Array) -> Array:
-    """(D,) the offsets that a radian more of a regressor makes."""
-    shift = np.zeros_like(held)
+def _offsets(regressor: str, terms: Terms, reference: Array) -> Array:
+    """(D,) the change of the offsets by one radian of a regressor."""
+    shift = np.zeros_like(reference)
     for d in np.flatnonzero(terms.of(regressor)).tolist():
-        shift[terms.offset_of(terms.output[d])] += held[d]
+        shift[terms.offset_of(terms.output[d])] += reference[d]
     return shift
 
 
-def _pressure(terms: Terms, held: Array) -> Array:
-    """(D,) of a dynamic pressure that is twice what is measured; non-dimensional rates go with its root."""
+def _pressure(terms: Terms, reference: Array) -> Array:
+    """(D,) the shift if dynamic pressure is twice the measured one; non-dimensional rates change by its root."""
     share = np.array([0.5 if r in RATES else 1.0 for r in terms.regressors])
-    return np.asarray(share * held)
+    return np.asarray(share * reference)
 
 
-def _turned(vane: str, terms: Terms, held: Array) -> Array:
-    """(D,) of a true angle a radian above what is measured; all of lift and drag is turned by the angle of attack."""
-    shift = _offsets(vane, terms, held)
+def _turned(vane: str, terms: Terms, reference: Array) -> Array:
+    """(D,) the shift if the true angle is one radian above the measured one.
+
+    An alpha error also rotates lift and drag.
+    """
+    shift = _offsets(vane, terms, reference)
     if vane == "alpha":
         for output, other, sign in ((_LIFT, _DRAG, 1.0), (_DRAG, _LIFT, -1.0)):
             for d in np.flatnonzero(terms.output == output).tolist():
                 twin = (terms.output == other) & (terms.column == terms.column[d])
-                shift[d] += sign * held[twin].sum()
+                shift[d] += sign * reference[twin].sum()
     return shift
 
 
-def _changed(columns: NDArray[np.intp], terms: Terms, held: Array) -> Shift:
-    """Each of these derivatives by itself, of about the size that the others of its kind may change by."""
-    free = np.zeros((held.size, columns.size))
+def _changed(columns: NDArray[np.intp], terms: Terms, reference: Array) -> Shift:
+    """An independent change of each of these derivatives."""
+    free = np.zeros((reference.size, columns.size))
     free[columns, np.arange(columns.size)] = 1.0
-    spread = np.maximum(CHANGED * np.abs(held[columns]), 2.0 * terms.tolerance[columns])
-    return Shift(np.zeros_like(held), free, spread)
+    spread = np.maximum(CHANGED * np.abs(reference[columns]), 2.0 * terms.tolerance[columns])
+    return Shift(np.zeros_like(reference), free, spread)
 
 
 def _columns(names: Sequence[str], terms: Terms) -> NDArray[np.intp]:
-    """Terms of these coefficients."""
+    """The terms of these coefficients."""
     return np.flatnonzero(np.isin(terms.output, [COEFFICIENTS.index(name) for name in names]))
 
 

@@ -1,8 +1,8 @@
-"""Do the surfaces go where they are told? Their measured positions beside their commands, where both are there.
+"""Compares the measured positions of the surfaces with their commands, where both are available.
 
-A position that stays farther from the command, behind the servo's lag, than the servo's error allows is that of a
-surface that is stuck, or hard over (Ducard, "Fault-tolerant Flight Control and Guidance Systems" (2009), ch. 3). Where
-``actuators`` echoes the commands there is nothing to be seen here, and the forces must tell.
+A surface whose position differs from the lagged command by more than the servo's error for some time is stuck, hard
+over or does not follow (Ducard, "Fault-tolerant Flight Control and Guidance Systems" (2009), ch. 3). Where
+``actuators`` repeats the commands, this check finds nothing, and faults are found by forces alone.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from sysid_node.faults.types import HARD_OVER, NOT_FOLLOWING, POSITION, STUCK, F
 
 Array = NDArray[np.float64]
 
-LASTING = 0.3  # s that a surface must be off
-FOLLOWING = 1.0  # s that it must be where it should, to be taken for sound again
-STILL = 0.005  # rad: one that moves less is stuck
-RECENT = 0.5  # s of positions by which that is told
-COMMAND_AGE = 0.15  # s, after which commands no longer count
+LASTING = 0.3  # s for which a position must differ, to be a fault
+FOLLOWING = 1.0  # s for which it must agree, to end the fault
+STILL = 0.005  # rad: a surface that moves less is stuck
+RECENT = 0.5  # s of positions that decide whether it moves
+COMMAND_AGE = 0.15  # s: older commands are not compared
 
 
 @dataclass
 class ServoState:
-    """What is remembered of the controls, in the aircraft file's order."""
+    """The state of the check, for the controls in the aircraft file's order."""
 
     names: tuple[str, ...]
     limits: Array
     settings: FaultMonitorSettings
     command: Array  # rad, NaN before the first
-    off_since: Array  # s, inf = where it should be
-    off_at: Array  # s, when it was last not where it should be
-    coming: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=2000))  # commands by time (s)
+    off_since: Array  # s, beginning of the present difference; inf = none
+    off_at: Array  # s, time of the last difference
+    pending: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=2000))  # commands by time (s)
     commanded: float = -math.inf  # s
     expected: Array | None = None  # behind the lag
     time: float = math.nan  # s, of the last positions
@@ -49,27 +49,27 @@ class ServoState:
 
 
 def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> ServoState:
-    """Nothing heard."""
+    """The state before the first message."""
     limits = np.array([control.limit or LIMIT for control in aircraft.controls.values()])
     never = np.full(limits.size, math.inf)
     return ServoState(tuple(aircraft.controls), limits, settings, np.full(limits.size, math.nan), never, -never)
 
 
 def command(state: ServoState, time: float, controls: Sequence[float]) -> None:
-    """What the controls (rad) are told at a time (s, of the positions' clock)."""
-    if state.coming and time < state.coming[-1][0]:
-        state.coming.clear()  # the clock has stepped back
-    state.coming.append((time, np.clip(controls, -state.limits, state.limits)))
+    """Take a command to the controls (rad) at a time (s, by the positions' clock)."""
+    if state.pending and time < state.pending[-1][0]:
+        state.pending.clear()  # the clock has stepped back
+    state.pending.append((time, np.clip(controls, -state.limits, state.limits)))
 
 
 def position(state: ServoState, time: float, controls: Sequence[float]) -> list[Fault]:
-    """Where the controls (rad) are at a time (s); returns what is wrong with them at present.
+    """Take the positions of the controls (rad) at a time (s); returns the present faults.
 
-    Nothing is, where the commands of that time have not come: they may be on their way.
+    There are none while the commands of that time are missing, as they may arrive later.
     """
     found = np.asarray(controls, dtype=float)
-    while state.coming and state.coming[0][0] <= time:
-        state.commanded, state.command = state.coming.popleft()
+    while state.pending and state.pending[0][0] <= time:
+        state.commanded, state.command = state.pending.popleft()
     if not abs(time - state.commanded) <= COMMAND_AGE:
         _forget(state)
         return []
@@ -101,7 +101,7 @@ def _forget(state: ServoState) -> None:
 
 
 def _fault(state: ServoState, i: int, now: float, before: Fault | None) -> Fault:
-    """Of a control that is not where it should be."""
+    """The fault of a control whose position differs from its command."""
     places = np.array([row[i] for _, row in state.recent])
     if np.ptp(places) > STILL:
         kind = NOT_FOLLOWING

@@ -1,7 +1,7 @@
-"""Has a vane jammed? What it reads, beside the angle that lift (side force) speaks of.
+"""Detects a jammed vane by comparison of its reading with the angle that follows from lift (or side force).
 
-The angle m that the vane reads and the angle f that the force's equation asks for both follow the true angle t while
-the vane turns: their covariance is that of t plus each one's noise. When it is stuck, m holds its noise alone. The
+While the vane turns, its reading m and the angle f that solves the force equation both follow the true angle t: their
+covariance is that of t plus the noise of each. When it is jammed, m has its noise alone. The
 logarithm of the Bayes factor is that of the two covariances (normal deviates; Anderson, "An Introduction to
 Multivariate Statistical Analysis", 2nd ed. (1984), sec. 10.8), t's variance being f's less its noise.
 """
@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LEAST_MOTION = 4.0  # times the noise's variance that the true angle's must be, for a vane to be judged
+LEAST_MOTION = 4.0  # least variance of the true angle, in noise variances, for a vane to be tested
 
 
-def stuck_factor(read: Array, asked: Array, filter: Array, read_noise: float, difference: float) -> float:
-    """Logarithm of the Bayes factor of a vane that is stuck, from block means (N,) rad in a row.
+def stuck_factor(read: Array, implied: Array, filter: Array, read_noise: float, difference: float) -> float:
+    """Log Bayes factor of a jammed vane, from consecutive block means (N,) rad.
 
     ``filter`` (2,) whitens the difference of the two angles, whose variance is then ``difference``; ``read_noise`` is
     the variance of the vane's noise in a block, rad^2.
     """
-    m, f = (_whitened(x, filter) for x in (read, asked))
+    m, f = (_whitened(x, filter) for x in (read, implied))
     n = m.size
     if n < 3:
         return 0.0

@@ -1,4 +1,4 @@
-"""All hypotheses over one stretch of flight."""
+"""Bayes factors of all hypotheses on an interval of flight."""
 
 from __future__ import annotations
 
@@ -29,81 +29,83 @@ from sysid_node.online.frequency.regression_signals import OFFSET
 
 Array = NDArray[np.float64]
 
-#: Vanes: column of a block's air data, and the coefficient that tells their angle.
+#: Vanes: column of a block's air data, and the coefficient that depends on their angle.
 VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index("CY"))}
 
 
-LOOSE = 0.1  # share by which a fault may differ from its hypothesis
-ENOUGH = 3  # blocks of sound flight that say something of it
-LONG = 20  # blocks
-MARGIN = 1.0  # of a logarithm, for the statistics' rounding
-LAST_RESORT = 0.1  # share by which damage of a whole axis, which can explain all, must explain more than what is simple
+LOOSE = 0.1  # relative difference of a fault from its hypothesis that is allowed for
+ENOUGH = 3  # least number of blocks before the onset that refine the prior
+LONG = 20  # blocks, from which on the noise of the vanes is corrected for
+MARGIN = 1.0  # of a log Bayes factor, allowance for rounding
+LAST_RESORT = 0.1  # share taken off the log Bayes factor of damage of a whole axis, which can fit any change
 
 
 class FlightInterval(NamedTuple):
-    """The last blocks, what is believed, what they sum up to against it, and that without what its errors allow."""
+    """An interval of flight: blocks, prior, their sums J and v, and these with the prior's uncertainty taken out."""
 
     pieces: Sequence[WhitenedBlock]
-    belief: ModelPrior
+    prior: ModelPrior
     whole: tuple[Array, Array]
     J: Array
     v: Array
 
 
-def last_interval(state: MonitorState, count: int, belief: ModelPrior | None = None) -> FlightInterval:
-    """The last ``count`` blocks, against a belief; None: what is believed by now."""
-    belief = belief or state.belief
-    assert belief is not None
+def last_interval(state: MonitorState, count: int, prior: ModelPrior | None = None) -> FlightInterval:
+    """The interval of the last ``count`` blocks, with a prior; None: the present one."""
+    prior = prior or state.prior
+    assert prior is not None
     pieces = _last(state, count)
     J, v = (np.sum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
-    return _against(state, pieces, (J, v), belief)
+    return _against(state, pieces, (J, v), prior)
 
 
-def changed_since(state: MonitorState, count: int, belief: ModelPrior) -> FlightInterval:
-    """What set in ``count`` blocks ago.
+def changed_since(state: MonitorState, count: int, prior: ModelPrior) -> FlightInterval:
+    """The interval of the last ``count`` blocks, for a change that began with the first of them.
 
-    What the first blocks' whitening takes from the blocks before them is of the sound aircraft: the moment of a change
-    shows more than what follows, and only so does it speak for what changed (the signature of Willsky & Jones 1976).
+    The whitening of the first blocks uses the blocks before them, which had no change. The first blocks therefore hold
+    more information about the change than the following ones (the failure signature of Willsky & Jones 1976).
     """
     pieces = _last(state, count)
-    first = [_begun(piece, late, belief) for late, piece in enumerate(pieces[:ORDER])]
+    first = [_begun(piece, late, prior) for late, piece in enumerate(pieces[:ORDER])]
     pieces = [*first, *pieces[ORDER:]]
     J, v = (np.sum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
-    return _against(state, pieces, (J, v), belief)
+    return _against(state, pieces, (J, v), prior)
 
 
 def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[FlightInterval]:
-    """As ``since``, of each count, against what is believed together with what the blocks before it say of it.
+    """As ``changed_since``, for each count, with a prior that includes the blocks before it, from ``sound`` blocks ago.
 
-    They begin ``sound`` blocks ago. What was off before something failed was off by then, too: an offset that the held
-    model's errors would allow for does not come from one block to the next.
+    An error of the reference model is present before a fault, too. With those blocks in the prior, an error that the
+    prior's uncertainty would allow for is not mistaken for a change from one block to the next.
     """
-    assert state.belief is not None
-    pieces, prior = _last(state, sound), state.belief
+    assert state.prior is not None
+    pieces, base_prior = _last(state, sound), state.prior
     read = _readings(pieces)
     J, v = (np.cumsum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
     found = []
     for count in counts:
         n = sound - count
-        before, belief = (np.zeros_like(J[0]), np.zeros_like(v[0])), prior
+        before, prior = (np.zeros_like(J[0]), np.zeros_like(v[0])), base_prior
         if n >= ENOUGH:
             before = (J[n - 1], v[n - 1])
-            precision = prior.precision + before[0]
-            score = before[1] - before[0] @ prior.shift + _flattened(state, read[:n])
-            belief = ModelPrior(prior.shift + np.linalg.solve(precision, score), precision)
-        first = [_begun(piece, late, belief) for late, piece in enumerate(pieces[n : n + ORDER])]
+            precision = base_prior.precision + before[0]
+            score = before[1] - before[0] @ base_prior.shift + _flattened(state, read[:n])
+            prior = ModelPrior(base_prior.shift + np.linalg.solve(precision, score), precision)
+        first = [_begun(piece, late, prior) for late, piece in enumerate(pieces[n : n + ORDER])]
         rest = [total[-1] - total[n + len(first) - 1] for total in (J, v)]
         sums = [sum((getattr(piece, name) for piece in first), start) for name, start in zip("Jv", rest, strict=True)]
-        found.append(_against(state, [*first, *pieces[n + ORDER :]], (sums[0], sums[1]), belief))
+        found.append(_against(state, [*first, *pieces[n + ORDER :]], (sums[0], sums[1]), prior))
     return found
 
 
 def allowing_for_gusts(state: MonitorState, over: FlightInterval) -> FlightInterval:
-    """A stretch against a belief that allows for what gusts may have taught (``gusts``)."""
+    """The interval with a prior that allows for the bias due to gusts (``gust_correlation``)."""
     J, v = over.whole
-    allowed = np.linalg.inv(over.belief.precision) + gust_correlation.gust_covariance(state.held, J / len(over.pieces))
-    belief = over.belief._replace(precision=np.asarray(np.linalg.inv(allowed)))
-    return FlightInterval(over.pieces, belief, over.whole, *marginal(J, v, belief.precision))
+    allowed = np.linalg.inv(over.prior.precision) + gust_correlation.gust_covariance(
+        state.reference, J / len(over.pieces)
+    )
+    prior = over.prior._replace(precision=np.asarray(np.linalg.inv(allowed)))
+    return FlightInterval(over.pieces, prior, over.whole, *marginal(J, v, prior.precision))
 
 
 def _last(state: MonitorState, count: int) -> list[WhitenedBlock]:
@@ -111,52 +113,52 @@ def _last(state: MonitorState, count: int) -> list[WhitenedBlock]:
 
 
 def _against(
-    state: MonitorState, pieces: Sequence[WhitenedBlock], sums: tuple[Array, Array], belief: ModelPrior
+    state: MonitorState, pieces: Sequence[WhitenedBlock], sums: tuple[Array, Array], prior: ModelPrior
 ) -> FlightInterval:
-    """Pieces whose information (D, D) and score (D,) about the held values are ``sums``."""
+    """The interval of blocks whose information (D, D) and score (D,) about the reference values are ``sums``."""
     J, v = sums
-    v = v - J @ belief.shift + _flattened(state, _readings(pieces))
-    return FlightInterval(pieces, belief, (J, v), *marginal(J, v, belief.precision))
+    v = v - J @ prior.shift + _flattened(state, _readings(pieces))
+    return FlightInterval(pieces, prior, (J, v), *marginal(J, v, prior.precision))
 
 
 def _readings(pieces: Sequence[WhitenedBlock]) -> Array:
-    """(N, 3) of the air data."""
+    """(N, 3) the air data of the blocks."""
     return np.array([piece.block.air for piece in pieces])
 
 
 def _flattened(state: MonitorState, read: Array) -> Array:
-    """(D,) what noise of the vanes takes off the score of blocks that ``read`` (N, 3).
+    """(D,) the correction of the score for the noise of the vanes, for blocks with air data ``read`` (N, 3).
 
-    Noise on a regressor flattens the slope that least squares find, and over a long stretch in which the angle hardly
-    moves that would look like a changed derivative (bias-compensated least squares: Soderstrom, Automatica 43, 2007,
-    sec. 5). A vane that reads less than its noise has none of that size: it has jammed, or is a good one. Over a short
-    stretch it makes at most half a logarithm a block, and what noise there was cannot be told from what is read.
+    Noise on a regressor biases the slope towards zero. In a long interval with little motion this would look like a
+    changed derivative (bias-compensated least squares: Soderstrom, Automatica 43, 2007, sec. 5). A vane whose readings
+    vary less than its noise has less noise than assumed: it is jammed, or better than the file says. In a short
+    interval the bias is at most half a log unit per block, and the noise cannot be estimated from the readings.
     """
     total = np.zeros(len(state.terms.names))
     if len(read) < LONG:
         return total
     for vane, (variance, score) in state.flattened.items():
-        there = float(read[:, VANES[vane][0]].var(ddof=1))
-        total += min(1.0, there / variance) * len(read) * score
+        variance_read = float(read[:, VANES[vane][0]].var(ddof=1))
+        total += min(1.0, variance_read / variance) * len(read) * score
     return total
 
 
-def _begun(piece: WhitenedBlock, late: int, belief: ModelPrior) -> WhitenedBlock:
-    """A piece as of what set in ``late`` blocks before it."""
+def _begun(piece: WhitenedBlock, late: int, prior: ModelPrior) -> WhitenedBlock:
+    """The block for a change that began ``late`` blocks before it."""
     A = piece.begun[late]
-    b = piece.whitened + (A - piece.design) @ belief.shift
+    b = piece.whitened + (A - piece.design) @ prior.shift
     return piece._replace(design=A, whitened=b, J=A.T @ A, v=A.T @ b)
 
 
 def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
-    """Each hypothesis with what it leaves out (``evidence.weigh_loosely``), by the variance that the best leaves."""
+    """Each hypothesis with an allowance for its simplicity (``weigh_loosely``), by the best one's residual variance."""
     first = weights(state, over, usual)
     best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
     scale = max(float(usual.max()), best, 1.0)
     found = []
     for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
-        one = weigh_loosely(*over.whole, hypothesis.shift, over.belief.precision, LOOSE * moved, scale)
+        one = weigh_loosely(*over.whole, hypothesis.shift, over.prior.precision, LOOSE * moved, scale)
         if hypothesis.whole:
             one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
         found.append(one)
@@ -164,17 +166,17 @@ def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[W
 
 
 def statistics(state: MonitorState, over: FlightInterval) -> Array:
-    """(H,) of each hypothesis; see ``evidence.score_squares``."""
+    """(H,) the mean square score of each hypothesis; see ``bayes_factors.score_squares``."""
     return score_squares(over.J, over.v, _shifts(state))
 
 
 def weights(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
-    """Each hypothesis; ``usual`` (H,) is the size of its statistic where nothing has failed."""
+    """The Bayes factor of each hypothesis; ``usual`` (H,) is the mean of its statistic without a fault."""
     return weigh_each(over.J, over.v, _shifts(state), np.maximum(usual, 1.0))
 
 
 def promising(state: MonitorState, over: FlightInterval, usual: Array, squares: Array, least: float) -> list[Weighed]:
-    """As ``weights``, where only factors beyond ``least`` matter; ``squares`` (H,) are the stretch's statistics."""
+    """As ``weights``, where only factors above ``least`` matter; ``squares`` (H,) are the interval's statistics."""
     usual = np.maximum(usual, 1.0)
     worth = most(_shifts(state), squares, usual) > least - MARGIN
     return weigh_each(over.J, over.v, _shifts(state), usual, worth)
@@ -186,44 +188,44 @@ def _shifts(state: MonitorState) -> Shifts:
 
 
 def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weighed) -> float:
-    """The residuals' variance that a hypothesis leaves, over the usual one: air may have become rougher, too.
+    """The residual variance with a hypothesis, relative to that before: it also grows where the air becomes rougher.
 
-    The largest of the six coefficients'.
+    It is the largest of the six coefficients'.
     """
     shift = state.hypotheses[place].shift
-    moved = shift.fixed + shift.free @ weighed.size + over.belief.shift
+    moved = shift.fixed + shift.free @ weighed.size + over.prior.shift
     left = np.array([piece.whitened - piece.design @ moved for piece in over.pieces])
     return float((left**2).mean(axis=0).max())
 
 
 def vane_noise(state: MonitorState, samples: float) -> dict[str, float]:
-    """Variance (rad^2) of each vane's noise in a block of so many ``samples``: the file's, or what residuals allow."""
+    """Variance (rad^2) of each vane's noise in a block of so many ``samples``: the file's, at most the residuals'."""
     found = {}
     for vane, (_, output) in VANES.items():
         terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
         if terms.size:
-            taps = state.colour.filter[:, output]
-            slope = float(state.held.values[terms[0]])
-            most = float(residual_whitening.scale(state.colour)[output] / slope) ** 2 / (1.0 + float(taps @ taps))
+            taps = state.whitening.filter[:, output]
+            slope = float(state.reference.values[terms[0]])
+            most = float(residual_whitening.scale(state.whitening)[output] / slope) ** 2 / (1.0 + float(taps @ taps))
             found[vane] = min(state.aircraft.noise[vane] ** 2 / samples, most)
     return found
 
 
 def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Sequence[int] = ()) -> Array:
-    """(N, 2) logarithms of the Bayes factors of jammed vanes over the last ``counts`` (N) pieces, or over all."""
+    """(N, 2) log Bayes factors of jammed vanes over the last ``counts`` (N) blocks, or over all."""
     counts = counts or [len(pieces)]
     found = np.zeros((len(counts), len(VANES)))
     for place, (vane, (column, output)) in enumerate(VANES.items()):
         terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
         if not terms.size:
             continue
-        slope = float(state.held.values[terms[0]])  # what flight has shown on top is too little to matter here
+        slope = float(state.reference.values[terms[0]])  # what was learned since is too little to matter here
         read = np.array([piece.block.air[column] for piece in pieces])
-        off = [(p.residual[output] / p.block.regressors[OFFSET] - state.held.offsets[output]) for p in pieces]
-        asked = read + np.array(off) / slope
+        off = [(p.residual[output] / p.block.regressors[OFFSET] - state.reference.offsets[output]) for p in pieces]
+        implied = read + np.array(off) / slope
         samples = float(np.mean([piece.block.samples for piece in pieces]))
         noise = vane_noise(state, samples)[vane]
-        difference = float(residual_whitening.scale(state.colour)[output] / slope) ** 2
-        taps = state.colour.filter[:, output]
-        found[:, place] = [stuck_factor(read[-n:], asked[-n:], taps, noise, difference) for n in counts]
+        difference = float(residual_whitening.scale(state.whitening)[output] / slope) ** 2
+        taps = state.whitening.filter[:, output]
+        found[:, place] = [stuck_factor(read[-n:], implied[-n:], taps, noise, difference) for n in counts]
     return found

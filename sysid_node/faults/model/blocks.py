@@ -1,8 +1,8 @@
-"""Aligned samples to blocks of a tenth of a second: coefficients, their regressors, and what the air data said.
+"""Averages aligned samples to blocks of 0.1 s: coefficients, their regressors, and air data.
 
-The equations are those of ``online.signals``: k C = k (C_0 + C_alpha alpha + ...), averaged over the block. What a
-moment's equation has in angular accelerations is the increment of the angular momentum over the block: nothing is
-differentiated.
+The equations are those of ``online.frequency.regression_signals``: k C = k (C_0 + C_alpha alpha + ...), averaged over a
+block. The angular accelerations of a moment equation become the increment of angular momentum over the block, so that
+nothing is differentiated.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from sysid_node.online.types import SAMPLE_COLUMNS
 Array = NDArray[np.float64]
 
 PERIOD = 0.1  # s
-MOST_GAP = 0.25  # s between samples, beyond which a new block begins
+MOST_GAP = 0.25  # s between samples; after a longer gap a new block begins
 _DRIFT = OFFSET + 2
 _AIR = [SAMPLE_COLUMNS.index(name) for name in ("V", "alpha", "beta")]
 _THRUST = SAMPLE_COLUMNS.index("thrust")
 
 
 class Block(NamedTuple):
-    """Means over a block that ends at ``time`` (s)."""
+    """Means over a block, which ends at ``time`` (s)."""
 
     time: float
     outputs: Array  # (6,) k C
     regressors: Array  # (W,) columns of the layout; k in column OFFSET
     air: Array  # (3,) V m/s, alpha, beta rad, as measured
     samples: int
-    follows: bool  # whether it begins where the last one ended
+    follows: bool  # whether it begins at the end of the block before
 
 
 @dataclass
 class BlockAverager:
-    """What the averaging remembers."""
+    """The state of the averaging."""
 
     layout: Layout
     signals: ScalarSignals
@@ -56,16 +56,16 @@ class BlockAverager:
 
 
 def init(aircraft: Aircraft) -> BlockAverager:
-    """Nothing averaged yet."""
+    """The state before the first sample."""
     layout = signals.layout(aircraft)
     width = layout.width
     return BlockAverager(layout, signals.scalar_signals(aircraft), signals.momentum_gain(aircraft), np.zeros(width))
 
 
 def add(state: BlockAverager, time: float, sample: Sequence[float]) -> Block | None:
-    """Take in an aligned sample (``SAMPLE_COLUMNS``, then controls) at ``time`` (s); a block where one is complete.
+    """Take an aligned sample (``SAMPLE_COLUMNS``, then controls) at ``time`` (s); returns a block when it is complete.
 
-    Samples without a value that is needed, or not after the last, are left out.
+    Samples that lack a needed value, or are not later than the last, are left out.
     """
     values = list(sample)
     if math.isnan(values[_THRUST]):
@@ -89,7 +89,7 @@ def add(state: BlockAverager, time: float, sample: Sequence[float]) -> Block | N
 
 
 def of_record(aircraft: Aircraft, time: Array, samples: Array) -> list[Block]:
-    """The blocks that ``add`` makes of all samples (N, M) at times (N,) s, but for rounding; much faster."""
+    """The blocks of samples (N, M) at times (N,) s, as ``add`` gives them except for rounding, but much faster."""
     values = np.array(samples, dtype=np.float64)
     values[np.isnan(values[:, _THRUST]), _THRUST] = 0.0
     usable = np.isfinite(values.sum(axis=1))

@@ -1,16 +1,17 @@
-"""What gusts may have taught.
+"""Bounds on the bias of the learned derivatives due to gusts.
 
-Gusts are correlated with the motion that they make: air that turns comes with air that blows in at an angle, and
-autopilots answer to both. Least squares take that for the aircraft's own, however long they learn (Ljung, "System
-Identification", 2nd ed. (1999), sect. 13.4): a correlation rho of the residuals with the regressors shifts what is
-learned by rho of the standard error that a single block leaves (Conley, Hansen & Rossi, "Plausibly exogenous", Review
-of Economics and Statistics 94, 2012). A stretch that is moved in the same way is shifted by as much, and agrees. One
-that is moved on purpose speaks for itself: along a direction in which its blocks say lambda times as much as those that
-were learned from, 1 / lambda of the shift is left in it, and that it contradicts the rest means nothing. What was
-learned from holds bursts of deliberate motion, too, so that a few times its mean counts as moved in the same way.
+Gusts are correlated with the motion that they cause: rotating air comes with changes of the flow angles, and autopilots
+respond to both. Least squares are biased by this, however long they learn (Ljung, "System Identification", 2nd ed.
+(1999), sect. 13.4). A correlation rho of residuals and regressors shifts the estimate by rho times the standard error
+of a single block (Conley, Hansen & Rossi, "Plausibly exogenous", Review of Economics and Statistics 94, 2012). An
+interval with the same kind of motion has the same shift, and does not contradict the reference. In an interval with
+deliberate motion, along a direction in which its blocks hold lambda times the information of those that were learned
+from, only 1 / lambda of the shift remains, and a contradiction of this size is no evidence of a fault. As the flight
+that was learned from has deliberate motion, too, an interval with up to a few times its mean information counts as the
+same kind.
 
-Beside the correlation that is always there, a few gusts in a row make one by chance, which the dozen derivatives of a
-whole axis take up, whatever its direction (``surprise``).
+In addition, a few gusts in a row have a correlation by chance. The dozen derivatives of a whole axis fit it whatever
+its direction (``usual_size_in_gusts``).
 """
 
 from __future__ import annotations
@@ -23,24 +24,24 @@ from sysid_node.faults.model.terms import Terms
 
 Array = NDArray[np.float64]
 
-BY_CHANCE = 0.1  # of the residuals of a single stretch with all of an axis's regressors, beside what they always have
-CORRELATION = 0.5  # of residuals with regressors; in moderate turbulence 0.1 to 1 were seen, by coefficient and flight
-ALIKE = 3.0  # times what a block that was learned from says, up to which a stretch is moved in the same way
-LEAST = 20.0  # blocks, of which something is learned
+BY_CHANCE = 0.1  # correlation of the residuals of one interval with all regressors of an axis, by chance
+CORRELATION = 0.5  # of residuals and regressors; 0.1 to 1 in moderate turbulence, by coefficient and flight
+ALIKE = 3.0  # ratio of information to the mean block's, up to which an interval has the same kind of motion
+LEAST = 20.0  # blocks that a term must have been learned from
 _RIDGE = 1e-6
 
 
-def gust_covariance(held: ReferenceModel, information: Array) -> Array:
-    """(D, D) by how much more the held terms may be off, seen from a stretch.
+def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
+    """(D, D) the additional covariance of the reference derivatives, for the comparison with an interval.
 
-    ``information`` (D, D) is what a block of the stretch says of them, in the mean.
+    ``information`` (D, D) is the mean information of a block of the interval.
     """
-    terms = held.terms
-    slopes = np.flatnonzero(~terms.of("0") & (np.diag(held.blocks) >= LEAST))
+    terms = reference.terms
+    slopes = np.flatnonzero(~terms.of("0") & (np.diag(reference.blocks) >= LEAST))
     if not slopes.size:
         return np.zeros_like(information)
-    count = np.sqrt(np.maximum(np.diag(held.blocks), 1.0))
-    learned = _of_slopes(held.J / np.outer(count, count), terms, slopes)
+    count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))
+    learned = _of_slopes(reference.J / np.outer(count, count), terms, slopes)
     scale = 1.0 / np.sqrt(np.diag(learned))
     root = np.linalg.inv(np.linalg.cholesky(learned * np.outer(scale, scale) + _RIDGE * np.eye(slopes.size)))
     root = root * scale
@@ -49,17 +50,17 @@ def gust_covariance(held: ReferenceModel, information: Array) -> Array:
     shift = CORRELATION * (root.T @ axes) * unshared
     moved = np.zeros((len(information), slopes.size))
     moved[slopes] = shift
-    for output in set(terms.output[slopes].tolist()):  # the offset makes up for it, see ``held.belief``
+    for output in set(terms.output[slopes].tolist()):  # the offset compensates for it, see ``model_prior``
         mine = terms.output[slopes] == output
-        moved[terms.offset_of(output)] = -held.regressors[slopes[mine]] @ shift[mine]
+        moved[terms.offset_of(output)] = -reference.regressors[slopes[mine]] @ shift[mine]
     return np.asarray(moved @ moved.T)
 
 
 def usual_size_in_gusts(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:
-    """(H,) how large each shift's mean square score may be in a stretch of so many blocks where nothing has failed.
+    """(H,) the expected mean square score of each shift in an interval of so many blocks without a fault.
 
-    ``usual`` (H,) is what it was of late. Damage of a ``whole`` axis (H,) takes up what a few gusts in a row do to any
-    of its derivatives, as one direction hardly does: a correlation of rho adds rho^2 for every block.
+    ``usual`` (H,) is its recent mean. Damage of a ``whole`` axis (H,) fits the chance correlation of a few gusts with
+    any of its derivatives, which a single direction hardly does: a correlation rho adds rho^2 for each block.
     """
     found = np.maximum(usual, 1.0)
     found[whole] = np.maximum(found[whole], 1.0 + BY_CHANCE**2 * blocks)
@@ -67,7 +68,7 @@ def usual_size_in_gusts(whole: NDArray[np.bool_], usual: Array, blocks: int) -> 
 
 
 def _of_slopes(J: Array, terms: Terms, slopes: NDArray[np.intp]) -> Array:
-    """Information about some terms in one (D, D) about all, where their coefficients' offsets are not known."""
+    """Information about some terms, from that about all (D, D), where the offsets of their coefficients are unknown."""
     offsets = np.array([terms.offset_of(output) for output in sorted(set(terms.output[slopes].tolist()))])
     among, across = J[np.ix_(offsets, offsets)], J[np.ix_(offsets, slopes)]
     among = among + np.diag(_RIDGE * np.diag(among) + 1e-12)

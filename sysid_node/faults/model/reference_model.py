@@ -1,10 +1,10 @@
-"""The model that is held: the last good derivatives, and how well they are known.
+"""The reference model: the derivatives before a fault, and their covariance.
 
-They begin as the aircraft file's, within its tolerances; the identifier's take their place where they are valid and
-have grown old enough to hold nothing of a fault that is only now found. On top comes what sound flight has shown since:
-least squares of the whitened blocks, constrained to these values (modified sequential least squares: Ward, Monaco &
-Bodson, J. Guidance 21(6), 1998), less what the vanes' noise adds to their motion's energy (bias-compensated least
-squares: Soderstrom, Automatica 43, 2007, sec. 5).
+The derivatives are at first those of the aircraft file, with its tolerances. Valid estimates of the identifier replace
+them when they are old enough not to include a fault that is found now. They are refined by least squares on the
+whitened blocks since then, constrained to these values (modified sequential least squares: Ward, Monaco & Bodson, J.
+Guidance 21(6), 1998), corrected for the noise of the vanes (bias-compensated least squares: Soderstrom, Automatica 43,
+2007, sec. 5).
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
 
-RIPE = 10.0  # s
-REAL = 0.5  # share of a direction's information that must be motion's
-KEPT = 0.9995  # share of what a block has shown that the next one leaves: 200 s
+RIPE = 10.0  # s, age at which estimates are adopted
+REAL = 0.5  # least share of motion, not noise, in the information along a direction that is learned
+KEPT = 0.9995  # factor of the old information at each block: a memory of 200 s
 
 
 class IdentifierEstimate(NamedTuple):
-    """A derivative as the identifier has it."""
+    """A derivative as identified."""
 
     value: float
     standard_error: float
@@ -38,34 +38,34 @@ class IdentifierEstimate(NamedTuple):
 
 
 def identifier_estimates(estimates: Estimates) -> dict[str, IdentifierEstimate]:
-    """What the identifier says, as the monitor hears it."""
+    """The identifier's estimates in the form that the monitor takes."""
     return {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in estimates.derivatives.values()}
 
 
 @dataclass
 class ReferenceModel:
-    """Values (D,) and standard errors (D,), what flight has shown on top, and the offsets that go with them."""
+    """Values (D,), standard errors (D,), the information of the flight since, and offsets."""
 
     terms: Terms
     values: Array
     errors: Array
-    regressors: Array  # (D,) mean of each term's regressor of late
-    J: Array  # (D, D) information of sound flight
+    regressors: Array  # (D,) recent mean of each term's regressor
+    J: Array  # (D, D) information of the flight without a fault
     v: Array  # (D,) its score about the values
-    blocks: Array  # (D, D) how many it is made of
-    offsets: Array = field(default_factory=lambda: np.zeros(6))  # k times these belong to the model, too
-    coming: deque[tuple[float, Mapping[str, IdentifierEstimate]]] = field(default_factory=deque)
+    blocks: Array  # (D, D) number of blocks in it
+    offsets: Array = field(default_factory=lambda: np.zeros(6))  # of the coefficients, part of the model
+    pending: deque[tuple[float, Mapping[str, IdentifierEstimate]]] = field(default_factory=deque)
 
 
 class ModelPrior(NamedTuple):
-    """What the blocks are weighed against: the mean's distance from the held values (D,), and its precision (D, D)."""
+    """The distribution of the derivatives without a fault: mean minus reference values (D,), and precision (D, D)."""
 
     shift: Array
     precision: Array
 
 
 def init(terms: Terms) -> ReferenceModel:
-    """The aircraft file's."""
+    """The reference model of the aircraft file."""
     count = len(terms.names)
     nothing = np.zeros(count)
     none = np.zeros((count, count))
@@ -74,92 +74,92 @@ def init(terms: Terms) -> ReferenceModel:
     )
 
 
-def receive_estimates(held: ReferenceModel, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
-    """Estimates of a time (s); some of them are kept until they are ripe."""
-    if held.coming and time < held.coming[-1][0]:
-        held.coming.clear()  # the clock has stepped back
-    if not held.coming or time - held.coming[-1][0] >= RIPE:
-        held.coming.append((time, known))
+def receive_estimates(reference: ReferenceModel, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
+    """Take estimates at a time (s). One set each 10 s is kept until it is old enough."""
+    if reference.pending and time < reference.pending[-1][0]:
+        reference.pending.clear()  # the clock has stepped back
+    if not reference.pending or time - reference.pending[-1][0] >= RIPE:
+        reference.pending.append((time, known))
 
 
-def adopt_estimates(held: ReferenceModel, now: float) -> bool:
-    """Take up what is old enough, where nothing has failed by a time (s); whether anything was."""
+def adopt_estimates(reference: ReferenceModel, now: float) -> bool:
+    """Adopt the estimates that are old enough at a time (s); returns whether there were any."""
     taken = False
-    while held.coming and now - held.coming[0][0] >= RIPE:
-        _, known = held.coming.popleft()
-        for d, name in enumerate(held.terms.names):
+    while reference.pending and now - reference.pending[0][0] >= RIPE:
+        _, known = reference.pending.popleft()
+        for d, name in enumerate(reference.terms.names):
             one = known.get(name)
             if one is not None and one.valid and math.isfinite(one.value + one.standard_error):
-                change = one.value - held.values[d]
-                held.offsets[held.terms.output[d]] -= change * held.regressors[d]
-                held.v -= change * held.J[:, d]
-                held.values[d], held.errors[d] = one.value, one.standard_error
+                change = one.value - reference.values[d]
+                reference.offsets[reference.terms.output[d]] -= change * reference.regressors[d]
+                reference.v -= change * reference.J[:, d]
+                reference.values[d], reference.errors[d] = one.value, one.standard_error
                 taken = True
     return taken
 
 
-def learn(held: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
-    """From a block of sound flight, about the ``chosen`` terms (D,)."""
+def learn(reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
+    """Add the information of a block without a fault about the ``chosen`` terms (D,)."""
     both = np.outer(chosen, chosen)
-    held.blocks = KEPT * held.blocks + both
-    held.J = KEPT * held.J + both * J
-    held.v = KEPT * held.v + chosen * v
+    reference.blocks = KEPT * reference.blocks + both
+    reference.J = KEPT * reference.J + both * J
+    reference.v = KEPT * reference.v + chosen * v
 
 
-def noise_of(terms: Terms, colour: WhiteningFilter, regressor: str, variance: float) -> Array:
-    """(D, D) what noise of a ``variance`` on a regressor adds to the information of a block."""
+def noise_of(terms: Terms, whitening: WhiteningFilter, regressor: str, variance: float) -> Array:
+    """(D, D) the information that noise of a ``variance`` on a regressor adds to a block."""
     noisy = np.flatnonzero(terms.of(regressor))
     design = np.zeros((6, len(terms.names)))
     design[terms.output[noisy], noisy] = np.sqrt(variance)
-    parts = (colour.unmix @ (taps[:, None] * design) for taps in (np.ones(6), *colour.filter))
+    parts = (whitening.unmix @ (taps[:, None] * design) for taps in (np.ones(6), *whitening.filter))
     return np.asarray(sum(part.T @ part for part in parts))
 
 
-def model_prior(held: ReferenceModel, noise: Array, slack: float) -> ModelPrior:
-    """What is held, with what sound flight has shown; a share ``slack`` of each derivative counts as no change.
+def model_prior(reference: ReferenceModel, noise: Array, slack: float) -> ModelPrior:
+    """The prior of the derivatives without a fault; changes by a share ``slack`` of each are allowed for.
 
-    ``noise`` (D, D) is the part of the information that is the regressors' noise.
+    ``noise`` (D, D) is the part of the information that is due to noise on the regressors.
     """
-    terms, values = held.terms, held.values
-    root = np.linalg.cholesky(_covariance(held))
-    size, axes = np.linalg.eigh(root.T @ (held.J - noise) @ root)
+    terms, values = reference.terms, reference.values
+    root = np.linalg.cholesky(_covariance(reference))
+    size, axes = np.linalg.eigh(root.T @ (reference.J - noise) @ root)
     axes = root @ axes
-    # where the noise makes as much of the information as the motion, nothing is learned: it is not known that well
-    learned = size > REAL * np.einsum("di,de,ei->i", axes, held.J, axes)
+    # nothing is learned where noise is as large a part of the information as motion: the noise is not known that well
+    learned = size > REAL * np.einsum("di,de,ei->i", axes, reference.J, axes)
     size = np.where(learned, size, 0.0)
     covariance = (axes / (1.0 + size)) @ axes.T
-    shift = axes @ np.where(learned, axes.T @ (held.v + noise @ values) / (1.0 + size), 0.0)
+    shift = axes @ np.where(learned, axes.T @ (reference.v + noise @ values) / (1.0 + size), 0.0)
     values = values + shift
     loose = (slack * values) ** 2
     for output in set(terms.output.tolist()):
         mine = terms.output == output
         d = terms.offset_of(output)
-        # offsets are learned by themselves, for the held values: what is shifted leaves the mean as it is
+        # offsets are learned separately, for the reference values: a shift of the others must not change the mean
         mine[d] = False
-        shift[d] = -float(shift[mine] @ held.regressors[mine])
-        # and they are off by what the other terms' slack makes of the motion
+        shift[d] = -float(shift[mine] @ reference.regressors[mine])
+        # and their uncertainty includes that due to the slack of the other terms
         loose[d] = float(((slack * values * terms.signal)[mine] ** 2).sum()) + (slack * values[d]) ** 2 + 1e-12
     return ModelPrior(shift, np.asarray(np.linalg.inv(covariance + np.diag(loose)), dtype=np.float64))
 
 
-def _covariance(held: ReferenceModel) -> Array:
-    """(D, D) of the held values: each by itself, and as much again for what is common to a coefficient's.
+def _covariance(reference: ReferenceModel) -> Array:
+    """(D, D) covariance of the reference values: an independent part and an equal part common to each coefficient.
 
-    A wrong area, inertia or airspeed calibration scales all of a coefficient's derivatives alike.
+    A wrong area, inertia or airspeed calibration scales all derivatives of a coefficient alike.
     """
-    terms, errors = held.terms, np.maximum(held.errors, 1e-9)
+    terms, errors = reference.terms, np.maximum(reference.errors, 1e-9)
     found = np.diag(errors**2)
     for output in set(terms.output.tolist()):
         mine = (terms.output == output) & (terms.signal < 1.0)
-        share = float(np.median(errors[mine] / np.maximum(np.abs(held.values[mine]), 1e-9))) if mine.any() else 0.0
-        common = np.where(terms.output == output, min(share, 1.0) * held.values, 0.0)
+        share = float(np.median(errors[mine] / np.maximum(np.abs(reference.values[mine]), 1e-9))) if mine.any() else 0.0
+        common = np.where(terms.output == output, min(share, 1.0) * reference.values, 0.0)
         found += np.outer(common, common)
     return found
 
 
-def whole(held: ReferenceModel, shift: Array) -> Array:
-    """(D,) the values with a ``shift``, and with what the offsets have been found to be."""
-    values = np.asarray(held.values + shift)
-    for output in set(held.terms.output.tolist()):
-        values[held.terms.offset_of(output)] += held.offsets[output]
+def whole(reference: ReferenceModel, shift: Array) -> Array:
+    """(D,) the values with a ``shift`` and with the learned offsets."""
+    values = np.asarray(reference.values + shift)
+    for output in set(reference.terms.output.tolist()):
+        values[reference.terms.offset_of(output)] += reference.offsets[output]
     return values

@@ -1,4 +1,4 @@
-"""The model's terms: every derivative of the aircraft file, and an offset for every coefficient."""
+"""The terms of the reference model: each derivative of the aircraft file, and an offset of each coefficient."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 #: Plausible sizes of regressors in flight: rad, and non-dimensional rates.
 _SIGNALS = {"alpha": 0.05, "beta": 0.05, "p": 0.04, "q": 0.01, "r": 0.02}
 _SURFACE = 0.05  # rad
-_LOOSE = (0.5, 0.05)  # of a derivative without a tolerance: this share of its value, or so much
-_OFFSET = 0.01  # what an offset that is not in the file may be
+_LOOSE = (0.5, 0.05)  # tolerance of a derivative without one: share of its value, and least value
+_OFFSET = 0.01  # tolerance of an offset that is not in the file
 
 RATES = ("p", "q", "r")
 
@@ -29,7 +29,7 @@ class Terms:
     """D terms of C = 6 coefficients."""
 
     names: tuple[str, ...]
-    output: NDArray[np.intp]  # (D,) which coefficient
+    output: NDArray[np.intp]  # (D,) place of the coefficient
     column: NDArray[np.intp]  # (D,) of the layout
     values: Array  # (D,) the file's
     tolerance: Array  # (D,) 1 sigma
@@ -37,7 +37,7 @@ class Terms:
 
     @cached_property
     def regressors(self) -> tuple[str, ...]:
-        """(D,) of each term."""
+        """(D,) the regressor of each term."""
         return tuple(name.partition("_")[2] for name in self.names)
 
     def of(self, regressor: str) -> NDArray[np.bool_]:
@@ -50,7 +50,7 @@ class Terms:
 
 
 def terms(aircraft: Aircraft, layout: Layout) -> Terms:
-    """Of the coefficients whose equations can be formed."""
+    """The terms of the coefficients whose equations can be formed."""
     unformed = regression_signals.unformed(aircraft)
     known = {c: regressors for c, regressors in aircraft.model_structure.items() if c not in unformed}
     names = [f"{c}_{r}" for c, regressors in known.items() for r in dict.fromkeys((*regressors, "0"))]

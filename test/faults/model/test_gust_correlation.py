@@ -19,7 +19,7 @@ RARE = float(chi2.ppf(0.999, 3))  # sum of three squares
 def taught(seed: int = 1) -> tuple[MonitorState, np.ndarray, np.ndarray]:
     """A monitor that has learned Cm's slopes, which ones, and what a block said of all terms, in the mean."""
     state, _ = monitored(seed)
-    held = state.held
+    held = state.reference
     slopes = np.flatnonzero((state.terms.output == COEFFICIENTS.index("Cm")) & ~state.terms.of("0"))
     X = np.random.default_rng(seed).standard_normal((40, len(slopes)))
     said = np.zeros_like(held.J)
@@ -32,25 +32,25 @@ def taught(seed: int = 1) -> tuple[MonitorState, np.ndarray, np.ndarray]:
 def test_a_stretch_that_is_moved_alike_is_shifted_alike() -> None:
     state, _, said = taught()
     for times in (0.01, 1.0, 0.99 * ALIKE):
-        np.testing.assert_allclose(gust_correlation.gust_covariance(state.held, times * said), 0.0, atol=1e-12)
+        np.testing.assert_allclose(gust_correlation.gust_covariance(state.reference, times * said), 0.0, atol=1e-12)
 
 
 def test_the_shift_is_the_correlation_s_however_long_was_learned() -> None:
     """With e = rho y for a y that the regressors explain, least squares are off by rho standard errors of one block."""
     state, slopes, said = taught()
-    allowed = gust_correlation.gust_covariance(state.held, 1e6 * said)[np.ix_(slopes, slopes)]
+    allowed = gust_correlation.gust_covariance(state.reference, 1e6 * said)[np.ix_(slopes, slopes)]
     block = np.linalg.inv(said[np.ix_(slopes, slopes)])
     np.testing.assert_allclose(allowed, CORRELATION**2 * block, rtol=1e-4)
-    state.held.J, state.held.blocks = 10.0 * state.held.J, 10.0 * state.held.blocks
-    doubt = gust_correlation.gust_covariance(state.held, 1e6 * said)[np.ix_(slopes, slopes)]
+    state.reference.J, state.reference.blocks = 10.0 * state.reference.J, 10.0 * state.reference.blocks
+    doubt = gust_correlation.gust_covariance(state.reference, 1e6 * said)[np.ix_(slopes, slopes)]
     np.testing.assert_allclose(doubt, allowed, rtol=1e-9)
 
 
 def test_the_shift_leaves_the_mean_as_it_is() -> None:
     state, slopes, said = taught()
-    allowed = gust_correlation.gust_covariance(state.held, 1e3 * said)
+    allowed = gust_correlation.gust_covariance(state.reference, 1e3 * said)
     mean = np.zeros(len(allowed))
-    mean[slopes] = state.held.regressors[slopes]
+    mean[slopes] = state.reference.regressors[slopes]
     mean[state.terms.offset_of(COEFFICIENTS.index("Cm"))] = 1.0
     assert np.abs(allowed).max() > 1e-4
     assert mean @ allowed @ mean == pytest.approx(0.0, abs=1e-9 * np.abs(allowed).max())
@@ -58,17 +58,17 @@ def test_the_shift_leaves_the_mean_as_it_is() -> None:
 
 def test_what_was_never_learned_is_not_doubted() -> None:
     state, _ = monitored(2)
-    assert not gust_correlation.gust_covariance(state.held, np.eye(len(state.terms.names))).any()
+    assert not gust_correlation.gust_covariance(state.reference, np.eye(len(state.terms.names))).any()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_burst_against_what_gusts_have_taught_proves_nothing(seed: int) -> None:
     """A minute has taught the slopes of Cm wrongly, by a correlation of 0.8; a burst that says the truth follows."""
     state, maker = monitored(seed)
-    state.held.errors = 0.3 * np.abs(state.held.values) + 1e-5
+    state.reference.errors = 0.3 * np.abs(state.reference.values) + 1e-5
     fly(state, maker, 60.0)
     slopes = np.flatnonzero((state.terms.output == COEFFICIENTS.index("Cm")) & ~state.terms.of("0"))
-    said = state.held.J / np.maximum(state.held.blocks, 1.0)
+    said = state.reference.J / np.maximum(state.reference.blocks, 1.0)
     root = np.linalg.cholesky(np.linalg.inv(said)[np.ix_(slopes, slopes)])
     off = np.zeros(len(said))
     off[slopes] = 0.8 * root @ (np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0))
@@ -76,7 +76,7 @@ def test_a_burst_against_what_gusts_have_taught_proves_nothing(seed: int) -> Non
     for times, excused in ((1.0, False), (30.0, True)):
         J = 100.0 * times * said  # of many blocks, so that only what is believed leaves anything open
         burst = over._replace(whole=(J, J @ off))
-        before = marginal(*burst.whole, over.belief.precision)
+        before = marginal(*burst.whole, over.prior.precision)
         after = allowing_for_gusts(state, burst._replace(pieces=100 * over.pieces[:1]))
         surprise = [float(v @ np.linalg.pinv(J) @ v) for J, v in (before, (after.J, after.v))]
         assert surprise[0] > RARE
