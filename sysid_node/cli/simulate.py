@@ -138,20 +138,21 @@ def _truth(args: argparse.Namespace, sortie: Sortie) -> dict[str, Any]:
 
 
 def _derivatives(surfaces: str, sortie: Sortie) -> tuple[dict[str, float], list[dict[str, Any]]]:
-    """The true derivatives at the beginning, and what failures make of those of the recorded surfaces, and when.
+    """The true derivatives at the beginning, and their changes by failures of surfaces with the times of these.
 
-    A jammed surface whose position is recorded does what it does; by its commands it has lost its effect.
+    They belong to the deflections that are recorded: if the position of a stuck surface is measured, its derivatives
+    do not change; if its command is recorded, they become zero.
     """
     lossy = LOSSES[:1] if surfaces == "measured" else LOSSES
     failed = sorted((effect.get("onset", 0.0), name) for name, effect in sortie.effects.items() if name in lossy)
     end = (len(sortie.flight.outputs) - 1) * sortie.simulator.step
     begin, changes = dict(sortie.derivatives), []
-    now = begin
+    present = begin
     for onset, name in failed:
-        changed = _left(sortie, name, now)
-        now = now | changed
+        changed = _left(sortie, name, present)
+        present = present | changed
         if onset <= 0.0:
-            begin = now
+            begin = present
         elif onset < end:
             changes.append({"time": onset, "derivatives": changed})
     return begin, changes
