@@ -15,6 +15,7 @@ from sysid_node.control import controller
 from sysid_node.control.estimates import identified_derivatives
 from sysid_node.control.settings import ControllerSettings as Control
 from sysid_node.control.types import Measurements, SetPoints
+from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter_settings import ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
@@ -145,7 +146,7 @@ def _command(
     _, _, az, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
     if not excitation.events and now.time >= BEGIN:
         exciter.start(excitation, now.time)
-    extra = exciter.step(excitation, now.time, exciter.FlightCondition(phi, theta, V, -az / exciter.GRAVITY))
+    extra = exciter.step(excitation, now.time, exciter.FlightCondition(phi, theta, V, -az / GRAVITY))
     sensed = Measurements(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
     command = controller.step(pilot, sensed, points, extra.tolist())
     wanted = pilot.law.wanted

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import plant, regulator
-from sysid_node.control.plant import Linear, Scales, Values
+from sysid_node.dynamics import linear_model
+from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
+from sysid_node.dynamics.linear_model import Derivatives, DimensionalScales, LinearModel
 
 Array = NDArray[np.float64]
 
@@ -38,7 +40,7 @@ class Axis:
     sizes: Array  # (D,) scale of errors: the file's value, or twice its tolerance where that is larger
     signals: Array  # (D,) plausible size of each derivative's regressor
     moments: slice  # the states whose equations hold the surfaces' moments
-    motion: Callable[[Values], Linear]  # without the surfaces' lag
+    motion: Callable[[Derivatives], LinearModel]  # without the surfaces' lag
     lag: float  # s, of the surfaces, first-order
     delay: float  # s, of the commands
     Q: Array  # (n,) weight on the states
@@ -63,7 +65,7 @@ class Axis:
         """(..., D) values by name."""
         return {name: values[..., i] for i, name in enumerate(self.derivatives)}
 
-    def model(self, values: Array) -> Linear:
+    def model(self, values: Array) -> LinearModel:
         """The linear model for derivatives (..., D), with the surfaces' lag."""
         return plant.behind_actuators(self.motion(self.named(values)), self.lag)
 
@@ -87,14 +89,14 @@ def axes(aircraft: Aircraft, lag: float, delay: float) -> tuple[Axis, Axis]:
     """
     plant.check(aircraft)
     reference = aircraft.reference
-    scales = Scales.of(aircraft, reference.airspeed, reference.air_density)
+    condition = DimensionalScales.of(aircraft, reference.airspeed, reference.air_density)
     alpha, _ = level_flight(aircraft, 1.0)
 
-    def pitch(values: Values) -> Linear:
-        return plant.with_integral(plant.with_attitude(plant.longitudinal(values, scales)), 2)
+    def pitch(values: Derivatives) -> LinearModel:
+        return plant.with_integral(plant.with_attitude(plant.longitudinal(values, condition)), 2)
 
-    def lateral(values: Values) -> Linear:
-        return plant.with_integral(plant.lateral(values, scales, alpha), 3)
+    def lateral(values: Derivatives) -> LinearModel:
+        return plant.with_integral(plant.lateral(values, condition, alpha), 3)
 
     return (
         _axis("pitch", aircraft, plant.LONGITUDINAL, slice(1, 2), pitch, _PITCH, lag, delay),
@@ -107,7 +109,7 @@ def _axis(
     aircraft: Aircraft,
     derivatives: tuple[str, ...],
     moments: slice,
-    motion: Callable[[Values], Linear],
+    motion: Callable[[Derivatives], LinearModel],
     allowed: tuple[float, ...],
     lag: float,
     delay: float,
@@ -139,10 +141,7 @@ _SIGNALS = {"alpha": 0.05, "beta": 0.05, "p": 0.04, "q": 0.01, "r": 0.02, "de": 
 
 def level_flight(aircraft: Aircraft, pressure: float) -> tuple[float, float]:
     """Alpha and elevator (rad) in level flight, by the file, at ``pressure`` times the reference dynamic pressure."""
-    d = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
+    values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
     reference = aircraft.reference
-    load = 0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S * pressure
-    lift = aircraft.mass * plant.GRAVITY / load - d.get("CL_0", 0.0)
-    matrix = np.array([[d["CL_alpha"], d.get("CL_de", 0.0)], [d["Cm_alpha"], d["Cm_de"]]])
-    alpha, elevator = np.linalg.solve(matrix, [lift, -d.get("Cm_0", 0.0)])
-    return float(alpha), float(elevator)
+    load = dynamic_pressure(reference.air_density, reference.airspeed) * aircraft.geometry.S * pressure
+    return linear_model.level_flight(values, aircraft.mass * GRAVITY / load)

@@ -21,10 +21,11 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import reference
 from sysid_node.control.adaptation import AxisParameters
 from sysid_node.control.axis import Axis, level_flight
-from sysid_node.control.plant import GRAVITY, Scales
 from sysid_node.control.reference import DelayedReference, ReferenceMotion, ReferenceState
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import Command, Measurements, SetPoints
+from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
+from sysid_node.dynamics.linear_model import DimensionalScales
 
 Array = NDArray[np.float64]
 
@@ -99,7 +100,7 @@ def step(
     return Command(elevator, aileron, rudder, _thrust(law, measured, points, late, level, step))
 
 
-def _condition(law: LawState, measured: Measurements, points: SetPoints, step: float) -> Scales:
+def _condition(law: LawState, measured: Measurements, points: SetPoints, step: float) -> DimensionalScales:
     """The filtered flight condition; without a measured airspeed the last one, or the set-point."""
     known = law.aircraft.reference
     if math.isnan(law.airspeed):
@@ -110,7 +111,7 @@ def _condition(law: LawState, measured: Measurements, points: SetPoints, step: f
     law.airspeed = min(max(law.airspeed, 0.5 * known.airspeed), 2.0 * known.airspeed)
     if 0.1 < measured.density < 2.0:
         law.density = measured.density
-    return Scales.of(law.aircraft, law.airspeed, law.density)
+    return DimensionalScales.of(law.aircraft, law.airspeed, law.density)
 
 
 def _pressure(law: LawState) -> float:
@@ -125,7 +126,7 @@ def _feedforward(
     wanted: ReferenceMotion,
     pitch: dict[str, float],
     side: dict[str, float],
-    scales: Scales,
+    scales: DimensionalScales,
     step: float,
 ) -> Array:
     """(3,) rad: the surfaces that cause the reference's angular accelerations.
@@ -211,7 +212,7 @@ def _thrust(
     if law.most_thrust == 0.0:
         return 0.0
     d = {name: derivative.value for name, derivative in law.aircraft.derivatives.items()}
-    load = 0.5 * law.density * law.airspeed**2 * law.aircraft.geometry.S
+    load: float = dynamic_pressure(law.density, law.airspeed) * law.aircraft.geometry.S
     weight = law.aircraft.mass * GRAVITY
     drag = d.get("CD_0", 0.0) + d.get("CD_alpha", 0.0) * level + d.get("CD_k", 0.0) * (weight / load) ** 2
     error = _finite(points.airspeed - measured.airspeed, 0.0)

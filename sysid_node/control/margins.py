@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.control.plant import Linear
+from sysid_node.dynamics.linear_model import LinearModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -38,14 +38,14 @@ class Margins:
         return good
 
 
-def margins(plant: Linear, K: Array, delay: float) -> Margins:
+def margins(plant: LinearModel, K: Array, delay: float) -> Margins:
     """Margins of u = -K x (m, n) with plants A (..., n, n), B (..., n, m) and a ``delay`` (s) of every input."""
     loops = one_at_a_time(transfer(plant, K, OMEGA) * np.exp(-1j * OMEGA * delay)[:, None, None])
     gain, phase = crossings(loops)
     return Margins(gain.min(axis=-1), phase.min(axis=-1), stable(plant, K, delay))
 
 
-def transfer(plant: Linear, K: Array, omega: Array) -> Complex:
+def transfer(plant: LinearModel, K: Array, omega: Array) -> Complex:
     """(..., F, m, m) K (jw - A)^-1 B at frequencies (F,) rad/s."""
     terms, polynomial = _resolvent(plant.A)
     numerators = np.stack([K @ term @ plant.B for term in terms], axis=-3)  # (..., n, m, m) of s^(n-1) ... s^0
@@ -94,14 +94,14 @@ def _phase(a: Complex, b: Complex) -> Array:
     return np.asarray(np.abs(np.angle(-a * np.exp(1j * share * turn))))
 
 
-def stable(plant: Linear, K: Array, delay: float) -> NDArray[np.bool_]:
+def stable(plant: LinearModel, K: Array, delay: float) -> NDArray[np.bool_]:
     """(...,) whether the closed loop is stable."""
     closed = closed_loop(plant, K, delay)
     found: NDArray[np.bool_] = np.linalg.eigvals(closed).real.max(axis=-1) < 0.0
     return found
 
 
-def closed_loop(plant: Linear, K: Array, delay: float) -> Array:
+def closed_loop(plant: LinearModel, K: Array, delay: float) -> Array:
     """(..., n + 2m, n + 2m) of the states, and Pade's two of each delayed command c = -K x.
 
     exp(-s T) = 1 - 12 T s / (T^2 s^2 + 6 T s + 12): delayed = c - 12 z2 / T, with dz1/dt = z2 and

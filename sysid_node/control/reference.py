@@ -11,9 +11,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
-from sysid_node.control.plant import GRAVITY
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import SetPoints
+from sysid_node.dynamics.atmosphere import GRAVITY
 
 T = TypeVar("T")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 
 from sysid_node.control.margins import margins
-from sysid_node.control.plant import Linear
+from sysid_node.dynamics.linear_model import LinearModel
 from sysid_node.errors import InputError
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ GAIN_MARGIN, PHASE_MARGIN = 10.0 ** (12.0 / 20.0), np.deg2rad(60.0)
 _WEIGHTS = np.logspace(-3.0, 6.0, 91)  # that are tried on the surfaces
 
 
-def gains(plant: Linear, Q: Array, R: Array) -> Array:
+def gains(plant: LinearModel, Q: Array, R: Array) -> Array:
     """K (m, n) of u = -K x that minimises the integral of x'Qx + u'Ru.
 
     Q (n,) is a diagonal. Raises LinAlgError without a solution.
@@ -32,7 +32,7 @@ def gains(plant: Linear, Q: Array, R: Array) -> Array:
     return np.asarray(np.linalg.solve(R, plant.B.T @ P))
 
 
-def least_weight(plant: Linear, Q: Array, delay: float) -> float:
+def least_weight(plant: LinearModel, Q: Array, delay: float) -> float:
     """The least weight on the squared deflections that gives the baseline's margins.
 
     Raises InputError where none does.

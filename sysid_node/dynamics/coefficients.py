@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from sysid_node.dynamics.airflow import Flow
-from sysid_node.dynamics.vector import Real, Vector
+from sysid_node.dynamics.vector import Real, Triple
 
 
 class Coefficients(NamedTuple):
@@ -24,13 +24,14 @@ class Coefficients(NamedTuple):
     Cn: Real
 
 
-def rate_regressors(rates: Vector, half: Real, span: Real, chord: Real) -> Vector:
+def rate_regressors(rates: Triple, half: Real, span: Real, chord: Real) -> Triple:
     """Non-dimensional rates p b / 2V, q cbar / 2V, r b / 2V of rates (rad/s); ``half`` is 1 / 2V (s/m)."""
-    return Vector(rates.x * span * half, rates.y * chord * half, rates.z * span * half)
+    p, q, r = rates
+    return p * span * half, q * chord * half, r * span * half
 
 
 def regressors(
-    flow: Flow, rates: Vector, span: Real, chord: Real, reference_airspeed: Real, one: Real = 1.0
+    flow: Flow, rates: Triple, span: Real, chord: Real, reference_airspeed: Real, one: Real = 1.0
 ) -> dict[str, Real]:
     """Every regressor of the state by name, but for CL^2: 0, alpha, beta, p, q, r, V.
 

@@ -24,7 +24,7 @@ STATES = ("alpha", "q", "beta", "p", "r", "phi")
 
 
 @dataclass(frozen=True)
-class StateSpace:
+class LinearModel:
     """dx/dt = A x + B u; A (..., n, n), B (..., n, m)."""
 
     A: Array
@@ -32,7 +32,7 @@ class StateSpace:
 
 
 @dataclass(frozen=True)
-class FlightCondition:
+class DimensionalScales:
     """From coefficients to accelerations at one airspeed (m/s) and density."""
 
     airspeed: float
@@ -43,35 +43,34 @@ class FlightCondition:
     lateral: Array  # (2, 2) inverse inertia times qbar S b, 1/s^2: of (Cl, Cn)
 
     @classmethod
-    def of(cls, aircraft: Aircraft, airspeed: float, density: float) -> FlightCondition:
+    def of(cls, aircraft: Aircraft, airspeed: float, density: float) -> DimensionalScales:
         """At an airspeed (m/s) and air density (kg/m^3)."""
         geometry, inertia = aircraft.geometry, aircraft.inertia
         load = dynamic_pressure(density, airspeed) * geometry.S
-        half = 0.5 / airspeed
         return cls(
             airspeed=airspeed,
             force=load / (aircraft.mass * airspeed),
-            chord=geometry.cbar * half,
-            span=geometry.b * half,
+            chord=geometry.cbar / (2.0 * airspeed),
+            span=geometry.b / (2.0 * airspeed),
             pitch=load * geometry.cbar / inertia.Iyy,
-            lateral=load * geometry.b * _inverse(inertia),
+            lateral=_lateral(inertia, load * geometry.b),
         )
 
 
-def _inverse(inertia: Inertia) -> Array:
-    """Inverse (2, 2) of the inertia about x and z; an infinite moment's acceleration is zero."""
+def _lateral(inertia: Inertia, moment: float) -> Array:
+    """(2, 2) accelerations about x and z by a moment (N m) about each; none about an axis of infinite inertia."""
     if inertia.Ixz == 0.0:
-        return np.diag([1.0 / inertia.Ixx, 1.0 / inertia.Izz])
-    return np.linalg.inv(np.array([[inertia.Ixx, -inertia.Ixz], [-inertia.Ixz, inertia.Izz]]))
+        return np.diag([moment / inertia.Ixx, moment / inertia.Izz])
+    return moment * np.linalg.inv(np.array([[inertia.Ixx, -inertia.Ixz], [-inertia.Ixz, inertia.Izz]]))
 
 
 def linear_model(
     derivatives: Derivatives,
-    condition: FlightCondition,
+    condition: DimensionalScales,
     alpha: float,
     states: Sequence[str] = STATES,
     controls: Sequence[str] = ("de", "da", "dr"),
-) -> StateSpace:
+) -> LinearModel:
     """The equations of these states (of ``STATES``), in this order; inputs are controls (rad), by symbol.
 
     ``alpha`` (rad) is the angle of attack of the steady flight. What couples to a state that is left out is left out;
@@ -91,10 +90,10 @@ def linear_model(
     for (state, by), value in _kinematics(condition.airspeed, alpha).items():
         if state in states and by in states:
             A[..., states.index(state), states.index(by)] += value
-    return StateSpace(A, B)
+    return LinearModel(A, B)
 
 
-def _acceleration(state: str, derivatives: Derivatives, condition: FlightCondition, names: Sequence[str]) -> Array:
+def _acceleration(state: str, derivatives: Derivatives, condition: DimensionalScales, names: Sequence[str]) -> Array:
     """(..., R) what one unit of each regressor adds to a state's rate."""
 
     def row(coefficient: str) -> Array:

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 from sysid_node.aircraft.model import Inertia
 from sysid_node.dynamics.atmosphere import GRAVITY
-from sysid_node.dynamics.vector import Real, Vector
+from sysid_node.dynamics.vector import Real, Triple, Vector
 
 
 class MomentsOfInertia(Protocol):
@@ -48,23 +48,29 @@ def known_moments(inertia: Inertia) -> Inertia:
     return Inertia(*(0.0 if math.isnan(moment) else moment for moment in moments))
 
 
-def angular_momentum(inertia: MomentsOfInertia, rates: Vector) -> Vector:
+def angular_momentum(inertia: MomentsOfInertia, rates: Triple) -> Triple:
     """I w about the centre of gravity, N m s, of rates (rad/s); N m of an angular acceleration (rad/s^2)."""
-    return Vector(
-        inertia.Ixx * rates.x - inertia.Ixz * rates.z,
-        inertia.Iyy * rates.y,
-        inertia.Izz * rates.z - inertia.Ixz * rates.x,
+    p, q, r = rates
+    return inertia.Ixx * p - inertia.Ixz * r, inertia.Iyy * q, inertia.Izz * r - inertia.Ixz * p
+
+
+def gyroscopic_moment(inertia: MomentsOfInertia, rates: Triple) -> Triple:
+    """w x I w, N m: the moment that it takes to keep the body turning at constant rates (rad/s).
+
+    Written out with the differences of the moments of inertia (Klein & Morelli, eq. 3.37), for one sample at a time;
+    ``angular_acceleration`` and ``moment_for`` take the vector product, which JAX compiles as well.
+    """
+    p, q, r = rates
+    return (
+        (inertia.Izz - inertia.Iyy) * q * r - inertia.Ixz * p * q,
+        (inertia.Ixx - inertia.Izz) * p * r + inertia.Ixz * (p * p - r * r),
+        (inertia.Iyy - inertia.Ixx) * p * q + inertia.Ixz * q * r,
     )
-
-
-def gyroscopic_moment(inertia: MomentsOfInertia, rates: Vector) -> Vector:
-    """w x I w, N m: the moment that it takes to keep the body turning at constant rates (rad/s)."""
-    return rates.cross(angular_momentum(inertia, rates))
 
 
 def angular_acceleration(inertia: MomentsOfInertia, rates: Vector, moment: Vector) -> Vector:
     """Euler's equation dw/dt = I^-1 (M - w x I w), rad/s^2, of rates (rad/s) and moments about the CG (N m)."""
-    rest = moment.minus(gyroscopic_moment(inertia, rates))
+    rest = moment.minus(rates.cross(angular_momentum(inertia, rates)))
     determinant = inertia.Ixx * inertia.Izz - inertia.Ixz * inertia.Ixz
     return Vector(
         (inertia.Izz * rest.x + inertia.Ixz * rest.z) / determinant,
@@ -73,17 +79,17 @@ def angular_acceleration(inertia: MomentsOfInertia, rates: Vector, moment: Vecto
     )
 
 
-def moment_for(inertia: MomentsOfInertia, rates: Vector, acceleration: Vector) -> Vector:
+def moment_for(inertia: MomentsOfInertia, rates: Vector, acceleration: Triple) -> Vector:
     """Euler's equation solved for the moment about the centre of gravity (N m): M = I dw/dt + w x I w."""
-    return angular_momentum(inertia, acceleration).plus(gyroscopic_moment(inertia, rates))
+    return Vector(*angular_momentum(inertia, acceleration)).plus(rates.cross(angular_momentum(inertia, rates)))
 
 
-def free_fall(down: Vector, rates: Vector, velocity: Vector) -> Vector:
+def free_fall(down: Vector, rates: Vector, velocity: Triple) -> Vector:
     """Rate of the velocity (m/s^2, body axes) of a body on which only gravity acts; ``down`` is the unit vector."""
     return down.times(GRAVITY).minus(rates.cross(velocity))
 
 
-def velocity_rate(force: Vector, down: Vector, rates: Vector, velocity: Vector) -> Vector:
+def velocity_rate(force: Vector, down: Vector, rates: Vector, velocity: Triple) -> Vector:
     """Rate of the velocity's components (m/s^2, body axes) under a specific force (m/s^2): dv/dt = f + g - w x v."""
     return force.plus(free_fall(down, rates, velocity))
 

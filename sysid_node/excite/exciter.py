@@ -28,7 +28,6 @@ from sysid_node.excite.spec import parse_segments
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665
 RATE = 200.0  # Hz, at which the manoeuvre is sampled
 RESET_DELAY = 1.5  # s of renewed excitation after which the estimates are reset
 INVALID_TIME = 0.5  # s for which a derivative must be invalid before excitation begins again

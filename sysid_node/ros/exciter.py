@@ -14,6 +14,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
+from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter import FlightCondition
@@ -97,7 +98,7 @@ class Exciter(LoopNode):
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
         stamp, values, attitude = messages.imu_and_attitude(numbers)
-        self._inertial = time.monotonic(), (*attitude, -values[2] / exciter.GRAVITY)
+        self._inertial = time.monotonic(), (*attitude, -values[2] / GRAVITY)
         self._start_ns = self._start_ns or stamp
         self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
 

@@ -7,7 +7,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import plant
 from sysid_node.control.axis import level_flight
-from sysid_node.control.plant import Scales
+from sysid_node.dynamics.linear_model import DimensionalScales
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying.rollout import settled
@@ -16,7 +16,7 @@ from sysid_node.sim.stations import actuator, propulsion
 
 AIRCRAFT = load_aircraft("cdrw")
 VALUES = {name: d.value for name, d in AIRCRAFT.derivatives.items()}
-SCALES = Scales.of(AIRCRAFT, AIRCRAFT.reference.airspeed, AIRCRAFT.reference.air_density)
+CONDITION = DimensionalScales.of(AIRCRAFT, AIRCRAFT.reference.airspeed, AIRCRAFT.reference.air_density)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def slopes() -> tuple[np.ndarray, np.ndarray]:
 
 def test_longitudinal_model_is_the_simulators_slope(slopes: tuple[np.ndarray, np.ndarray]) -> None:
     A, B = slopes
-    found = plant.longitudinal(VALUES, SCALES)
+    found = plant.longitudinal(VALUES, CONDITION)
     # the simulator's drag and thrust turn the lift curve a little: the model leaves them out
     np.testing.assert_allclose(found.A, A[:2, :2], rtol=0.03, atol=0.02)
     np.testing.assert_allclose(found.B, B[:2, :1], rtol=0.01)
@@ -57,7 +57,7 @@ def test_longitudinal_model_is_the_simulators_slope(slopes: tuple[np.ndarray, np
 def test_lateral_model_is_the_simulators_slope(slopes: tuple[np.ndarray, np.ndarray]) -> None:
     A, B = slopes
     alpha, _ = level_flight(AIRCRAFT, 1.0)
-    found = plant.lateral(VALUES, SCALES, alpha)
+    found = plant.lateral(VALUES, CONDITION, alpha)
     np.testing.assert_allclose(found.A[:3, :3], A[2:, 2:], rtol=0.01, atol=0.02)
     np.testing.assert_allclose(found.B[:3], B[2:, 1:], rtol=0.01, atol=1e-3)
     assert found.A[0, 3] == pytest.approx(9.80665 / 18.0, rel=0.01)
@@ -65,8 +65,8 @@ def test_lateral_model_is_the_simulators_slope(slopes: tuple[np.ndarray, np.ndar
 
 def test_many_aircraft_at_once_are_each_of_them() -> None:
     several = {name: np.array([value, 1.2 * value]) for name, value in VALUES.items()}
-    both = plant.lateral(several, SCALES, 0.08)
-    one = plant.lateral({name: 1.2 * value for name, value in VALUES.items()}, SCALES, 0.08)
+    both = plant.lateral(several, CONDITION, 0.08)
+    one = plant.lateral({name: 1.2 * value for name, value in VALUES.items()}, CONDITION, 0.08)
     np.testing.assert_allclose(both.A[1], one.A)
     np.testing.assert_allclose(both.B[1], one.B)
 

@@ -12,8 +12,7 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
 from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
-
-GRAVITY = 9.80665  # m/s^2
+from sysid_node.dynamics.atmosphere import GRAVITY
 
 Signals = Mapping[str, jax.Array]
 

@@ -14,8 +14,8 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.models.kinematics import GRAVITY
 from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.dynamics.atmosphere import GRAVITY
 
 INPUTS = ("de", "V", "beta", "p", "r", "phi", "theta", "ax", "rho", "q_measured")
 PARAMETERS = ("CZ_alpha", "CZ_de", "CZ_0", "Cm_alpha", "Cm_q", "Cm_de", "Cm_0", "bias_az")

@@ -12,8 +12,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft, Vector3
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.regression.filtering import differentiate
+from sysid_node.dynamics.airflow import flow_angles, velocity_of
+from sysid_node.dynamics.atmosphere import dynamic_pressure
+from sysid_node.dynamics.coefficients import regressors, with_polar
+from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
+from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
+from sysid_node.dynamics.rigid_body import known_moments, moment_for
+from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -115,26 +122,14 @@ def _accelerated(record: FlightRecord) -> dict[str, Array]:
 
 def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, Array]:
     s = dict(signals)
-    rates = np.column_stack([s["p"], s["q"], s["r"]])
-    accelerations = np.column_stack([s["pdot"], s["qdot"], s["rdot"]])
-    force = np.column_stack([s["ax"], s["ay"], s["az"]]) - _lever(aircraft.sensors.imu, rates, accelerations)
-    s |= dict(zip(("ax", "ay", "az"), force.T, strict=True))
-    alpha, beta = (s.get(name, np.zeros_like(s["V"])) for name in ("alpha", "beta"))
-    velocity = s["V"][:, None] * np.column_stack(
-        [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
-    )
+    rates, accelerations = (Vector(s["p"], s["q"], s["r"]), Vector(s["pdot"], s["qdot"], s["rdot"]))
+    force = specific_force_from(Vector(s["ax"], s["ay"], s["az"]), rates, accelerations, aircraft.sensors.imu)
+    s |= dict(zip(("ax", "ay", "az"), force, strict=True))
     if any(aircraft.sensors.air_data):
-        velocity = velocity - np.cross(rates, np.array(aircraft.sensors.air_data))
-        s["V"] = np.linalg.norm(velocity, axis=1)
-        s["alpha"] = np.arctan2(velocity[:, 2], velocity[:, 0])
-        s["beta"] = np.arctan2(velocity[:, 1], np.hypot(velocity[:, 0], velocity[:, 2]))
+        alpha, beta = (s.get(name, np.zeros_like(s["V"])) for name in ("alpha", "beta"))
+        velocity = velocity_from(velocity_of((s["V"], alpha, beta), np), rates, aircraft.sensors.air_data)
+        s["V"], s["alpha"], s["beta"] = flow_angles(velocity, np)
     return s
-
-
-def _lever(position: Vector3, rates: Array, accelerations: Array) -> Array:
-    """Acceleration (N, 3) of a point on the body relative to the CG."""
-    arm = np.array(position)
-    return np.asarray(np.cross(accelerations, arm) + np.cross(rates, np.cross(rates, arm)))
 
 
 def _needed(aircraft: Aircraft) -> list[str]:
@@ -174,19 +169,20 @@ def _complete_samples(aircraft: Aircraft, record: FlightRecord) -> tuple[FlightR
 
 
 def _coefficients(aircraft: Aircraft, s: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
-    geometry, throttle, remarks = aircraft.geometry, aircraft.throttle, []
+    throttle, remarks = aircraft.throttle, []
     thrust = s.get("thrust", np.zeros_like(s["V"]))
-    inclination, arm = (throttle.inclination, throttle.arm) if throttle else (0.0, 0.0)
-    force = 0.5 * s["rho"] * s["V"] ** 2 * geometry.S
+    inclination, arm = thrust_line(throttle)
+    forward, down = thrust_axes(inclination, np)
+    force = dynamic_pressure(s["rho"], s["V"]) * aircraft.geometry.S
     c = {
-        "CX": (aircraft.mass * s["ax"] - thrust * math.cos(inclination)) / force,
+        "CX": (aircraft.mass * s["ax"] - thrust * forward) / force,
         "CY": aircraft.mass * s["ay"] / force,
-        "CZ": (aircraft.mass * s["az"] + thrust * math.sin(inclination)) / force,
+        "CZ": (aircraft.mass * s["az"] - thrust * down) / force,
     }
     alpha = s.get("alpha", np.zeros_like(s["V"]))
-    c["CL"] = c["CX"] * np.sin(alpha) - c["CZ"] * np.cos(alpha)
+    c["CL"], drag = lift_and_drag(c["CX"], c["CZ"], np.cos(alpha), np.sin(alpha))
     if throttle is None or "thrust" in s:
-        c["CD"] = -c["CX"] * np.cos(alpha) - c["CZ"] * np.sin(alpha)
+        c["CD"] = drag
     elif "CD" in aircraft.model_structure:
         remarks.append("thrust was not measured: drag cannot be told from it, and CD is left out")
     moments, unknown = _moments(aircraft, s, force, thrust * arm)
@@ -197,34 +193,27 @@ def _moments(
     aircraft: Aircraft, s: Mapping[str, Array], force: Array, thrust_moment: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Moment coefficients, and those that cannot be formed with the reason."""
-    i, p, q, r = aircraft.inertia, s["p"], s["q"], s["r"]
-    known = {name: 0.0 if math.isnan(getattr(i, name)) else getattr(i, name) for name in ("Ixx", "Iyy", "Izz", "Ixz")}
-    Ixx, Iyy, Izz, Ixz = known.values()
-    b, cbar = aircraft.geometry.b, aircraft.geometry.cbar
+    inertia, geometry = aircraft.inertia, aircraft.geometry
+    rates, accelerations = (Vector(s["p"], s["q"], s["r"]), Vector(s["pdot"], s["qdot"], s["rdot"]))
+    roll, pitch, yaw = moment_for(known_moments(inertia), rates, accelerations)
     moments = {
-        "Cl": (Ixx * s["pdot"] - Ixz * (s["rdot"] + p * q) + (Izz - Iyy) * q * r) / (force * b),
-        "Cm": (Iyy * s["qdot"] + (Ixx - Izz) * p * r + Ixz * (p**2 - r**2) - thrust_moment) / (force * cbar),
-        "Cn": (Izz * s["rdot"] - Ixz * (s["pdot"] - q * r) + (Iyy - Ixx) * p * q) / (force * b),
+        "Cl": roll / (force * geometry.b),
+        "Cm": (pitch - thrust_moment) / (force * geometry.cbar),
+        "Cn": yaw / (force * geometry.b),
     }
-    own = {"Cl": i.Ixx, "Cm": i.Iyy, "Cn": i.Izz}
+    about = {"Cl": inertia.Ixx, "Cm": inertia.Iyy, "Cn": inertia.Izz}
     unknown = {
         name: "its moment of inertia is not in the aircraft file"
-        for name, value in own.items()
-        if math.isnan(value) and name in aircraft.model_structure
+        for name, moment in about.items()
+        if math.isnan(moment) and name in aircraft.model_structure
     }
-    return {name: value for name, value in moments.items() if not math.isnan(own[name])}, unknown
+    return {name: value for name, value in moments.items() if not math.isnan(about[name])}, unknown
 
 
 def _regressors(aircraft: Aircraft, s: Mapping[str, Array], lift: Array) -> dict[str, Array]:
-    geometry = aircraft.geometry
-    half = 0.5 / s["V"]
-    regressors = {
-        "0": np.ones_like(half),
-        "p": s["p"] * geometry.b * half,
-        "q": s["q"] * geometry.cbar * half,
-        "r": s["r"] * geometry.b * half,
-        "V": s["V"] / aircraft.reference.airspeed,
-        "k": lift**2,
-    }
-    regressors |= {name: s[name] for name in ("alpha", "beta") if name in s}
-    return regressors | {symbol: s[symbol] for symbol in aircraft.control_symbols if symbol in s}
+    """Regressors (N,) by name, as far as they were measured."""
+    geometry, rates = aircraft.geometry, (s["p"], s["q"], s["r"])
+    flow, one = (s["V"], s.get("alpha"), s.get("beta")), np.ones_like(s["V"])
+    formed = regressors(flow, rates, geometry.b, geometry.cbar, aircraft.reference.airspeed, one)
+    controls = {symbol: s[symbol] for symbol in aircraft.control_symbols if symbol in s}
+    return {name: x for name, x in with_polar(formed, lift).items() if x is not None} | controls

@@ -125,7 +125,7 @@ def corrected_motion(chain: Chain, motion: Motion) -> Sample:
     """The motion (N,) without the sensors' effects of a parameter vector, at the time of the samples."""
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
-    velocity = velocity_from(velocity_of(flow.T, jnp), inertial.rates, _probe(chain))
+    velocity = Vector(*velocity_from(velocity_of(flow.T, jnp), inertial.rates, _probe(chain)))
     return Sample(inertial.force, inertial.rates, velocity, inertial.attitude, flow, reading)
 
 
@@ -184,7 +184,7 @@ def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
     """Rates of change (N, 3) of airspeed and flow angles at the probe."""
     force, rates, turning, attitude = inertial
     velocity, probe = velocity_of(reading.T, jnp), _probe(chain)
-    moving, _ = rates_of_change(velocity_from(velocity, rates, probe), attitude, force, rates)
+    moving, _ = rates_of_change(Vector(*velocity_from(velocity, rates, probe)), attitude, force, rates)
     return jnp.stack(flow_rates(velocity, velocity_at(moving, turning, probe), jnp), axis=1)
 
 

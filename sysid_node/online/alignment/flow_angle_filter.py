@@ -25,6 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics import scalar
+from sysid_node.dynamics.airflow import velocity_of
+from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
+from sysid_node.dynamics.forces import lift_and_drag
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.least_squares import Plan, Solution
@@ -38,7 +42,6 @@ EVERY = 0.1  # s between corrections
 FINEST = 1e-5  # rad: no vane has less noise, whatever a file says
 HIDDEN = 10.0  # times the energy of the gusts in the airspeed that a reconstructed angle must move
 MIDDLE = 2.0 * math.pi * 0.5  # rad/s: middle of the band, where the integrated noise is likened to a vane's
-_G = 9.80665
 _CONTROLS = len(SAMPLE_COLUMNS)
 #: What the references are believed to be off by, as white noise: gusts of 0.04 rad, or of as much of the airspeed,
 #: with a correlation time of some 5 s. rad^2 s.
@@ -291,12 +294,10 @@ def _begin(filter_: Reconstruction, k: Kinematics, time: float, sample: Sequence
     """At the file's angle of attack, without sideslip, in a turn that neither slips nor speeds up."""
     ax, ay, az, _, _, r, V = sample[:7]
     alpha = max(min(_asked(k, sample, 0.0, (0.0, 0.0))[0], 0.3), -0.3)
-    climb = max(min((ax * math.cos(alpha) + az * math.sin(alpha)) / _G, 0.5), -0.5)
-    bank = math.atan2(V * r - ay, _G)
+    climb = max(min((ax * math.cos(alpha) + az * math.sin(alpha)) / GRAVITY, 0.5), -0.5)
+    bank = math.atan2(V * r - ay, GRAVITY)
     filter_.state = [
-        V * math.cos(alpha),
-        0.0,
-        V * math.sin(alpha),
+        *velocity_of((V, alpha, 0.0), scalar),
         bank,
         alpha + math.asin(climb),
         *(filter_.state[5:] or (0.0, 0.0)),
@@ -329,9 +330,9 @@ def _slopes(x: Sequence[float], imu: Sequence[float]) -> tuple[float, float, flo
     p, q = p - bias_p, q - bias_q
     sin_phi, cos_phi, sin_theta, cos_theta = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     return (
-        ax - _G * sin_theta + r * v - q * w,
-        ay + _G * sin_phi * cos_theta + p * w - r * u,
-        az + _G * cos_phi * cos_theta + q * u - p * v,
+        ax - GRAVITY * sin_theta + r * v - q * w,
+        ay + GRAVITY * sin_phi * cos_theta + p * w - r * u,
+        az + GRAVITY * cos_phi * cos_theta + q * u - p * v,
         p + (q * sin_phi + r * cos_phi) * sin_theta / cos_theta,
         q * cos_phi - r * sin_phi,
     )
@@ -341,8 +342,8 @@ def _asked(k: Kinematics, sample: Sequence[float], alpha: float, biases: Sequenc
     """Alpha and beta (rad) that the aircraft file's lift and side force ask for; ``alpha`` turns the axes."""
     ax, ay, az, p, q, r, V = sample[:7]
     p, q = p - biases[0], q - biases[1]
-    scale = k.mass_over_area / (0.5 * sample[9] * V * V)
-    lift = scale * (ax * math.sin(alpha) - az * math.cos(alpha))
+    scale = k.mass_over_area / dynamic_pressure(sample[9], V)
+    lift = scale * lift_and_drag(ax, az, math.cos(alpha), math.sin(alpha))[0]
     regressors = (p * k.half_span / V, q * k.half_chord / V, r * k.half_span / V, V / k.airspeed, *sample[_CONTROLS:])
     asked = []
     for found, (slope, offset, rest) in ((lift, k.lift), (scale * ay, k.side)):
@@ -415,9 +416,9 @@ def _jacobian(x: Sequence[float], imu: Sequence[float]) -> Array:
     tilt = st / ct
     return np.array(
         [
-            [0.0, r, -q, 0.0, -_G * ct, 0.0, w],
-            [-r, 0.0, p, _G * cp * ct, -_G * sp * st, -w, 0.0],
-            [q, -p, 0.0, -_G * sp * ct, -_G * cp * st, v, -u],
+            [0.0, r, -q, 0.0, -GRAVITY * ct, 0.0, w],
+            [-r, 0.0, p, GRAVITY * cp * ct, -GRAVITY * sp * st, -w, 0.0],
+            [q, -p, 0.0, -GRAVITY * sp * ct, -GRAVITY * cp * st, v, -u],
             [0.0, 0.0, 0.0, tilt * (q * cp - r * sp), (q * sp + r * cp) / ct**2, -1.0, -tilt * sp],
             [0.0, 0.0, 0.0, -q * sp - r * cp, 0.0, 0.0, -cp],
             [0.0] * 7,

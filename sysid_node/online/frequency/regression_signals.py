@@ -26,6 +26,14 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS, STATE_REGRESSORS
+from sysid_node.dynamics import scalar
+from sysid_node.dynamics.airflow import flow_angles, speed_of, velocity_of
+from sysid_node.dynamics.atmosphere import dynamic_pressure
+from sysid_node.dynamics.coefficients import rate_regressors
+from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
+from sysid_node.dynamics.lever_arm import tangential, velocity_from, without_centripetal
+from sysid_node.dynamics.rigid_body import angular_momentum, gyroscopic_moment, known_moments
+from sysid_node.dynamics.vector import Vector
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -98,7 +106,7 @@ def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
 
     The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
     """
-    return cast(ScalarSignals, _signals(aircraft, math, lambda _: 1.0, lambda _: 0.0))
+    return cast(ScalarSignals, _signals(aircraft, scalar, lambda _: 1.0, lambda _: 0.0))
 
 
 def array_signals(aircraft: Aircraft) -> ArraySignals:
@@ -110,62 +118,55 @@ def array_signals(aircraft: Aircraft) -> ArraySignals:
     def mapped(function: Callable[..., float]) -> Callable[..., Array]:
         return lambda *xs: np.fromiter(map(function, *(x.tolist() for x in xs)), np.float64, xs[0].size)
 
-    functions = {name: mapped(getattr(math, name)) for name in ("cos", "sin", "atan2")}
+    functions = {name: mapped(getattr(scalar, name)) for name in ("cos", "sin", "arctan2")}
     return cast(
         ArraySignals, _signals(aircraft, SimpleNamespace(**functions, sqrt=np.sqrt), np.ones_like, np.zeros_like)
     )
 
 
-def _signals(aircraft: Aircraft, functions: Any, one: Any, none: Any) -> Any:
-    """Build the signal function over scalars or arrays; see ``scalar_signals``."""
-    cos, sin, sqrt, atan2 = functions.cos, functions.sin, functions.sqrt, functions.atan2
-    m, S, b, c = aircraft.mass, aircraft.geometry.S, aircraft.geometry.b, aircraft.geometry.cbar
+def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any) -> Any:
+    """Build the signal function over scalars or arrays; see ``scalar_signals``. ``xp`` holds elementary functions."""
     rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
-    qbar0 = 0.5 * rho0 * V0 * V0
-    force, roll, pitch = 1.0 / (qbar0 * S), 1.0 / (qbar0 * S * b), 1.0 / (qbar0 * S * c)
-    mass = m * force
-    Ixx, Iyy, Izz, Ixz = (_known(v) for v in _inertias(aircraft))
-    xi, yi, zi = aircraft.sensors.imu
-    xa, ya, za = aircraft.sensors.air_data
-    throttle = aircraft.throttle
-    incline, arm = (throttle.inclination, throttle.arm) if throttle else (0.0, 0.0)
-    cos_t, sin_t = math.cos(incline) * force, math.sin(incline) * force
+    pressure0, span, chord = rho0 * V0 * V0, aircraft.geometry.b, aircraft.geometry.cbar
+    force, roll, pitch = (1.0 / scale for scale in _scales(aircraft))
+    mass, inertia = aircraft.mass * force, known_moments(aircraft.inertia)
+    imu, probe = aircraft.sensors.imu, aircraft.sensors.air_data
+    inclination, arm = thrust_line(aircraft.throttle)
+    thrust_x, thrust_z = (share * force for share in thrust_axes(inclination, scalar))
     names, timed = layout(aircraft).regressors, layout(aircraft).timed
     candidates = (*(r for r in STATE_REGRESSORS if r != "0"), *aircraft.control_symbols)
     chosen = [candidates.index(name) for name in names]
 
     def signals(sample: Any) -> Any:
         ax, ay, az, p, q, r, V, alpha, beta, rho, thrust = sample[:11]
-        # the flow at the CG: the air-data probe's own speed, omega x arm, is in what it measures
-        forward = V * cos(beta)
-        u = forward * cos(alpha) - (q * za - r * ya)
-        v = V * sin(beta) - (r * xa - p * za)
-        w = forward * sin(alpha) - (p * ya - q * xa)
-        upright = sqrt(u * u + w * w)
-        V = sqrt(u * u + v * v + w * w)
-        alpha, beta = atan2(w, u), atan2(v, upright)
-        # specific force at the CG: centripetal part of the lever arm here, tangential part below
-        ax = ax + (q * q + r * r) * xi - p * q * yi - p * r * zi
-        ay = ay - p * q * xi + (p * p + r * r) * yi - q * r * zi
-        az = az - p * r * xi - q * r * yi + (p * p + q * q) * zi
-        k = rho * V * V / (rho0 * V0 * V0)
-        FX, FY, FZ = mass * ax - cos_t * thrust, mass * ay, mass * az + sin_t * thrust
-        ca, sa = cos(alpha), sin(alpha)
-        lift, drag = FX * sa - FZ * ca, -FX * ca - FZ * sa
-        L = ((Izz - Iyy) * q * r - Ixz * p * q) * roll
-        M = ((Ixx - Izz) * p * r + Ixz * (p * p - r * r) - arm * thrust) * pitch
-        N = ((Iyy - Ixx) * p * q + Ixz * q * r) * roll
+        rates = p, q, r
+        velocity = velocity_from(velocity_of((V, alpha, beta), xp), rates, probe)
+        _, alpha, beta = flow_angles(velocity, xp)
+        V = speed_of(velocity, xp)
+        # specific force at the CG: centripetal part of the lever arm here, tangential part in ``momentum_gain``
+        fx, fy, fz = without_centripetal((ax, ay, az), rates, imu)
+        k = rho * V * V / pressure0
+        ca, sa = xp.cos(alpha), xp.sin(alpha)
+        lift, drag = lift_and_drag(mass * fx - thrust_x * thrust, mass * fz - thrust_z * thrust, ca, sa)
+        L, M, N = gyroscopic_moment(inertia, rates)
         half = 0.5 * k / V
-        span, chord = b * half, c * half
-        known = [k * alpha, k * beta, p * span, q * chord, r * span, k * V / V0, lift * lift / k]
+        p_hat, q_hat, r_hat = rate_regressors(rates, 1.0, span * half, chord * half)  # times k
+        known = [k * alpha, k * beta, p_hat, q_hat, r_hat, k * V / V0, lift * lift / k]
         known += [k * control for control in sample[_CONTROLS:]]
-        row = [lift, drag, FY, L, M, N, k, one(k)]
+        row = [lift, drag, mass * fy, L * roll, (M - arm * thrust) * pitch, N * roll, k, one(k)]
         row += [known[i] for i in chosen]
         row += [none(k)] * len(timed)  # rates come with the interval
         # the angles carry the tangential acceleration of the lever arm into lift and drag
         return row, [ca, sa]
 
     return signals
+
+
+def _scales(aircraft: Aircraft) -> tuple[float, float, float]:
+    """Reference dynamic pressure times area (N), the same times span, and times chord (N m)."""
+    reference, geometry = aircraft.reference, aircraft.geometry
+    pressure_area = dynamic_pressure(reference.air_density, reference.airspeed) * geometry.S
+    return pressure_area, pressure_area * geometry.b, pressure_area * geometry.cbar
 
 
 def momentum_gain(aircraft: Aircraft) -> MomentumGain:
@@ -179,7 +180,7 @@ def momentum_gain(aircraft: Aircraft) -> MomentumGain:
         p, q, r = after[0] - before[0], after[1] - before[1], after[2] - before[2]
         ca, sa = 0.5 * (before[3] + after[3]), 0.5 * (before[4] + after[4])
         X, Y, Z = qX * q + rX * r, pY * p + rY * r, pZ * p + qZ * q
-        return [X * sa - Z * ca, -X * ca - Z * sa, Y, pL * p + rL * r, qM * q, pN * p + rN * r]
+        return [*lift_and_drag(X, Z, ca, sa), Y, pL * p + rL * r, qM * q, pN * p + rN * r]
 
     return gain
 
@@ -189,30 +190,23 @@ def momentum_matrix(aircraft: Aircraft) -> Array:
 
     Force rows are body-axis forces over qbar0 S, moment rows are moments over qbar0 S b (or cbar).
     """
-    g = aircraft.geometry
-    qbar0 = 0.5 * aircraft.reference.air_density * aircraft.reference.airspeed**2
-    Ixx, Iyy, Izz, Ixz = (_known(v) for v in _inertias(aircraft))
-    x, y, z = aircraft.sensors.imu
-    mass = aircraft.mass / (qbar0 * g.S)
-    roll, pitch = 1.0 / (qbar0 * g.S * g.b), 1.0 / (qbar0 * g.S * g.cbar)
-    # a_cg = a_imu - omega_dot x r: columns are the axes of the force
-    tangential = mass * np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-    moments = np.array([[Ixx * roll, 0.0, -Ixz * roll], [0.0, Iyy * pitch, 0.0], [-Ixz * roll, 0.0, Izz * roll]])
-    return np.hstack([tangential, moments])
+    reference, geometry = aircraft.reference, aircraft.geometry
+    # the airspeed's square first: rounded otherwise, early estimates, which rest on next to no data, would differ
+    pressure_area = dynamic_pressure(reference.air_density, 1.0) * reference.airspeed**2 * geometry.S
+    mass = aircraft.mass / pressure_area
+    roll, pitch = 1.0 / (pressure_area * geometry.b), 1.0 / (pressure_area * geometry.cbar)
+    inertia, imu = known_moments(aircraft.inertia), Vector(*aircraft.sensors.imu)
+    rows = []
+    for unit in np.eye(3).tolist():
+        acceleration = Vector(*unit)
+        at_cg = tangential(acceleration, imu).times(-mass)  # the IMU's reading has it in addition
+        L, M, N = angular_momentum(inertia, acceleration)
+        rows.append([*at_cg, L * roll, M * pitch, N * roll])
+    return np.array(rows)
 
 
 def unformed(aircraft: Aircraft) -> dict[str, str]:
     """Coefficients whose equation cannot be formed, with the reason; empty where all inertias are known."""
-    Ixx, Iyy, Izz, _ = _inertias(aircraft)
-    missing = {"Cl": Ixx, "Cm": Iyy, "Cn": Izz}
-    return {c: "inertia unknown" for c, inertia in missing.items() if math.isnan(inertia)}
-
-
-def _inertias(aircraft: Aircraft) -> tuple[float, float, float, float]:
-    i = aircraft.inertia
-    return i.Ixx, i.Iyy, i.Izz, i.Ixz
-
-
-def _known(value: float) -> float:
-    """An inertia that is not known leaves its products of rates out (``unformed`` names the lost equations)."""
-    return 0.0 if math.isnan(value) else value
+    inertia = aircraft.inertia
+    missing = {"Cl": inertia.Ixx, "Cm": inertia.Iyy, "Cn": inertia.Izz}
+    return {c: "inertia unknown" for c, moment in missing.items() if math.isnan(moment)}

@@ -11,21 +11,20 @@ the lines of the instruments from the lines of the deflections, so that nothing 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, Inertia
+from sysid_node.dynamics.linear_model import STATES, DimensionalScales, linear_model
 from sysid_node.online.frequency.regression_signals import Layout
 
 Array = NDArray[np.float64]
 
 #: Regressors that have an instrument of their own; controls are their own.
 INSTRUMENTED = ("alpha", "q", "beta", "p", "r")
-_STATES = 6  # alpha, q, beta, p, r, phi
 _LEAK = 0.1  # 1/s: keeps spiral and phugoid, which are not in question, off the axis
-_G = 9.80665
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxilia
     if not layout.instrumented:
         return None
     A, B, rows, scales = _linear(aircraft, layout)
-    resolvent = np.linalg.inv(1j * omega[:, None, None] * np.eye(_STATES) - A)
+    resolvent = np.linalg.inv(1j * omega[:, None, None] * np.eye(len(STATES)) - A)
     gains = scales[:, None] * (resolvent[:, rows] @ B)
     return Auxiliary(gains, layout.deflections)
 
@@ -59,29 +58,15 @@ def fill_in(model: Auxiliary, lines: Array) -> None:
 
 def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[np.intp], Array]:
     """x' = A x + B u about trim, x = alpha, q, beta, p, r, phi; rows of x and scales that the instruments are."""
-    g, i, V = aircraft.geometry, aircraft.inertia, aircraft.reference.airspeed
-    qS = 0.5 * aircraft.reference.air_density * V * V * g.S
-    half_b, half_c = g.b / (2.0 * V), g.cbar / (2.0 * V)
-    columns = {"alpha": (0, 1.0), "q": (1, half_c), "beta": (2, 1.0), "p": (3, half_b), "r": (4, half_b)}
-    mass = aircraft.mass * V
-    Ixx, Iyy, Izz = (value if math.isfinite(value) else math.inf for value in (i.Ixx, i.Iyy, i.Izz))
-    gains = {"CL": (0, -qS / mass), "Cm": (1, qS * g.cbar / Iyy), "CY": (2, qS / mass)}
-    gains |= {"Cl": (3, qS * g.b / Ixx), "Cn": (4, qS * g.b / Izz)}
-    controls = layout.timed
-    A, B = np.zeros((_STATES, _STATES)), np.zeros((_STATES, len(controls)))
-    for name, derivative in aircraft.derivatives.items():
-        coefficient, _, regressor = name.partition("_")
-        if coefficient not in gains:
-            continue
-        row, gain = gains[coefficient]
-        if regressor in columns:
-            A[row, columns[regressor][0]] += gain * derivative.value * columns[regressor][1]
-        elif regressor in controls:
-            B[row, controls.index(regressor)] += gain * derivative.value
-    A[0, 1] += 1.0
-    A[2, 4] -= 1.0
-    A[2, 5] += _G / V
-    A[5, 3] += 1.0
-    A -= _LEAK * np.eye(_STATES)
-    rows = np.array([columns[r][0] for r in layout.instrumented], dtype=np.intp)
-    return A, B, rows, np.array([columns[r][1] for r in layout.instrumented])
+    reference, inertia = aircraft.reference, aircraft.inertia
+    Ixx, Iyy, Izz = (m if math.isfinite(m) else math.inf for m in (inertia.Ixx, inertia.Iyy, inertia.Izz))
+    # an unknown moment of inertia leaves its axis at rest, and Ixz, which couples roll and yaw, is left out: the
+    # instruments need not be exact, and those of all results so far are without it
+    uncoupled = replace(aircraft, inertia=Inertia(Ixx, Iyy, Izz, Ixz=0.0))
+    condition = DimensionalScales.of(uncoupled, reference.airspeed, reference.air_density)
+    values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
+    model = linear_model(values, condition, 0.0, STATES, layout.timed)
+    scales = {"q": condition.chord, "p": condition.span, "r": condition.span}
+    rows = np.array([STATES.index(r) for r in layout.instrumented], dtype=np.intp)
+    A = model.A - _LEAK * np.eye(len(STATES))
+    return A, model.B, rows, np.array([scales.get(r, 1.0) for r in layout.instrumented])

@@ -183,7 +183,7 @@ def _climb(record: FlightRecord, time: Array) -> Array:
 def _speed_of_climb(roll: Scalar, pitch: Scalar, airspeed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:
     """Speed (N,) upwards through the air, m/s."""
     attitude = quaternion((roll, pitch, jnp.zeros_like(roll)), jnp)
-    climb: Scalar = -to_earth(attitude, velocity_of((airspeed, alpha, beta), jnp)).z
+    climb: Scalar = -to_earth(attitude, Vector(*velocity_of((airspeed, alpha, beta), jnp))).z
     return climb
 
 
@@ -210,7 +210,7 @@ def _true_motion(chain: Chain, signals: Signals) -> _Sample:
         reading = jnp.stack(sensors.flow_from(effects, *shift_cubic(signals.air, -late_air / step).T), 1)
         flow = sensors.before_lag(effects, reading, None, step)
         arm = sensors.air_data_arm(chain.model, effects, chain.body)
-        velocity = velocity_from(velocity_of(flow.T, jnp), rates, arm)
+        velocity = Vector(*velocity_from(velocity_of(flow.T, jnp), rates, arm))
     _, alpha, _ = flow_angles(velocity, jnp)
     return _Sample(
         command=command.arrive(effects, signals.commands, step),
