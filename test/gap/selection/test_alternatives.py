@@ -1,0 +1,38 @@
+"""Causes against their alternatives, fitted; truth: the effect that was flown."""
+
+import pytest
+
+from sysid_node.gap.selection.alternatives import replace_stepwise
+
+
+@pytest.fixture(scope="module")
+def alone(late):
+    """A lag and a delay, each fitted alone to late commands."""
+    fitter, base, candidates = late
+    return {label: fitter.add_candidate(base, candidates[label]) for label in ("actuator_lag", "command_delay")}
+
+
+def test_the_true_effect_takes_the_place_of_one_that_resembles_it(late, alone) -> None:
+    fitter, base, candidates = late
+    stages = [[alone["actuator_lag"], alone["command_delay"]]]
+    chosen, (position,) = replace_stepwise(fitter, base, alone["actuator_lag"], stages, [])
+    assert chosen.fit is alone["command_delay"].fit
+    assert position.candidate is candidates["command_delay"] and position.without is base
+    assert {each.added.label for each in position.alternatives} == {"actuator_lag", "command_delay"}
+
+
+def test_what_is_barred_takes_no_place(late, alone) -> None:
+    fitter, base, candidates = late
+    stages = [[alone["actuator_lag"]]]
+    chosen, (position,) = replace_stepwise(
+        fitter, base, alone["actuator_lag"], stages, [candidates["command_delay"]], frozenset({"command_delay"})
+    )
+    assert chosen is alone["actuator_lag"]
+    assert "command_delay" in {each.added.label for each in position.alternatives}  # it is fitted, and weighed
+
+
+def test_the_true_effect_stays(late, alone) -> None:
+    fitter, base, _ = late
+    stages = [[alone["command_delay"], alone["actuator_lag"]]]
+    chosen, _ = replace_stepwise(fitter, base, alone["command_delay"], stages, [])
+    assert chosen is alone["command_delay"]

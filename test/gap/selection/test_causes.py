@@ -1,0 +1,44 @@
+"""The causes that are kept, weighed on a flight; truth: the effect that was flown."""
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.selection.calibration import calibrated_probability
+from sysid_node.gap.selection.causes import select_causes
+from sysid_node.gap.selection.comparison import power_left
+
+
+@pytest.fixture(scope="module")
+def selected(late):
+    """Causes of late commands, where forward selection ended with a lag that resembles them."""
+    fitter, base, candidates = late
+    lag = fitter.add_candidate(base, candidates["actuator_lag"])
+    return select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]])
+
+
+def test_the_true_effect_is_the_cause(selected, late) -> None:
+    chosen, (cause,), doubted = selected
+    assert chosen.fit.effects == {"command_delay"} == {cause.candidate.effect}
+    assert doubted == ()
+    assert cause.without is late[1]
+
+
+def test_its_probability_is_its_share_of_the_calibrated_one(selected) -> None:
+    _, (cause,), _ = selected
+    assert cause.share > 0.95 and cause.share + sum(p for _, p in cause.alternatives) <= 1.0 + 1e-12
+    assert cause.probability == pytest.approx(cause.share * calibrated_probability(cause.evidence))
+    assert cause.probability > 0.9 and cause.evidence.misfit < 0.2
+
+
+def test_its_table_holds_what_decides(selected) -> None:
+    _, (cause,), _ = selected
+    table = cause.table
+    assert (table.label, table.share) == ("command_delay", cause.share)
+    assert table.alternative_share == max((p for _, p in cause.alternatives), default=0.0)
+
+
+def test_the_power_that_it_removes_is_never_negative(selected) -> None:
+    chosen, (cause,), _ = selected
+    removed = power_left(cause.without.evidence) - power_left(chosen.evidence)
+    np.testing.assert_allclose(cause.power_removed, np.maximum(removed, 0.0))
+    assert cause.power_removed.max() > 0.0

@@ -1,0 +1,47 @@
+"""Short simulated flights; truth: a flight of this simulator itself."""
+
+import numpy as np
+import pytest
+
+from sysid_node.gap.validation.multiple_shooting import course_of, simulate_beside, simulation_error
+from sysid_node.sim.model.layout import OUTPUTS
+
+SIZE = 100  # samples at 50 Hz: 2 s
+RATES = [OUTPUTS.index(name) for name in "pqr"]
+
+
+def test_short_flights_begin_at_equal_distances(plain_model) -> None:
+    begins = np.asarray(course_of(plain_model, SIZE).begins)
+    assert np.flatnonzero(begins)[0] == 0
+    assert set(np.diff(np.flatnonzero(begins))) == {SIZE}
+
+
+def test_the_simulator_reads_what_was_measured_where_a_short_flight_begins(plain_model) -> None:
+    course = course_of(plain_model, SIZE)
+    heavier = plain_model.simulator.vector({"mass_error": {"error": 0.3}})
+    simulated, measured, _ = simulate_beside(plain_model, heavier, course)
+    begins = np.asarray(course.begins)[: len(measured)]
+    states = [OUTPUTS.index(name) for name in ("p", "q", "r", "phi", "theta", "V")]
+    np.testing.assert_allclose(simulated[begins][:, states], measured[begins][:, states], atol=1e-9)
+
+
+def test_the_true_simulator_departs_by_no_more_than_noise_and_another_by_more(plain_model, aircraft) -> None:
+    course = course_of(plain_model, SIZE)
+    true = simulation_error(plain_model, plain_model.simulator.neutral(), course)
+    slow = plain_model.simulator.vector({"actuator_lag": {"time_constant": 0.15}})
+    other = simulation_error(plain_model, slow, course)
+    assert (true[:, RATES].std(axis=0) < 6.0 * aircraft.noise["gyro"]).all()
+    assert (other[:, RATES].std(axis=0) > 3.0 * true[:, RATES].std(axis=0)).all()
+
+
+def test_still_air_moves_by_the_noise_of_the_air_data_alone(plain_model, aircraft) -> None:
+    _, _, air = simulate_beside(plain_model, plain_model.simulator.neutral(), course_of(plain_model, SIZE))
+    across = plain_model.record["V"].mean() * aircraft.noise["alpha"]
+    assert air.shape == (len(plain_model.record), 3)
+    assert air[:, 2].std() < 3.0 * across
+
+
+@pytest.mark.parametrize("angle", ["phi", "psi"])
+def test_errors_of_angles_are_within_half_a_turn(plain_model, angle) -> None:
+    error = simulation_error(plain_model, plain_model.simulator.neutral(), course_of(plain_model, SIZE))
+    assert np.abs(error[:, OUTPUTS.index(angle)]).max() <= np.pi
