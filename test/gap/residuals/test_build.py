@@ -27,16 +27,6 @@ def test_a_heading_that_was_not_measured_is_not_compared(aircraft, plain) -> Non
     assert [c for c, measured in zip(CHANNELS, model.axes, strict=True) if not measured] == ["psi"]
 
 
-def test_twice_the_noise_has_four_times_the_power(aircraft, plain, plain_model) -> None:
-    """In the airspeed, which depends linearly on its sensors and not on commands; four realisations scatter."""
-    louder = replace(aircraft, noise={name: 2.0 * sigma for name, sigma in aircraft.noise.items()})
-    model = residual_model_of(Simulator(louder, 50.0), plain)
-    airspeed = CHANNELS.index("V")
-    assert model.inputs.memory == plain_model.inputs.memory
-    ratio = model.noise[1:, airspeed].sum() / plain_model.noise[1:, airspeed].sum()
-    assert ratio == pytest.approx(4.0, rel=0.1)
-
-
 def test_the_same_record_seen_alike_is_the_same_model(plain_model) -> None:
     again = residual_model_like(plain_model, plain_model.record)
     neutral = plain_model.simulator.neutral()
