@@ -22,9 +22,9 @@ from evaluation.judging import FAR, METHODS, Array, processes
 from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
-from sysid_node.online.whole_record import run
 from sysid_node.sim.signals.dryden import INTENSITIES
 
 AIRCRAFT = "cdrw"

@@ -42,7 +42,7 @@ def phase_error(start: float, rng: np.random.Generator) -> float:
     at, x = start + np.arange(round(MINUTE * RATE)) / RATE, rng.normal(size=round(MINUTE * RATE))
     state, steps = fourier_transform.start(grid, 1), np.diff(at)
     areas, slants = 0.5 * steps * (x[1:] + x[:-1]), 0.5 * steps**2 * np.diff(x)
-    fourier_transform.add_many(state, at[:-1], at[1:], areas[:, None], slants[:, None])
+    fourier_transform.add(state, at[:-1].tolist(), at[1:].tolist(), areas[:, None], slants[:, None])
     lines, F = fourier_transform.current(state)[:, 0], grid.count
     phase = np.outer(grid.omega.astype(np.longdouble), at[:-1].astype(np.longdouble) + 0.5 * steps)
     wave = np.exp(-1j * np.remainder(phase, 2 * np.longdouble(np.pi)).astype(float))

@@ -19,9 +19,9 @@ from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
-from sysid_node.online.whole_record import run
 
 AIRCRAFT = "cdrw"
 TIME = np.array([59.99])  # s

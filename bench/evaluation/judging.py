@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
-from sysid_node.online.whole_record import run
 
 from .flying import Setting, fly, noisier
 

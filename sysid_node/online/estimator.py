@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +21,9 @@ from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes.detection import PIECE
 from sysid_node.online.changes.excited_segments import experiences
-from sysid_node.online.frequency import fourier_transform, regression_signals
-from sysid_node.online.frequency.regression_signals import NUISANCES, OUTPUTS, Layout
+from sysid_node.online.frequency import fourier_transform, regression_signals, sampled_transform
+from sysid_node.online.frequency.regression_signals import NUISANCES, OUTPUTS
+from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression import information, least_squares
 from sysid_node.online.regression.derivative_index import table
 from sysid_node.online.regression.instruments import INSTRUMENTED, auxiliary_model
@@ -71,7 +71,8 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
     )
-    running = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
+    transform = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
+    running = SampledTransform(layout, transform)
     nothing, flow = information.nothing(layout), flow_angle_filter.init(aircraft)
     return State(model, running, plan, nothing, flow, experiences=experiences(plan, layout))
 
@@ -106,18 +107,16 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
         return
     row, angles = state.model.signals(sample)
     row.insert(DRIFT, time)
-    now = state.previous = (time, np.array(row), (*sample[3:6], *angles))
+    motion = (*sample[3:6], *angles)
     renew_early(state)
+    state.previous = (time, motion)
     if previous is None or time - previous[0] > state.model.settings.max_gap:
-        interrupt(state, time)
+        interrupt(state, time, row)
         return
     state.step = time - previous[0]
-    gain = state.model.momentum(previous[2], now[2])
-    area, slant = over_interval(state.model.layout, state.step, previous[1], now[1], gain)
-    fourier_transform.add(state.transform, previous[0], time, area, slant)
+    sampled_transform.append(state.transform, time, row, state.model.momentum(previous[1], motion))
     state.samples += 1
     state.intervals += sample[INTERVAL]
-    state.recent.append(now[1][None])
 
 
 def renew_early(state: State) -> None:
@@ -155,23 +154,10 @@ def leave_out(state: State, column: int) -> None:
     state.incomplete[name] = state.incomplete.get(name, 0) + 1
 
 
-def over_interval(layout: Layout, step: Any, before: Array, after: Array, gain: Any) -> tuple[Array, Array]:
-    """Areas and slants (..., T) of the signals over a ``step`` (s), or over many (N, 1); see ``transform``.
-
-    ``gain`` (..., 6) is what the coefficients gain by the angular accelerations, the controls' rates are their
-    increments: both are areas of derivatives.
-    """
-    slant = after - before
-    area = (after + before) * (0.5 * step)
-    area[..., :OUTPUTS] += gain
-    area[..., layout.rates] = slant[..., layout.deflections]
-    slant *= 0.5 * step * step
-    return area, slant
-
-
-def interrupt(state: State, time: float) -> None:
-    """Nothing is known of the time since the last sample: finish the segment there and begin one here."""
+def interrupt(state: State, time: float, row: Sequence[float]) -> None:
+    """Finish the segment at the last sample and begin one at this: nothing is known of the time in between."""
     if state.transform.last > state.segment_start:
         renew(state, last=True)
     state.watch.pieces.clear()
-    begin_segment(state, time)
+    sampled_transform.begin_at(state.transform, time, row)
+    begin_segment(state)

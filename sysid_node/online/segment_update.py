@@ -7,7 +7,6 @@ on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +18,7 @@ from sysid_node.online.changes import detection
 from sysid_node.online.changes.detection import PIECE, Looking, Watch
 from sysid_node.online.changes.excited_segments import experiences, learn
 from sysid_node.online.changes.score_test import Reference
-from sysid_node.online.frequency import fourier_transform
+from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import (
     actuator_lag_test as timing,
@@ -48,7 +47,7 @@ TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which
 def renew(state: State, last: bool = False) -> None:
     """Renew what changes slowly, see ``Renewed``; all of it where this is the ``last`` time in the segment."""
     time = state.transform.last
-    lines = fourier_transform.current(state.transform)
+    lines = sampled_transform.current(state.transform)
     _watch_piece(state, lines)
     last = last or reach(time, state.step) - state.segment_start >= state.model.segment_time
     state.pieces += 1
@@ -59,7 +58,7 @@ def renew(state: State, last: bool = False) -> None:
         _look_for_changes(state, lines)
     if last:
         finish_segment(state)
-        begin_segment(state, time)
+        begin_segment(state)
     else:
         _begin_piece(state)
 
@@ -72,26 +71,21 @@ def reach(time: Any, step: Any) -> Any:
 def _is_due(state: State) -> bool:
     """Whether it is time to solve for everything again."""
     renewed = state.renewed
-    return renewed is None or state.pieces - renewed.pieces >= _pause(renewed)
+    return renewed is None or state.pieces - renewed.pieces >= 1 + int(renewed.total.energy / SOON)
 
 
-def _pause(renewed: Renewed) -> int:
-    """Pieces from one time when everything is solved for to the next."""
-    return 1 + int(renewed.total.energy / SOON)
-
-
-def begin_segment(state: State, time: float) -> None:
-    """Begin a segment, of which alone the transform is, and a piece of the watch at ``time`` (s)."""
-    fourier_transform.restart(state.transform, time)
+def begin_segment(state: State) -> None:
+    """Begin a segment, of which alone the transform is, and a piece of the watch at the last sample."""
+    time = state.transform.last
+    sampled_transform.restart(state.transform)
     state.segment_start, state.samples, state.intervals = time, 0, 0.0
     state.uneven, state.weighed_until = Unevenness(), time
-    state.recent.clear()
     _begin_piece(state)
 
 
 def _begin_piece(state: State) -> None:
     time = state.transform.last
-    state.piece, state.piece_start, state.renew_at = fourier_transform.current(state.transform), time, time + PIECE
+    state.piece, state.piece_start, state.renew_at = sampled_transform.current(state.transform), time, time + PIECE
 
 
 def _fading(state: State, since: float) -> float:
@@ -110,19 +104,19 @@ def _weigh_recent(state: State) -> None:
     """Count how unevenly the noise came since this was last counted."""
     now = state.transform.last
     duration = now - state.weighed_until
-    if duration <= 0.0 or not state.recent:
+    if duration <= 0.0 or not state.transform.recent:
         return
     pieces, every = list(state.watch.pieces)[-RECENT:], state.intervals / max(state.samples, 1)
     # about the mean of the last seconds, as slower motion is not in the lines
     mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (now - pieces[0][0])
-    model, rows = state.model, np.concatenate(state.recent)
+    model, rows = state.model, np.concatenate(state.transform.recent)
     boxes = max(round(2.0 * model.settings.frequencies[2] * duration), 1)
     found = heteroskedasticity.measure(
         model.aircraft, model.layout, model.plan, model.believed[0], rows, mean, duration, every, boxes
     )
     state.uneven = state.uneven + found
     state.weighed_until = now
-    state.recent.clear()
+    state.transform.recent.clear()
 
 
 def _measure_segment(state: State, lines: Array) -> Information:
@@ -252,24 +246,6 @@ def _look_for_changes(state: State, lines: Array) -> None:
         state.changed_at, state.experiences = now, experiences(model.plan, model.layout)
 
 
-def look_ahead(state: State, ends: Sequence[float], lines: Sequence[Array]) -> None:
-    """Test for changes what will be looked at with the next pieces, unless the next look's tests are known already.
-
-    The pieces will end at ``ends`` (K,) s, with transforms ``lines`` (2F + 1, W) of the present segment. Whatever is
-    renewed at these times meets the same tests, and so the same bits, as if it had made them then.
-    """
-    renewed, watch = state.renewed, state.watch
-    if renewed is None or not state.model.settings.detect_changes or watch.looks + 1 in watch.ahead:
-        return
-    starts, before = [state.piece_start, *ends[:-1]], [state.piece, *lines[:-1]]
-    rate = state.model.spectrum.rate
-    pieces = [
-        (start, after - past * math.exp(0.5 * rate * (start - end)))
-        for start, end, past, after in zip(starts, ends, before, lines, strict=True)
-    ]
-    _looking(state).ahead(pieces, ends, renewed.pieces + _pause(renewed) - state.pieces)
-
-
 def _looking(state: State) -> Looking:
     """What looks for changes share."""
     model = state.model
@@ -295,9 +271,9 @@ def _begin_anew(state: State, lines: Array, since: float) -> None:
     state.past = information.nothing(state.model.layout)
     state.inside.clear()
     state.segment_start = since
-    fourier_transform.take_out(state.transform, before)
+    sampled_transform.take_out(state.transform, before)
     state.watch = Watch()
-    _solve_all(state, _measure_segment(state, fourier_transform.current(state.transform)))
+    _solve_all(state, _measure_segment(state, sampled_transform.current(state.transform)))
 
 
 def _learn_before(state: State, lines: Array, end: float) -> None:

@@ -13,8 +13,8 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.alignment.flow_angle_filter import Reconstruction
 from sysid_node.online.changes.detection import Watch
 from sysid_node.online.changes.excited_segments import Experience
-from sysid_node.online.frequency.fourier_transform import Transform
 from sysid_node.online.frequency.regression_signals import Layout, MomentumGain, ScalarSignals
+from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression.actuator_lag_test import Timing
 from sysid_node.online.regression.derivative_index import Table
 from sysid_node.online.regression.heteroskedasticity import Unevenness
@@ -91,7 +91,7 @@ class State:
     """All that the estimator remembers. Times in s."""
 
     model: Model
-    transform: Transform  # of the present segment
+    transform: SampledTransform  # of the present segment
     plan: Plan  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
     flow: Reconstruction  # of the flow angles that are not measured
@@ -102,12 +102,11 @@ class State:
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
-    recent: list[Array] = field(default_factory=list)  # (n, T) signals of the samples since ``weighed_until``
     weighed_until: float = math.nan  # time up to which ``uneven`` counts
     uneven: Unevenness = field(default_factory=Unevenness)  # of the present segment
     renew_at: float = math.inf
     step: float = 0.0  # s between the last two samples
-    previous: tuple[float, Array, tuple[float, ...]] | None = None  # time, signals, (p, q, r, ca, sa)
+    previous: tuple[float, tuple[float, ...]] | None = None  # the last sample: time, (p, q, r, ca, sa)
     begin: float = math.nan  # time from which samples count
     samples: int = 0  # in the present segment
     intervals: float = 0.0  # s: sum of the air data's intervals in the present segment

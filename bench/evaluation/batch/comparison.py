@@ -24,9 +24,9 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.logs import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.truth import read_truth
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings as OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
-from sysid_node.online.whole_record import run
 
 Array = NDArray[np.float64]
 BAGS = Path(__file__).resolve().parents[3] / "bags"

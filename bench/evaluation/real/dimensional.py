@@ -87,5 +87,5 @@ def _measure(time: Array, columns: Array, sides: Array, rates: bool, grid: Lines
     if rates:
         areas[:, : len(sides)] = np.diff(sides, axis=1).T
     running = fourier_transform.start(grid, columns.shape[1])
-    fourier_transform.add_many(running, time[:-1], time[1:], areas, slants)
+    fourier_transform.add(running, time[:-1].tolist(), time[1:].tolist(), areas, slants)
     return information.measure(fourier_transform.current(running), None, lines, float(time[0]), float(time[-1]))

@@ -12,12 +12,10 @@ waited least lately; how long that is depends on how the stamps of the topics li
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 
@@ -35,16 +33,6 @@ class Schedule:
     wait: float = 0.0  # s, of the last sample
     shortest: deque[float] = field(default_factory=lambda: deque(maxlen=RUNS))  # s, waits that ended runs
 
-    def advance(self, reach: float, wait: float, fresh: bool) -> bool:
-        """Whether an estimate falls due at a sample that reaches so far (s) and has a ``wait`` (s) before it."""
-        if reach < self.next / self.rate:
-            return False
-        if not fresh and reach + wait < (self.next + 1) / self.rate:
-            return False
-        while reach >= self.next / self.rate:
-            self.next += 1
-        return True
-
 
 def due(schedule: Schedule, time: float, wait: float) -> bool:
     """Whether an estimate falls due at the sample at ``time`` (s, increasing); at most one a sample does.
@@ -54,29 +42,21 @@ def due(schedule: Schedule, time: float, wait: float) -> bool:
     interval = 0.0 if schedule.previous is None else time - schedule.previous
     if wait >= schedule.wait and schedule.previous is not None:
         schedule.shortest.append(schedule.wait)
-    schedule.previous, schedule.wait = time, wait
+    schedule.previous, schedule.wait, rate = time, wait, schedule.rate
+    reach = time + 0.5 * min(interval, 1.0 / rate)
+    if reach < schedule.next / rate:
+        return False
     fresh = wait <= max(schedule.shortest, default=0.0) + SPARE * interval
-    return schedule.advance(time + 0.5 * min(interval, 1.0 / schedule.rate), wait, fresh)
+    if not fresh and reach + wait < (schedule.next + 1) / rate:
+        return False
+    while reach >= schedule.next / rate:
+        schedule.next += 1
+    return True
 
 
 def due_times(time: Array, wait: Array, rate: float) -> Array:
-    """Those of the samples' times (N,) s, increasing, at which ``due`` says so."""
-    intervals = np.diff(time, prepend=time[:1])
-    reach = time + 0.5 * np.minimum(intervals, 1.0 / rate)
-    reaches, waits, fresh = reach.tolist(), wait.tolist(), _fresh(wait, intervals).tolist()
-    crest = np.maximum.accumulate(reach).tolist()
-    schedule, places, at = Schedule(rate), [], 0
-    while (at := bisect_left(crest, schedule.next / rate, at)) < len(crest):
-        if schedule.advance(reaches[at], waits[at], fresh[at]):
-            places.append(at)
-        at += 1
-    return time[places]
-
-
-def _fresh(wait: Array, intervals: Array) -> NDArray[np.bool_]:
-    """(N,) which samples are fresh."""
-    ends = wait[:-1][wait[1:] >= wait[:-1]]
-    longest = np.lib.stride_tricks.sliding_window_view(np.append(np.zeros(RUNS), ends), RUNS).max(axis=1)
-    run = np.cumsum(np.append(0, wait[1:] >= wait[:-1]))
-    fresh: NDArray[np.bool_] = wait <= longest[run[: wait.size]] + SPARE * intervals
-    return fresh
+    """Those of the samples' times (N,) s, increasing, at which an estimate falls due."""
+    schedule = Schedule(rate)
+    found = [due(schedule, t, w) for t, w in zip(time.tolist(), wait.tolist(), strict=True)]
+    chosen: Array = time[np.array(found, dtype=bool)]
+    return chosen

@@ -92,12 +92,7 @@ class _Entry(NamedTuple):
     values: Values
 
 
-class _Between(NamedTuple):
-    """What would have been said at an IMU message's stamp."""
-
-    until: int  # stamp of the message on the right
-    interval: int  # ns
-    values: Values
+_Pair = tuple[_Entry, _Entry]
 
 
 class _Waiting(NamedTuple):
@@ -171,7 +166,9 @@ def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[Complete]:
     base = state.bases[-1]
     state.since = base.since + (stamp_ns - base.stamp)
     state.waiting.append(_Waiting(epoch, stamp_ns, state.since, values))
-    complete = _release(state)
+    # where another of this epoch waits already, it waits for another topic, and still does
+    waits = len(state.waiting) > 1 and state.waiting[-2].epoch == epoch
+    complete = [] if waits else _release(state)
     while state.waiting and state.since - state.waiting[0].since > state.buffer:
         _give_up(state)
         complete += _release(state)
@@ -232,10 +229,10 @@ def _release(state: IntakeState) -> list[Complete]:
     waiting = state.waiting
     while waiting:
         imu = waiting[0]
-        air_data = _at(state, state.air_data, imu)
+        air_data = _neighbours_of(state, state.air_data, imu)
         if air_data is _Missing.AS_YET:
             break
-        actuators = _at(state, state.actuators, imu)
+        actuators = _neighbours_of(state, state.actuators, imu)
         if actuators is _Missing.AS_YET:
             break
         waiting.popleft()
@@ -244,43 +241,59 @@ def _release(state: IntakeState) -> list[Complete]:
         elif actuators is _Missing.FOR_GOOD:
             refuse(state, IMU, gap(ACTUATORS))
         else:
-            thrust, controls = actuators.values[:1], actuators.values[1:]
-            sample = (*imu.values, *air_data.values, *thrust, air_data.interval / 1e9, *controls)
-            wait = max(air_data.until, actuators.until) - imu.stamp
-            complete.append(Complete(imu.since / 1e9, sample, wait / 1e9))
+            complete.append(_completed(imu, air_data, actuators))
     return complete
+
+
+def _completed(imu: _Waiting, air_data: _Pair, actuators: _Pair) -> Complete:
+    """The IMU message with what the other topics say at its stamp."""
+    thrust, *controls = _interpolated(actuators, imu.stamp)
+    right = air_data[1]
+    sample = (*imu.values, *_interpolated(air_data, imu.stamp), thrust, right.interval / 1e9, *controls)
+    return Complete(imu.since / 1e9, sample, (max(right.stamp, actuators[1].stamp) - imu.stamp) / 1e9)
+
+
+def _interpolated(pair: _Pair, stamp: int) -> Sequence[float]:
+    """Values at a stamp on the straight line between two messages."""
+    left, right = pair
+    if left is right:
+        return left.values
+    weight = (stamp - left.stamp) / (right.stamp - left.stamp)
+    return [a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)]
 
 
 def _give_up(state: IntakeState) -> None:
     """Leaves out the IMU message that has waited longest, and takes it that the topics' clocks are set apart."""
     imu = state.waiting.popleft()
-    missing = isinstance(_at(state, state.air_data, imu), _Missing)
+    missing = isinstance(_neighbours_of(state, state.air_data, imu), _Missing)
     refuse(state, IMU, gap(AIR_DATA if missing else ACTUATORS))
     for topic in (state.air_data, state.actuators):
         topic.ahead = topic.clock.epoch - state.clock.epoch
 
 
-def _at(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Between | _Missing:
-    """What a topic says at an IMU message's stamp, or why nothing. Forgets messages that are no longer needed."""
+def _neighbours_of(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Pair | _Missing:
+    """A topic's messages on both sides of an IMU message's stamp, or why there are none.
+
+    A message of the same stamp stands on both sides. Forgets messages that are no longer needed.
+    """
     entries, epoch, stamp = topic.entries, imu.epoch + topic.ahead, imu.stamp
+    newest = topic.newest
+    if newest is not None and newest.stamp < stamp and newest.epoch == epoch:
+        return _Missing.AS_YET
     while entries and entries[0].epoch < epoch:
         entries.popleft()
     while len(entries) > 1 and entries[1].epoch == epoch and entries[1].stamp <= stamp:
         entries.popleft()
     left = entries[0] if entries and entries[0].epoch == epoch else None
     if left is not None and left.stamp == stamp:
-        return _Between(stamp, left.interval, left.values)
+        return left, left
     if left is not None and left.stamp > stamp:
         return _Missing.FOR_GOOD
     right = entries[1] if len(entries) > 1 and entries[1].epoch == epoch else None
     if left is None or right is None:
         both_set = topic.clock.epoch > epoch and state.clock.epoch > imu.epoch
         return _Missing.FOR_GOOD if both_set else _Missing.AS_YET
-    if right.stamp - left.stamp > state.gap:
-        return _Missing.FOR_GOOD
-    weight = (stamp - left.stamp) / (right.stamp - left.stamp)
-    values = tuple([a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)])
-    return _Between(right.stamp, right.interval, values)
+    return (left, right) if right.stamp - left.stamp <= state.gap else _Missing.FOR_GOOD
 
 
 def refuse(state: IntakeState, topic: str, reason: str) -> None:

@@ -57,7 +57,6 @@ class Watch:
     lost: Flags | None = None  # (C,)
     disowned: Flags | None = None  # (C,) by what was learned in well-excited flight
     looks: int = 0
-    ahead: dict[int, list[Contradiction]] = field(default_factory=dict)  # by look: what was tested before its time
 
 
 @dataclass(frozen=True)
@@ -89,24 +88,6 @@ class Looking:
         """How the last pieces contradict the estimates from before them: of the ``spans`` (rising) that have such."""
         known = list(_stretches(self.watch, self.watch.pieces, self.now, spans))
         return zip(spans, _tested(known, self.model, self.spectrum), strict=False)
-
-    def ahead(self, upcoming: Sequence[tuple[float, Array]], ends: Sequence[float], until: int) -> None:
-        """Test what is going to be looked at with the ``upcoming`` pieces, which end at ``ends`` (s), all at once.
-
-        New estimates will come with the one number ``until``: what is to be tested against them has to wait.
-        """
-        watch, every, known = self.watch, [*self.watch.pieces, *upcoming], list[_Stretch]()
-        counts: list[int] = []
-        for j, end in enumerate(ends, start=1):
-            spans = _due(watch.looks + j)
-            if j - spans[0] >= until:
-                break
-            fresh = list(_stretches(watch, every[: len(watch.pieces) + j], end, spans))
-            known += fresh
-            counts.append(len(fresh))
-        found = _tested(known, self.model, self.spectrum)
-        for j, count in enumerate(counts, start=1):
-            watch.ahead[watch.looks + j] = [next(found) for _ in range(count)]
 
 
 class _Stretch(NamedTuple):
@@ -153,8 +134,7 @@ def examine(looking: Looking, experiences: list[Experience]) -> Finding:
     watch, C = looking.watch, len(looking.full.coefficients)
     watch.looks += 1
     surest = 1.0
-    spans, tested = _due(watch.looks), watch.ahead.pop(watch.looks, None)
-    for span, found in looking.contradictions(spans) if tested is None else zip(spans, tested, strict=False):
+    for span, found in looking.contradictions(_due(watch.looks)):
         known = found.freedom >= KNOWN
         usual = _usual(watch, span, C)
         watch.doubted[span] = known & (found.chance(usual) < DOUBT)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import status
-from sysid_node.online.estimates.current_solution import Present, present, present_at
+from sysid_node.online.estimates.current_solution import Present, present
 from sysid_node.online.estimates.rows import DerivativeRows, FitRows
 from sysid_node.online.estimates.validity import grounds_of, judge
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import weak_instruments
 from sysid_node.online.state import Renewed, State
-from sysid_node.online.status import Codes
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
@@ -32,42 +29,31 @@ def estimate_of(state: State, current: Present | None, now: float | None = None)
     time, renewed = state.transform.last, state.renewed
     if current is None or renewed is None:
         return Estimates(time, _nothing_known(state), {})
-    return _named(state, time, *_told(state, renewed, current, time if now is None else now))
-
-
-def estimates_at(state: State, lines: Array, times: Sequence[float], nows: Sequence[float]) -> list[Estimates]:
-    """The same at K ``times`` (s) since the last renewal, when the transform was ``lines`` (K, 2F + 1, W)."""
-    current, renewed = present_at(state, lines, np.array(times)), state.renewed
-    if current is None or renewed is None:
-        return [Estimates(time, _nothing_known(state), {}) for time in times]
-    told = _told(state, renewed, current, np.array(nows))
-    return [_named(state, time, *one) for time, *one in zip(times, *told, strict=True)]
-
-
-def _told(state: State, renewed: Renewed, current: Present, now: Any) -> tuple[Array, Codes, Array]:
-    """(..., D, 4) numbers and (..., D) statuses of the derivatives, (..., C, 4) numbers of the fits; see ``rows``."""
-    codes = judge(state, renewed, current, now)
-    values, variances = current.values, current.variances
-    grounds, solution = grounds_of(state, renewed), current.solution
-    below, above = weak_instruments.reach(grounds.squares * variances, renewed.bend)
-    numbers = np.stack([values, np.sqrt(variances), values - below, values + above], axis=-1)
-    missing = len(state.model.table.unformed)
-    if missing:
-        lacking = np.array([math.nan, math.inf, -math.inf, math.inf])
-        numbers = np.concatenate([numbers, np.broadcast_to(lacking, (*codes.shape[:-1], missing, 4))], axis=-2)
-        unknown = np.full((*codes.shape[:-1], missing), status.INERTIA, codes.dtype)
-        codes = np.concatenate([codes, unknown], axis=-1)
-    fits = np.empty((*solution.motion.shape, 4))
-    explained = 1.0 - solution.residual / np.maximum(solution.motion, 1e-300)
-    fits[..., 0], fits[..., 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), grounds.fits
-    return numbers, codes, fits
-
-
-def _named(state: State, time: float, numbers: Array, codes: Codes, fits: Array) -> Estimates:
-    """The estimates of one moment, of which ``_told`` has told."""
+    codes = judge(state, renewed, current, time if now is None else now)
     model = state.model
+    numbers = _intervals(state, renewed, current)
+    missing = len(model.table.unformed)
+    if missing:
+        numbers = np.concatenate([numbers, np.tile([math.nan, math.inf, -math.inf, math.inf], (missing, 1))])
+        codes = np.concatenate([codes, np.full(missing, status.INERTIA, codes.dtype)])
     derivatives = DerivativeRows(model.table.all_names, numbers, codes, model.vocabulary)
-    return Estimates(time, derivatives, FitRows(model.plan.coefficients, fits))
+    return Estimates(time, derivatives, FitRows(model.plan.coefficients, _fits(state, renewed, current)))
+
+
+def _intervals(state: State, renewed: Renewed, current: Present) -> Array:
+    """(D, 4) value, standard error, lower and upper end of the interval of each derivative."""
+    values, variances = current.values, current.variances
+    below, above = weak_instruments.reach(grounds_of(state, renewed).squares * variances, renewed.bend)
+    return np.stack([values, np.sqrt(variances), values - below, values + above], axis=-1)
+
+
+def _fits(state: State, renewed: Renewed, current: Present) -> Array:
+    """(C, 4) numbers of the fits, see ``rows``."""
+    solution = current.solution
+    fits = np.empty((solution.motion.size, 4))
+    explained = 1.0 - solution.residual / np.maximum(solution.motion, 1e-300)
+    fits[:, 0], fits[:, 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), grounds_of(state, renewed).fits
+    return fits
 
 
 def _nothing_known(state: State) -> dict[str, DerivativeEstimate]:

@@ -1,12 +1,10 @@
 """Whether an estimate is to be believed, and what speaks against it.
 
 What changes with renewals only is weighed once for all samples until the next (``grounds``); what changes with every
-sample is decided for all estimates of all moments (...) at once (``judge``), as numbers (see ``status``).
+sample is decided for all estimates at once (``judge``), as numbers (see ``status``).
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,33 +79,31 @@ def _against(state: State, renewed: Renewed) -> Codes:
     return against
 
 
-def judge(state: State, renewed: Renewed, current: Present, now: Any) -> Codes:
-    """(..., D) statuses of the estimates ``current``, ``now`` (...) s."""
+def judge(state: State, renewed: Renewed, current: Present, now: float) -> Codes:
+    """(D,) statuses of the estimates ``current``, at ``now`` (s)."""
     table, plan, grounds = state.model.table, state.plan, grounds_of(state, renewed)
-    gram = current.gram
-    motion = gram.reshape(*gram.shape[:-2], -1).take(plan.energy, axis=-1)
+    motion = current.gram.reshape(-1).take(plan.energy)
     inflation = current.size * motion
     buried = motion < grounds.floor
     hidden = buried | (inflation > HOPELESS)
     poor = _poor(current)
     good = _narrow(grounds, current) & grounds.sound
     if np.count_nonzero(hidden):
-        good &= ~(hidden.take(table.unknown, axis=-1) & ~table.offset) & ~_lost_with(state, hidden)
+        good &= ~(hidden.take(table.unknown) & ~table.offset) & ~_lost_with(state, hidden)
     if np.count_nonzero(poor):
-        good &= ~poor.take(table.coefficient, axis=-1)
+        good &= ~poor.take(table.coefficient)
     codes = np.zeros(good.shape, np.uint8)
     if np.count_nonzero(good) < good.size:
-        reasons = _reasons(state, grounds, current, inflation, buried, poor)
-        np.copyto(codes, reasons, where=~good)
-    changed, stale = current.time - state.changed_at < SETTLING, now - current.time > STALE
-    if (changed | stale) is not False:  # one moment's is a plain bool
-        codes[changed] = status.CHANGED
-        codes[stale] = status.STALE
+        np.copyto(codes, _reasons(state, grounds, current, inflation, buried, poor), where=~good)
+    if current.time - state.changed_at < SETTLING:
+        codes[:] = status.CHANGED
+    if now - current.time > STALE:
+        codes[:] = status.STALE
     return codes
 
 
 def _narrow(grounds: Grounds, current: Present) -> Flags:
-    """(..., D) whether standard errors are small enough, and no rounding; and intervals have an end."""
+    """(D,) whether standard errors are small enough, and no rounding; and intervals have an end."""
     squares, allowed = current.values * current.values, grounds.allowed
     if grounds.relative is not None:
         allowed = np.maximum(allowed, np.minimum(grounds.relative * squares, grounds.longest))
@@ -118,31 +114,32 @@ def _narrow(grounds: Grounds, current: Present) -> Flags:
 
 
 def _poor(current: Present) -> Flags:
-    """(..., C) whether the model leaves most of a coefficient's motion unexplained: its interval means nothing then."""
+    """(C,) whether the model leaves most of a coefficient's motion unexplained: its interval means nothing then."""
     residual, motion = current.solution.residual, current.solution.motion
     poor: Flags = residual > POOR * np.maximum(motion, least_squares.TINY)
     return poor
 
 
 def _lost_with(state: State, hidden: Flags) -> Flags:
-    """(..., D) offsets that hold what a hidden slope (..., P) of their coefficient does."""
+    """(D,) offsets that hold what a hidden slope (P,) of their coefficient does."""
     table = state.model.table
-    return np.asarray(((hidden @ state.plan.mine) > 0.0).take(table.coefficient, axis=-1) & table.offset)
+    return np.asarray(((hidden @ state.plan.mine) > 0.0).take(table.coefficient) & table.offset)
 
 
 def _reasons(state: State, grounds: Grounds, current: Present, inflation: Array, buried: Flags, poor: Flags) -> Codes:
-    """(..., D) what speaks against each.
+    """(D,) what speaks against each.
 
-    ``inflation`` (..., P) of its unknown's variance, a regressor ``buried`` (..., P) in noise, a ``poor`` (..., C) fit.
+    ``inflation`` (P,) of its unknown's variance, a regressor ``buried`` (P,) in noise, a ``poor`` (C,) fit.
     """
     table, slope = state.model.table, ~state.model.table.offset
     # what is found later counts more
-    reasons = np.where(poor.take(table.coefficient, axis=-1), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
-    collinear = (inflation.take(table.unknown, axis=-1) > COLLINEAR) & slope
+    reasons = np.where(poor.take(table.coefficient), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
+    collinear = (inflation.take(table.unknown) > COLLINEAR) & slope
     if collinear.any():
-        rivals = least_squares.rivals(state.plan, current.solution).take(table.unknown, axis=-1)
+        rivals = least_squares.rivals(state.plan, current.solution).take(table.unknown)
         reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
-    reasons[buried.take(table.unknown, axis=-1) & slope] = status.NOT_EXCITED
+    reasons[buried.take(table.unknown) & slope] = status.NOT_EXCITED
     np.copyto(reasons, grounds.against, where=grounds.against != status.OK)
-    reasons[~current.solution.usable] = status.NOT_EXCITED
+    if not current.solution.usable:
+        reasons[:] = status.NOT_EXCITED
     return reasons

@@ -30,8 +30,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +40,6 @@ BLOCK = 16  # intervals in a block at most
 MOMENTS = 12
 _SPAN = 1.25  # rad, by which the highest line's phase turns in a block at most: 0.625^12 / 12! is 7e-12
 _LANES = 8  # vectors are padded to whole SIMD registers: a value's bits then do not depend on its place
-_PORTION = 384  # intervals that are taken in at once: what they need stays in the processor's caches
 
 
 @dataclass
@@ -91,15 +89,15 @@ def lines(start_hz: float, step_hz: float, stop_hz: float) -> Lines:
     return Lines(omega)
 
 
-def basis(grid: Lines, begins: Array) -> Array:
-    """(..., M, R) what each moment brings to each row, in blocks that begin at (...) s.
+def basis(grid: Lines, begin: float) -> Array:
+    """(M, R) what each moment brings to each row, in a block that begins at ``begin`` (s).
 
-    Moments are taken about the blocks' middles, in units of their halves.
+    Moments are taken about the block's middle, in units of its half.
     """
-    phase, P = (begins + grid.half)[..., None] * grid.padded, grid.padded.size
-    waves = np.ones((*phase.shape[:-1], 2 * P + 1))
-    waves[..., :P], waves[..., P : 2 * P] = np.cos(phase), np.sin(phase)
-    found: Array = waves.take(grid.waves, axis=-1)
+    phase, P = (begin + grid.half) * grid.padded, grid.padded.size
+    waves = np.ones(2 * P + 1)
+    waves[:P], waves[P : 2 * P] = np.cos(phase), np.sin(phase)
+    found: Array = waves.take(grid.waves)
     found *= grid.factors
     return found
 
@@ -116,92 +114,97 @@ def exact(grid: Lines, begin: float, end: float) -> Array:
     return found
 
 
-_PLACES = np.arange(BLOCK)
 #: The moments of such an interval are the area and the slant themselves.
 _ITSELF = np.eye(2, MOMENTS)
 #: Ratios of x^k / k to x^(k-1) / (k-1), over x.
 _RATIOS = np.maximum(np.arange(MOMENTS + 1.0), 1.0) / np.arange(1.0, MOMENTS + 2.0)
 
 
-def primitives(place: Any) -> Any:
-    """(..., M + 1) x^k / k of places x (..., 1), the integrals of x^(k-1) up to there, k from 1."""
-    return np.multiply.accumulate(place * _RATIOS, axis=-1)
-
-
-_FROM = primitives(-1.0)
-
-
-def weigh(before: Array, after: Array, left: Any, right: Any, step: Any, out: Array) -> None:
-    """Moments of an interval's area and slant into ``out`` (..., 2, M).
-
-    ``left`` and ``right`` (..., 1): its ends, from the block's middle in units of its half; ``before`` and ``after``:
-    their ``primitives``; ``step`` (..., 1) in s.
-    """
-    integrals, width = after - before, right - left
-    lower, even, odd = integrals[..., :-1], out[..., 0, :], out[..., 1, :]
-    np.multiply(lower, 1.0 / width, out=even)
-    np.multiply(lower, -0.5 * (right + left), out=odd)
-    odd += integrals[..., 1:]
-    odd *= 2.0 / (width * width * step)
+#: Primitives x^k / k at the beginning of a block, x = -1.
+_AT_BEGIN = np.multiply.accumulate(-_RATIOS)
 
 
 @dataclass
 class Transform:
-    """Running transform: the finished blocks and the one being filled."""
+    """Running transform: the finished blocks, and the block that is being filled."""
 
     grid: Lines
     width: int  # signals
     memory: float  # s: tau of the energy's decay, inf = none
-    done: Array  # (R, width + room) decayed to ``begin``
+    done: Array  # (R, width + room) the finished blocks, decayed to ``begin``
     kernels: Array  # (BLOCK, 2, M) moments of areas and slants in the unfinished block, zero behind them
     values: Array  # (BLOCK, 2, width + room) areas and slants
     waves: Array  # (M, R) what the unfinished block's moments bring to each row
-    before: Array  # (M + 1,) primitives of ``place``
-    place: float = -1.0  # where the last interval ended, from the block's middle in units of its half
+    powers: Array  # (BLOCK + 1, M + 1) x^k / k, k from 1, at the block's begin and at the intervals' ends x
+    place: float = -1.0  # end of the last interval, from the block's middle in units of its half
     count: int = 0  # intervals in the unfinished block
-    begin: float = -math.inf  # s: where it begins
+    begin: float = -math.inf  # s: where the unfinished block begins
     last: float = 0.0  # s: end of the last interval
 
 
 def start(grid: Lines, width: int, memory: float = math.inf, room: int = 0) -> Transform:
-    """Empty transform of ``width`` signals, with ``room`` for further columns, which stay zero."""
+    """An empty transform of ``width`` signals, with ``room`` for further columns, which stay zero."""
     done, values = np.zeros((grid.rows, width + room)), np.zeros((BLOCK, 2, width + room))
     kernels, waves = np.zeros((BLOCK, 2, MOMENTS)), np.zeros((MOMENTS, grid.rows))
-    return Transform(grid, width, memory, done, kernels, values, waves, _FROM)
+    powers = np.tile(_AT_BEGIN, (BLOCK + 1, 1))
+    return Transform(grid, width, memory, done, kernels, values, waves, powers)
 
 
-def add(state: Transform, begin: float, end: float, area: Array, slant: Array) -> None:
-    """Add the interval begin..end (s) with the signals' areas and slants (width,), see the module's text.
+def add(state: Transform, begins: Sequence[float], ends: Sequence[float], areas: Array, slants: Array) -> None:
+    """Add n consecutive intervals (s) with the signals' ``areas`` and ``slants`` (n, width), see the module's text.
 
-    Intervals follow each other without a gap, unless there is a ``restart`` between them.
+    Intervals follow each other without a gap, unless there is a ``restart`` between them. Intervals that are added
+    together give the same bits as those that are added one by one.
     """
-    grid = state.grid
-    if not state.count or state.count == BLOCK or end > state.begin + grid.span:
-        _begin_block(state, begin)
-    i, kernel = state.count, state.kernels[state.count]
-    if end > state.begin + grid.span:
-        state.waves, kernel[:] = exact(grid, begin, end), _ITSELF
-    else:
-        right = (end - state.begin) * grid.scale - 1.0
-        after = primitives(right)
-        weigh(state.before, after, state.place, right, end - begin, kernel)
-        state.place, state.before = right, after
-    if math.isfinite(state.memory):
-        kernel *= _growth(state.memory, 0.5 * (begin + end) - state.begin)
-    state.values[i, 0, : state.width] = area
-    state.values[i, 1, : state.width] = slant
-    state.count, state.last = i + 1, end
+    first, span = 0, state.grid.span
+    while first < len(ends):
+        if not state.count or state.count == BLOCK or ends[first] > state.begin + span:
+            _begin_block(state, begins[first])
+        stop = bisect_right(ends, state.begin + span, first, min(first + BLOCK - state.count, len(ends)))
+        stop = max(stop, first + 1)
+        filled = slice(state.count, state.count + stop - first)
+        if ends[first] > state.begin + span:  # an interval that is longer than a block is a block of its own
+            state.waves, state.kernels[0] = exact(state.grid, begins[first], ends[first]), _ITSELF
+        else:
+            _set_moments(state, begins[first:stop], ends[first:stop], filled)
+        if math.isfinite(state.memory):
+            middles = [0.5 * (a + b) - state.begin for a, b in zip(begins[first:stop], ends[first:stop], strict=True)]
+            state.kernels[filled] *= np.array([_growth(state.memory, middle) for middle in middles])[:, None, None]
+        state.values[filled, 0, : state.width] = areas[first:stop]
+        state.values[filled, 1, : state.width] = slants[first:stop]
+        state.count, state.last, first = filled.stop, ends[stop - 1], stop
+
+
+def _set_moments(state: Transform, begins: Sequence[float], ends: Sequence[float], filled: slice) -> None:
+    """Set the moments of the areas and slants of intervals that lie within the block under way.
+
+    What is computed per interval is cheaper with Python's floats than with short arrays.
+    """
+    place, scale, weights, places = state.place, state.grid.scale, [], []
+    for begin, end in zip(begins, ends, strict=True):
+        left, place = place, (end - state.begin) * scale - 1.0
+        width = place - left
+        places.append(place)
+        weights.append((1.0 / width, -0.5 * (place + left), 2.0 / (width * width * (end - begin))))
+    powers, state.place = state.powers[filled.start : filled.stop + 1], place
+    np.multiply.accumulate(np.multiply.outer(places, _RATIOS), axis=-1, out=powers[1:])
+    integrals, factors = powers[1:] - powers[:-1], np.array(weights)[:, :, None]
+    of_area, of_slant = state.kernels[filled, 0], state.kernels[filled, 1]
+    np.multiply(integrals[:, :-1], factors[:, 0], out=of_area)
+    np.multiply(integrals[:, :-1], factors[:, 1], out=of_slant)
+    of_slant += integrals[:, 1:]
+    of_slant *= factors[:, 2]
 
 
 def _begin_block(state: Transform, begin: float) -> None:
     """Finish the block under way, if there is one, and begin another at ``begin`` (s)."""
     if state.count:
-        state.done = _total(state.done, state.waves, state.kernels, state.values)
+        state.done = _total(state)
     if math.isfinite(state.memory):
         state.done *= _growth(state.memory, state.begin - begin)
     state.begin, state.count, state.kernels[:] = begin, 0, 0.0
-    state.waves = basis(state.grid, np.array(begin))
-    state.place, state.before = -1.0, _FROM
+    state.waves = basis(state.grid, begin)
+    state.place = -1.0
 
 
 def _growth(memory: float, time: float) -> float:
@@ -209,135 +212,12 @@ def _growth(memory: float, time: float) -> float:
     return math.exp(time / (2.0 * memory))
 
 
-def _total(done: Array, waves: Array, kernels: Array, values: Array) -> Array:
+def _total(state: Transform) -> Array:
     """(R, width + room) the finished blocks and the unfinished one's part."""
-    total: Array = waves.T.dot(kernels.reshape(-1, MOMENTS).T.dot(values.reshape(-1, values.shape[-1])))
-    total += done
+    moments = state.kernels.reshape(-1, MOMENTS).T.dot(state.values.reshape(-1, state.values.shape[-1]))
+    total: Array = state.waves.T.dot(moments)
+    total += state.done
     return total
-
-
-class _Blocks(NamedTuple):
-    """Consecutive blocks, of which the first is under way."""
-
-    begins: Array  # (n,) s
-    ends: list[int]  # (n,) how many of the intervals given lie before the end of each
-    kernels: Array  # (n, BLOCK, 2, M) as in ``Transform``
-    values: Array  # (n, BLOCK, 2, width + room)
-    waves: Array  # (n, M, R)
-
-
-def add_many(
-    state: Transform, begins: Array, ends: Array, areas: Array, slants: Array, stops: Sequence[int] = ()
-) -> Array:
-    """``add`` for N consecutive intervals, to the last bit.
-
-    ``begins`` and ``ends`` (N,) s; ``areas`` and ``slants`` (N, width). Returns (K, R, width + room) what ``current``
-    is after so many of the intervals, at least one, as the K ``stops`` say, which do not decrease.
-    """
-    found, told = np.empty((len(stops), *state.done.shape)), 0
-    if ends.size and not state.count:
-        _begin_block(state, float(begins[0]))
-    for first in range(0, ends.size, _PORTION):
-        part, upto = slice(first, first + _PORTION), bisect_right(stops, first + _PORTION)
-        blocks = _blocks(state, begins[part], ends[part], areas[part], slants[part])
-        inside = [stop - first for stop in stops[told:upto]]
-        _sum_up(state, blocks, ends[part], inside, found[told:upto])
-        told = upto
-    return found
-
-
-def _cut(
-    begin: float, count: int, span: float, begins: list[float], ends: list[float]
-) -> tuple[list[float], list[int]]:
-    """Begins (s) and ends, as in ``_Blocks``, of the blocks that take in intervals.
-
-    The first of them began at ``begin`` (s) and holds ``count`` intervals already; none is longer than ``span`` (s).
-    """
-    starts, stops, at = [begin], [], 0
-    while True:
-        fit = bisect_right(ends, starts[-1] + span, at, min(at + BLOCK - count, len(ends)))
-        # an interval that is too long is a block of its own
-        at = fit if count else max(fit, at + 1)
-        stops.append(at)
-        if at == len(ends):
-            return starts, stops
-        starts.append(begins[at])
-        count = 0
-
-
-def _blocks(state: Transform, begins: Array, ends: Array, areas: Array, slants: Array) -> _Blocks:
-    """The blocks that take in these intervals."""
-    grid, held = state.grid, state.count
-    starts, stops = _cut(state.begin, held, grid.span, begins.tolist(), ends.tolist())
-    begin, firsts = np.array(starts), np.array([0, *stops[:-1]])
-    which = np.repeat(np.arange(begin.size), np.diff(stops, prepend=0))
-    weighed, waves = _weighed(state, begin[which], firsts[1:], begins, ends), basis(grid, begin)
-    kernels, values = np.zeros((begin.size, BLOCK, 2, MOMENTS)), np.zeros((begin.size, *state.values.shape))
-    for i, (first, stop) in enumerate(zip(firsts.tolist(), stops, strict=True)):
-        given, place = slice(first, stop), slice(0 if i else held, stop - first + (0 if i else held))
-        kernels[i, place] = weighed[given]
-        values[i, place, 0, : state.width], values[i, place, 1, : state.width] = areas[given], slants[given]
-    kernels[0, :held], values[0, :held], waves[0] = state.kernels[:held], state.values[:held], state.waves
-    for i in np.flatnonzero(ends > begin[which] + grid.span).tolist():
-        waves[which[i]] = exact(grid, float(begins[i]), float(ends[i]))
-    return _Blocks(begin, stops, kernels, values, waves)
-
-
-def _weighed(state: Transform, origin: Array, firsts: NDArray[np.intp], begins: Array, ends: Array) -> Array:
-    """(N, 2, M) moments of intervals in blocks that begin at ``origin`` (N,) s; ``firsts`` begin another block."""
-    grid = state.grid
-    right = (ends - origin) * grid.scale - 1.0
-    after = primitives(right[:, None])
-    left, before = np.append(state.place, right[:-1]), np.concatenate([state.before[None], after[:-1]])
-    left[firsts], before[firsts] = -1.0, _FROM
-    kernels = np.empty((ends.size, 2, MOMENTS))
-    weigh(before, after, left[:, None], right[:, None], (ends - begins)[:, None], kernels)
-    kernels[ends > origin + grid.span] = _ITSELF
-    if math.isfinite(state.memory):
-        since = 0.5 * (begins + ends) - origin
-        kernels *= np.array([_growth(state.memory, time) for time in since.tolist()])[:, None, None]
-    state.place, state.before = float(right[-1]), after[-1]
-    return kernels
-
-
-def _sum_up(state: Transform, blocks: _Blocks, ends: Array, stops: Sequence[int], found: Array) -> None:
-    """Finish all blocks but the last, which is under way then; ``found`` (K, R, width + room): what is at the stops."""
-    fades, first, told = math.isfinite(state.memory), -state.count, 0
-    parts = _summed(blocks.waves, blocks.kernels, blocks.values)
-    _sum_to(blocks, first, stops, found)
-    for i, end in enumerate(blocks.ends):
-        if i:
-            begin, first = float(blocks.begins[i]), blocks.ends[i - 1]
-            state.done = parts[i - 1] + state.done
-            if fades:
-                state.done *= _growth(state.memory, state.begin - begin)
-            state.begin = begin
-        while told < len(stops) and stops[told] <= end:
-            found[told] += state.done
-            if fades:
-                found[told] *= _growth(state.memory, state.begin - float(ends[stops[told] - 1]))
-            told += 1
-    state.kernels, state.values = blocks.kernels[-1].copy(), blocks.values[-1].copy()
-    state.waves, state.count, state.last = blocks.waves[-1].copy(), blocks.ends[-1] - first, float(ends[-1])
-
-
-def _sum_to(blocks: _Blocks, first: int, stops: Sequence[int], found: Array) -> None:
-    """Into ``found`` what the blocks of the stops bring up to there; the first block begins with interval ``first``."""
-    which = np.searchsorted(blocks.ends, stops)
-    count = np.array(stops, np.intp) - np.array([first, *blocks.ends[:-1]])[which]
-    kernels = blocks.kernels[which] * (count[:, None] > _PLACES)[:, :, None, None]
-    _summed(blocks.waves[which], kernels, blocks.values[which], found)
-
-
-def _summed(waves: Array, kernels: Array, values: Array, out: Array | None = None) -> Array:
-    """(n, R, width + room) what n blocks bring, see ``Transform``."""
-    sums = _in_rows(kernels).swapaxes(-1, -2) @ _in_rows(values)
-    return np.asarray(np.matmul(waves.swapaxes(-1, -2), sums, out=out))
-
-
-def _in_rows(blocks: Array) -> Array:
-    """(n, 2 BLOCK, ...) of blocks (n, BLOCK, 2, ...)."""
-    return blocks.reshape(len(blocks), 2 * BLOCK, blocks.shape[-1])
 
 
 def restart(state: Transform, time: float) -> None:
@@ -345,14 +225,8 @@ def restart(state: Transform, time: float) -> None:
     state.done, state.count, state.last = np.zeros_like(state.done), 0, time
 
 
-def as_it_was(state: Transform, time: float, lines: Array) -> Transform:
-    """The transform of an earlier ``time`` (s), as ``current`` told it then."""
-    kernels, values = np.zeros_like(state.kernels), np.zeros_like(state.values)
-    return replace(state, done=lines, kernels=kernels, values=values, count=0, begin=time, last=time)
-
-
 def take_out(state: Transform, part: Array) -> None:
-    """Forget a ``part`` (R, width) of the transform up to the last sample, such as all up to some time ago."""
+    """Forget a ``part`` (R, width + room) of the transform up to the last sample, such as all up to some time ago."""
     state.done = current(state) - part
     state.begin, state.count = state.last, 0
 
@@ -361,7 +235,7 @@ def current(state: Transform) -> Array:
     """(R, width + room) the transform up to the last sample: real parts, imaginary parts, integrals."""
     if not state.count:
         return state.done.copy()
-    total = _total(state.done, state.waves, state.kernels, state.values)
+    total = _total(state)
     if math.isfinite(state.memory):
         total *= _growth(state.memory, state.begin - state.last)
     return total

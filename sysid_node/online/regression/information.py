@@ -29,7 +29,6 @@ from scipy.linalg.blas import dger
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression.heteroskedasticity import Unevenness
 from sysid_node.online.regression.instruments import Auxiliary, fill_in
-from sysid_node.online.regression.matrices import product
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
@@ -173,14 +172,13 @@ def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
 
 
 def products(transform: Array, model: Auxiliary | None) -> Array:
-    """(..., W, W) Gram matrices of transforms' (..., 2F + 1, W) clean lines, constant and drift projected out.
+    """(W, W) Gram matrix of a transform's (2F + 1, W) clean lines, constant and drift projected out.
 
-    The transforms are used up.
+    The transform is overwritten.
     """
     lines = about_mean(transform, model)
-    gram = product(lines.swapaxes(-1, -2), lines)
-    for one in gram.reshape(-1, *gram.shape[-2:]):
-        _project_out(one)
+    gram: Array = lines.T.dot(lines)
+    _project_out(gram)
     return gram
 
 

@@ -18,7 +18,6 @@ from scipy.special import stdtrit
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression import heteroskedasticity
 from sysid_node.online.regression.information import BANDS, Information
-from sysid_node.online.regression.matrices import diagonal, product
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -118,51 +117,34 @@ def without(full: Plan, blocks: tuple[int, ...]) -> Plan:
 
 @dataclass
 class Solution:
-    """Solution of all coefficients' normal equations, or of several: then all have a further axis in front.
-
-    ``usable`` is False where the equations are singular.
-    """
+    """Solution of all coefficients' normal equations. ``usable`` is False where the equations are singular."""
 
     theta: Array  # (P, C), zero where an unknown does not belong
     inverse: Array  # (P, P) of Z'A (of A'A in least squares)
     residual: Array  # (C,) sum of squares
     motion: Array  # (C,) sum of squares of what is to be explained
-    usable: NDArray[np.bool_]  # ()
+    usable: bool | NDArray[np.bool_]  # an array where solutions are stacked
 
 
 def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
-    """Solve (Z'A - bias) theta = Z'y - bias from summed Gram matrices (..., W, W); ``bias`` is from ``bias_of``.
+    """Solve (Z'A - bias) theta = Z'y - bias from a summed Gram matrix (W, W); ``bias`` is from ``bias_of``.
 
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
     """
-    P, several = plan.columns.size, gram.shape[:-2]
-    flat = gram.reshape(*several, gram.shape[-1] ** 2)
-    gathered = flat.take(plan.entries, axis=-1)
+    P, flat = plan.columns.size, gram.reshape(-1)
+    gathered = flat.take(plan.entries)
     gathered *= plan.counted
-    normal, cross = gathered[..., 0, :, :], gathered[..., 1, :, :]
+    normal, cross = gathered
     if bias is not None:
         cross -= bias
-    if several:
-        solved, usable = _each(plan, cross)
-    else:
-        solved, fine = _factorised(plan, cross)
-        usable = np.array(fine)
-    theta = solved[..., P:]
+    solved, usable = _factorised(plan, cross)
+    theta = solved[:, P:]
     # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
-    row = theta.swapaxes(-1, -2)
-    misfit = product(row, normal[..., :P, :])
-    misfit -= normal[..., P:, :]
-    motion = flat.take(plan.square, axis=-1)
-    residual: Array = np.maximum(diagonal(product(misfit, theta)) + motion, ROUNDING * motion)
-    return Solution(theta, solved[..., :P], residual, motion, usable)
-
-
-def _each(plan: Plan, cross: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """``_factorised`` of each of K moments, each laid out in memory as one alone is: equal bits need equal strides."""
-    solved, usable = np.empty(cross.shape).swapaxes(-1, -2), np.empty(len(cross), dtype=bool)
-    for k, one in enumerate(cross):
-        solved[k], usable[k] = _factorised(plan, one)
-    return solved, usable
+    misfit = theta.T.dot(normal[:P])
+    misfit -= normal[P:]
+    motion = flat.take(plan.square)
+    residual: Array = np.maximum(misfit.dot(theta).diagonal() + motion, ROUNDING * motion)
+    return Solution(theta, solved[:, :P], residual, motion, usable)
 
 
 def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
@@ -279,10 +261,10 @@ def student_95(freedom: Array) -> Array:
 
 
 def rivals(plan: Plan, solution: Solution) -> Index:
-    """(..., P) of each unknown the one of the same equation whose estimate is most correlated with its own."""
-    spread = np.sqrt(np.abs(diagonal(solution.inverse)))
+    """(P,) of each unknown the one of the same equation whose estimate is most correlated with its own."""
+    spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     # each row's own spread is common to all of it
-    correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)[..., None, :]
+    correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
     correlation *= plan.same - plan.unit
     rival: Index = correlation.argmax(axis=-1)
     return rival

@@ -28,9 +28,9 @@ def beliefs(aircraft: Aircraft, plan: Plan) -> tuple[Array, Array]:
 
 
 def weighed(plan: Plan, theta: Array, covariance: Array, values: Array, precisions: Array) -> tuple[Array, Array]:
-    """``theta`` (..., P, C) and its ``covariance`` (C, P, P) with the beliefs counted in."""
+    """``theta`` (P, C) and its ``covariance`` (C, P, P) with the beliefs counted in."""
     believed = covariance @ (precisions * values).T[:, :, None]
     # gain form: needs no inverse of a covariance that may be near singular
     gain = plan.unit + covariance * precisions.T[:, None]
-    found = np.linalg.solve(gain, theta.swapaxes(-1, -2)[..., None] + believed)
-    return np.asarray(found[..., 0].swapaxes(-1, -2)), np.asarray(np.linalg.solve(gain, covariance))
+    found = np.linalg.solve(gain, theta.T[..., None] + believed)
+    return np.asarray(found[..., 0].T), np.asarray(np.linalg.solve(gain, covariance))

@@ -89,7 +89,7 @@ def _variances(covariance: Array, mean: Array) -> Array:
 
 
 def reach(squares: Array, bend: Bend) -> tuple[Array, Array]:
-    """How far intervals (..., D) go below and above the estimates, of which ``squares`` are t^2 se^2."""
+    """How far the intervals (D,) go below and above the estimates, of which ``squares`` are t^2 se^2."""
     h = squares * bend.counted
     left = 1.0 - h * bend.curve
     endless = left < ROUNDING

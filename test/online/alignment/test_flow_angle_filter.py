@@ -13,7 +13,7 @@ from plant import TRUTH, fly, made_aircraft, multisteps
 from scipy.signal import butter, sosfiltfilt
 
 from sysid_node.aircraft.model import Aircraft, Derivative
-from sysid_node.online import estimator, whole_record
+from sysid_node.online import estimator, replay
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.alignment.flow_angle_filter import ALPHA, BETA
 from sysid_node.online.estimates.published import estimate
@@ -50,7 +50,7 @@ def wrong(name: str, tolerances: float) -> Aircraft:
 
 def identify(samples: Array, aircraft: Aircraft = AIRCRAFT) -> Estimates:
     time = flown()[0]
-    return whole_record.run(aircraft, Settings(), time, samples, time[-1:])[0]
+    return replay.run(aircraft, Settings(), time, samples, time[-1:])[0]
 
 
 def completed(aircraft: Aircraft, time: Array, samples: Array) -> Array:
@@ -123,7 +123,7 @@ def test_a_record_at_once_equals_its_samples_one_by_one(columns: tuple[int, ...]
     state = estimator.init(AIRCRAFT, Settings())
     for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, t, sample)
-    whole = whole_record.run(AIRCRAFT, Settings(), time, samples, time[-1:])[0]
+    whole = replay.run(AIRCRAFT, Settings(), time, samples, time[-1:])[0]
     assert repr(estimate(state, time[-1])) == repr(whole)
 
 

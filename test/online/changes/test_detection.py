@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 from plant import TRUTH, exact_flight, fly, made_aircraft, multisteps
 
+from sysid_node.online.replay import run
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.types import Estimates
-from sysid_node.online.whole_record import run
 
 Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()

@@ -15,11 +15,11 @@ from sysid_node.online import estimator
 from sysid_node.online.estimates.current_solution import present
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.validity import STALE
+from sysid_node.online.replay import run
 from sysid_node.online.segment_update import renew
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.state import State
 from sysid_node.online.types import SAMPLE_COLUMNS, DerivativeEstimate
-from sysid_node.online.whole_record import run
 
 Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()

@@ -27,7 +27,8 @@ def fed(grid: Lines, time: Array, signals: Array, memory: float = math.inf) -> T
     state = fourier_transform.start(grid, signals.shape[1], memory)
     for (begin, end), (before, after) in zip(pairwise(time.tolist()), pairwise(signals), strict=True):
         step = end - begin
-        fourier_transform.add(state, begin, end, 0.5 * step * (before + after), 0.5 * step**2 * (after - before))
+        area, slant = 0.5 * step * (before + after), 0.5 * step**2 * (after - before)
+        fourier_transform.add(state, [begin], [end], area[None], slant[None])
     return state
 
 
@@ -81,7 +82,7 @@ def test_increments_are_the_transform_of_the_derivative_with_its_boundary_terms(
     x = np.random.default_rng(2).normal(size=(200, 1)).cumsum(axis=0)
     slopes = fourier_transform.start(GRID, 1)
     for (begin, end), (before, after) in zip(pairwise(time.tolist()), pairwise(x), strict=True):
-        fourier_transform.add(slopes, begin, end, after - before, np.zeros(1))
+        fourier_transform.add(slopes, [begin], [end], (after - before)[None], np.zeros((1, 1)))
     X, w = complexes(fourier_transform.current(fed(GRID, time, x))), GRID.omega[:, None]
     ends = x[-1] * np.exp(-1j * w * time[-1]) - x[0] * np.exp(-1j * w * time[0])
     np.testing.assert_allclose(complexes(fourier_transform.current(slopes)), 1j * w * X + ends, rtol=0, atol=3e-8)
@@ -156,27 +157,15 @@ def test_the_recursion_is_the_sum_in_closed_form_at_every_sample(memory: float) 
 @pytest.mark.parametrize("split", [1, 7, BLOCK, 2 * BLOCK + 3])
 def test_many_at_once_are_the_same_bits(memory: float, split: int) -> None:
     time = irregular(3 * BLOCK)
+    time[2 * BLOCK - 5 :] += 3.0 * GRID.span  # an interval longer than a block
     signals = np.random.default_rng(5).normal(size=(time.size, 3))
     single = fed(GRID, time, signals, memory)
     many = fourier_transform.start(GRID, 3, memory)
     areas, slants = parts(time, signals)
     for some in (slice(0, split), slice(split, None)):
-        intervals = time[:-1][some], time[1:][some]
-        fourier_transform.add_many(many, *intervals, areas[some], slants[some])
+        begins, ends = time[:-1][some].tolist(), time[1:][some].tolist()
+        fourier_transform.add(many, begins, ends, areas[some], slants[some])
     assert fourier_transform.current(single).tobytes() == fourier_transform.current(many).tobytes()
-
-
-@pytest.mark.parametrize("memory", [math.inf, 2.0])
-def test_many_at_once_tell_what_was_current_on_the_way(memory: float) -> None:
-    time = irregular(9 * BLOCK)
-    signals = np.random.default_rng(7).normal(size=(time.size, 3))
-    stops = [1, 5, 5, BLOCK, 4 * BLOCK - 1, 4 * BLOCK, 4 * BLOCK + 1, 8 * BLOCK, time.size - 1]
-    many = fourier_transform.start(GRID, 3, memory)
-    areas, slants = parts(time, signals)
-    found = fourier_transform.add_many(many, time[:-1], time[1:], areas, slants, stops)
-    for stop, lines in zip(stops, found, strict=True):
-        one = fed(GRID, time[: stop + 1], signals[: stop + 1], memory)
-        assert lines.tobytes() == fourier_transform.current(one).tobytes()
 
 
 def test_phases_are_right_after_ten_hours() -> None:
@@ -208,26 +197,6 @@ def test_what_is_taken_out_leaves_what_came_after(memory: float, cut: int) -> No
 
 
 @pytest.mark.parametrize("memory", [math.inf, 2.0])
-def test_the_transform_as_it_was_can_be_forgotten_without_touching_what_goes_on(memory: float) -> None:
-    """What is taken out of it, and that it begins anew, is its own; samples that follow give the same bits."""
-    time = irregular(2 * BLOCK + 5)
-    signals = np.random.default_rng(10).normal(size=(time.size, 3))
-    cut = BLOCK + 3
-    running, there = fed(GRID, time, signals, memory), fed(GRID, time[: cut + 1], signals[: cut + 1], memory)
-    earlier, expected = fourier_transform.current(there), fourier_transform.current(running).tobytes()
-    past = fourier_transform.as_it_was(running, float(time[cut]), earlier.copy())
-    assert fourier_transform.current(past).tobytes() == earlier.tobytes()
-    areas, slants = parts(time[cut : cut + 2], signals[cut : cut + 2])
-    for state in (past, there):
-        fourier_transform.take_out(state, 0.3 * earlier)
-    assert fourier_transform.current(past).tobytes() == fourier_transform.current(there).tobytes()
-    assert fourier_transform.current(running).tobytes() == expected
-    for state in (past, there):
-        fourier_transform.add(state, float(time[cut]), float(time[cut + 1]), areas[0], slants[0])
-    assert fourier_transform.current(past).tobytes() == fourier_transform.current(there).tobytes()
-
-
-@pytest.mark.parametrize("memory", [math.inf, 2.0])
 def test_after_a_restart_nothing_is_left_of_what_was_before(memory: float) -> None:
     time = irregular(3 * BLOCK)
     signals = np.random.default_rng(9).normal(size=(time.size, 3))
@@ -235,6 +204,7 @@ def test_after_a_restart_nothing_is_left_of_what_was_before(memory: float) -> No
     fourier_transform.restart(again, float(time[20]))
     for (begin, end), (one, other) in zip(pairwise(time[20:].tolist()), pairwise(signals[20:]), strict=True):
         step = end - begin
-        fourier_transform.add(again, begin, end, 0.5 * step * (one + other), 0.5 * step**2 * (other - one))
+        area, slant = 0.5 * step * (one + other), 0.5 * step**2 * (other - one)
+        fourier_transform.add(again, [begin], [end], area[None], slant[None])
     expected = fourier_transform.current(fed(GRID, time[20:], signals[20:], memory))
     np.testing.assert_allclose(fourier_transform.current(again), expected, rtol=1e-12, atol=1e-14)

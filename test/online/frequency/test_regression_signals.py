@@ -11,9 +11,9 @@ from sysid_node.aircraft.model import Aircraft, Control, Derivative, Inertia, Se
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.frequency import regression_signals
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import SAMPLE_COLUMNS
-from sysid_node.online.whole_record import run
 
 LEAST_SQUARES = Settings(method="sls_rft", detect_changes=False)
 FLAP = Control("flap", "df", {"flap": 1.0})

@@ -12,8 +12,8 @@ from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import information
 from sysid_node.online.regression.information import BANDS
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
-from sysid_node.online.whole_record import run
 
 Array = NDArray[np.float64]
 GRID = fourier_transform.lines(0.1, 0.1, 2.0)
@@ -26,7 +26,7 @@ def transformed(time: Array, signals: Array, memory: float = math.inf) -> Array:
     steps = np.diff(time)
     areas = 0.5 * steps[:, None] * (signals[1:] + signals[:-1])
     slants = 0.5 * steps[:, None] ** 2 * (signals[1:] - signals[:-1])
-    fourier_transform.add_many(state, time[:-1], time[1:], areas, slants)
+    fourier_transform.add(state, time[:-1].tolist(), time[1:].tolist(), areas, slants)
     return fourier_transform.current(state)
 
 

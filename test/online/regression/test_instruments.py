@@ -7,8 +7,8 @@ from sysid_node.online.frequency import fourier_transform, regression_signals
 from sysid_node.online.regression import instruments
 from sysid_node.online.regression.information import about_mean
 from sysid_node.online.regression.instruments import INSTRUMENTED
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
-from sysid_node.online.whole_record import run
 
 AIRCRAFT = made_aircraft()
 LAYOUT = regression_signals.layout(AIRCRAFT, INSTRUMENTED)
@@ -59,10 +59,10 @@ def test_they_follow_the_motion_of_a_flight() -> None:
     rows.insert(regression_signals.OFFSET + 2, time)
     values, steps = np.stack(rows, axis=1), np.diff(time)
     state = fourier_transform.start(grid, LAYOUT.transformed, room=len(LAYOUT.instrumented))
-    fourier_transform.add_many(
+    fourier_transform.add(
         state,
-        time[:-1],
-        time[1:],
+        time[:-1].tolist(),
+        time[1:].tolist(),
         0.5 * steps[:, None] * (values[1:] + values[:-1]),
         0.5 * steps[:, None] ** 2 * np.diff(values, axis=0),
     )

@@ -10,8 +10,8 @@ from sysid_node.aircraft.model import Derivative
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.mixed_estimation import beliefs, weighed
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
-from sysid_node.online.whole_record import run
 
 AIRCRAFT = made_aircraft()
 PLAN = least_squares.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))

@@ -11,8 +11,8 @@ from plant import TRUTH, exact_flight, fly, made_aircraft, multisteps
 from sysid_node.aircraft.model import DEFAULT_NOISE, Aircraft
 from sysid_node.online.frequency import fourier_transform, regression_signals
 from sysid_node.online.regression import least_squares, regressor_noise
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
-from sysid_node.online.whole_record import run
 
 Array = NDArray[np.float64]
 NOISY = made_aircraft(noise={**DEFAULT_NOISE, "alpha": 0.02, "beta": 0.02})

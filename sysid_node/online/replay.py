@@ -1,0 +1,47 @@
+"""Estimates along a record of aligned samples, by the same calls in the same order as in the live node.
+
+So a replay equals the live run to the last bit, without a second implementation. A replay calls ``update`` with every
+sample and ``estimate`` where an estimate falls due. Only the alignment has a twin that works on the whole record at
+once; ``alignment.whole_record`` says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online import estimator
+from sysid_node.online.estimates.published import estimate
+from sysid_node.online.settings import Settings
+from sysid_node.online.types import Estimates
+
+Array = NDArray[np.float64]
+REPORT_EVERY = 512  # samples between reports of progress
+
+
+def run(
+    aircraft: Aircraft,
+    settings: Settings,
+    time: Array,
+    samples: Array,
+    publish_times: Array,
+    progress: Callable[[float], None] | None = None,
+) -> list[Estimates]:
+    """Estimates as they stand after the first sample at or past each of ``publish_times`` (K,) s, at most one a sample.
+
+    ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them. ``progress`` is called with the
+    time (s) of the last sample, every ``REPORT_EVERY`` samples and at the end.
+    """
+    state = estimator.init(aircraft, settings)
+    due = set(np.searchsorted(time, publish_times, side="left").tolist())
+    estimates = []
+    for i, moment in enumerate(time.tolist()):
+        estimator.update(state, moment, samples[i].tolist())
+        if i in due:
+            estimates.append(estimate(state, moment))
+        if progress is not None and ((i + 1) % REPORT_EVERY == 0 or i + 1 == time.size):
+            progress(moment)
+    return estimates
