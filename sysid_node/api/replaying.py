@@ -25,9 +25,9 @@ from sysid_node.flight.truth import Truth, truth_at_end
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import Aligned, align_streams
+from sysid_node.online.replay import run as run_online
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
-from sysid_node.online.replay import run as run_online
 from sysid_node.report.files.bag_folder import remove_earlier_bag
 from sysid_node.report.files.estimates_bag import write_estimates
 from sysid_node.report.files.run_folder import REPORT, write_run

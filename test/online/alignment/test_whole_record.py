@@ -18,7 +18,7 @@ AIRCRAFT = made_aircraft()
 
 def assert_same_bits(streams, max_gap=0.2):
     bulk = align_streams(AIRCRAFT, streams, max_gap)
-    single = whole_record._align_one_by_one(AIRCRAFT, streams, max_gap)
+    single = whole_record.align_by_message(AIRCRAFT, streams, max_gap)
     assert bulk.time.tobytes() == single.time.tobytes()
     assert bulk.samples.tobytes() == single.samples.reshape(bulk.samples.shape).tobytes()
     assert bulk.stamps.tobytes() == single.stamps.tobytes()
@@ -28,7 +28,7 @@ def assert_same_bits(streams, max_gap=0.2):
 
 
 def is_regular(streams, max_gap=0.2):
-    return whole_record._is_regular(align(AIRCRAFT, streams, max_gap), streams, max_gap)
+    return whole_record.is_regular(align(AIRCRAFT, streams, max_gap), streams, max_gap)
 
 
 def changed(streams: Streams, topic: str, change) -> Streams:
