@@ -24,7 +24,7 @@ from sysid_node.online.changes.excited_segments import experiences
 from sysid_node.online.frequency import fourier_transform, regression_signals, sampled_transform
 from sysid_node.online.frequency.regression_signals import NUISANCES, OUTPUTS
 from sysid_node.online.frequency.sampled_transform import SampledTransform
-from sysid_node.online.regression import information, least_squares
+from sysid_node.online.regression import information, normal_equations
 from sysid_node.online.regression.derivative_index import table
 from sysid_node.online.regression.instruments import INSTRUMENTED, auxiliary_model
 from sysid_node.online.regression.mixed_estimation import beliefs
@@ -54,7 +54,7 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
     # lines are independent over one period of their spacing; windows and forgetting want several segments
     segment_time = min(1.0 / settings.frequencies[1], settings.window / 5.0 or math.inf, 2.0 * memory)
     grid = fourier_transform.lines(*settings.frequencies)
-    plan = least_squares.plan(structure, layout)
+    plan = normal_equations.plan(structure, layout)
     model = Model(
         aircraft=aircraft,
         settings=settings,

@@ -28,13 +28,15 @@ from sysid_node.online.regression import (
     heteroskedasticity,
     information,
     least_squares,
+    normal_equations,
     regressor_noise,
     weak_instruments,
 )
 from sysid_node.online.regression.actuator_lag_test import Timing
 from sysid_node.online.regression.heteroskedasticity import Unevenness
 from sysid_node.online.regression.information import Information
-from sysid_node.online.regression.least_squares import Hold, Plan, Solution, Uncertainty
+from sysid_node.online.regression.least_squares import Hold, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import Plan
 from sysid_node.online.regression.selection_bias import prudence
 from sysid_node.online.state import Renewed, State
 
@@ -195,7 +197,7 @@ def _solve(state: State, total: Information, gram: Array) -> tuple[Hold, Solutio
     """The instruments' hold, the solution by the plan that it allows, and the noise's part in the equations."""
     full, last = state.model.plan, state.renewed
     hold = least_squares.hold(full, least_squares.solve(full, gram), total)
-    plan = state.plan = least_squares.trusting(full, hold.strength)
+    plan = state.plan = normal_equations.trusting(full, hold.strength)
     compensation = None
     if last is not None and last.solution.usable:
         share = regressor_noise.allowed(

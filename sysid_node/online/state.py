@@ -20,7 +20,8 @@ from sysid_node.online.regression.derivative_index import Table
 from sysid_node.online.regression.heteroskedasticity import Unevenness
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.instruments import Auxiliary
-from sysid_node.online.regression.least_squares import Hold, Plan, Solution, Uncertainty
+from sysid_node.online.regression.least_squares import Hold, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import Plan
 from sysid_node.online.regression.weak_instruments import Bend
 from sysid_node.online.settings import Settings
 from sysid_node.online.status import Codes, Vocabulary

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.frequency.regression_signals import Layout
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, Information, nothing
-from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 STRUCTURE = {
@@ -48,5 +48,5 @@ def information(lines: Array, density: float) -> Information:
     return info
 
 
-PLAIN = least_squares.plan(STRUCTURE, layout())
-INSTRUMENTAL = least_squares.plan(STRUCTURE, layout(INSTRUMENTED))
+PLAIN = normal_equations.plan(STRUCTURE, layout())
+INSTRUMENTAL = normal_equations.plan(STRUCTURE, layout(INSTRUMENTED))

@@ -9,13 +9,13 @@ from sysid_node.online.estimates.current_solution import present
 from sysid_node.online.estimates.published import estimate, estimate_of
 from sysid_node.online.estimates.validity import SETTLING, STALE, judge
 from sysid_node.online.frequency import regression_signals
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import normal_equations
 from sysid_node.online.settings import METHODS, Settings
 from sysid_node.online.state import State
 from sysid_node.online.status import vocabulary
 
 AIRCRAFT = made_aircraft()
-PLAN = least_squares.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
+PLAN = normal_equations.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
 
 
 def flown(seconds: float, method: str = "iv_rft") -> State:

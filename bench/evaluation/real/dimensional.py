@@ -17,7 +17,7 @@ from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.frequency.fourier_transform import Lines
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
-from sysid_node.online.regression import information, least_squares
+from sysid_node.online.regression import information, least_squares, normal_equations
 from sysid_node.online.regression.information import Information, Spectrum
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def regress(
     ``rates``: the left sides are the signals' rates of change. ``breaks`` (s): where the record begins anew.
     """
     layout = Layout(tuple(regressors))
-    plan = least_squares.plan(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
+    plan = normal_equations.plan(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
     grid = fourier_transform.lines(*frequencies)
     lines = information.spectrum(grid.omega, np.inf)
     total = information.nothing(layout)

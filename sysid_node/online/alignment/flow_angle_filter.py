@@ -31,7 +31,8 @@ from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.forces import lift_and_drag
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression.information import Information, Spectrum
-from sysid_node.online.regression.least_squares import Plan, Solution
+from sysid_node.online.regression.least_squares import Solution
+from sysid_node.online.regression.normal_equations import Plan
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]

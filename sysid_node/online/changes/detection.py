@@ -26,7 +26,7 @@ from sysid_node.online.changes.excited_segments import Experience, recall
 from sysid_node.online.changes.score_test import Contradiction, Reference, contradiction, disagreement
 from sysid_node.online.regression.information import Spectrum, clean_lines
 from sysid_node.online.regression.instruments import Auxiliary
-from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from sysid_node.online.changes.score_test import Reference
 from sysid_node.online.frequency.regression_signals import Layout
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.information import Information
-from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 
@@ -82,6 +82,6 @@ def recall(experience: Experience, full: Plan, since: float, before: float) -> R
         said = said + segment.said
     gram = said.grams.sum(axis=0)
     hold = least_squares.hold(full, least_squares.solve(full, gram), said)
-    plan = least_squares.trusting(full, hold.strength)
+    plan = normal_equations.trusting(full, hold.strength)
     solution = least_squares.solve(plan, gram)
     return Reference(chosen[-1].end, plan, solution, least_squares.uncertainty(plan, solution, said))

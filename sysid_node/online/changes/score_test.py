@@ -27,7 +27,8 @@ from scipy.linalg.lapack import dposv
 from scipy.special import fdtrc
 
 from sysid_node.online.regression.information import Spectrum
-from sysid_node.online.regression.least_squares import TINY, Plan, Solution, Uncertainty
+from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,9 @@ from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.information import products
-from sysid_node.online.regression.least_squares import Plan, Solution
+from sysid_node.online.regression.least_squares import Solution
 from sysid_node.online.regression.mixed_estimation import weighed
+from sysid_node.online.regression.normal_equations import Plan
 from sysid_node.online.state import Renewed, State
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysid_node.online import status
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.estimates.current_solution import Present
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.least_squares import student_95
 from sysid_node.online.state import Grounds, Renewed, State
 from sysid_node.online.status import Codes
@@ -48,7 +48,7 @@ def _weigh(state: State, renewed: Renewed) -> Grounds:
     caution, longest = np.maximum(cautions, 1.0), renewed.bend.longest(squares)
     stds, samples = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density), round(renewed.total.samples)
     return Grounds(
-        sound=(held >= least_squares.STRONG)[c] & (against == status.OK),
+        sound=(held >= normal_equations.STRONG)[c] & (against == status.OK),
         against=against,
         squares=squares,
         longest=longest,

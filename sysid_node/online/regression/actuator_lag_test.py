@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.frequency.regression_signals import Layout
-from sysid_node.online.regression.least_squares import Plan, Solution, Uncertainty
+from sysid_node.online.regression.least_squares import Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 

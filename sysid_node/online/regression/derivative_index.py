@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.regression.heteroskedasticity import DOUBT, Unevenness
-from sysid_node.online.regression.least_squares import Plan, Solution, Uncertainty, misfits
+from sysid_node.online.regression.least_squares import Solution, Uncertainty, misfits
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 

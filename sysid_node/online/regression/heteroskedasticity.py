@@ -13,16 +13,13 @@ that angle, too, as where the air turns and the probe is not at the centre of gr
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
-
-if TYPE_CHECKING:
-    from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 DOUBT = 1.5  # times the sensors' noise that a residual holds before it is more than that

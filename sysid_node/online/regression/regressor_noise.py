@@ -22,7 +22,8 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression import least_squares
-from sysid_node.online.regression.least_squares import Plan, Solution
+from sysid_node.online.regression.least_squares import Solution
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")

@@ -14,8 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.regression.least_squares import Hold, Plan, Solution, Uncertainty, misfits
+from sysid_node.online.regression.least_squares import Hold, Solution, Uncertainty, misfits
 from sysid_node.online.regression.mixed_estimation import weighed
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 

@@ -21,15 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.regression.derivative_index import Table
-from sysid_node.online.regression.least_squares import (
-    ROUNDING,
-    TINY,
-    Plan,
-    Solution,
-    Uncertainty,
-    misfits,
-    student_95,
-)
+from sysid_node.online.regression.least_squares import ROUNDING, TINY, Solution, Uncertainty, misfits, student_95
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from sysid_node.online.changes.excited_segments import KEPT, Experience, experiences, learn, recall
 from sysid_node.online.frequency.regression_signals import Layout
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, Information, nothing
-from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 LAYOUT = Layout(("alpha", "beta", "de", "da", "dr"), ("de", "da", "dr"), ())
-PLAN: Plan = least_squares.plan({"Cm": ("0", "alpha", "de"), "Cn": ("0", "beta", "da", "dr")}, LAYOUT)
+PLAN: Plan = normal_equations.plan({"Cm": ("0", "alpha", "de"), "Cn": ("0", "beta", "da", "dr")}, LAYOUT)
 ROWS = 20  # lines of each band
 
 

@@ -12,7 +12,7 @@ from sysid_node.online import estimator
 from sysid_node.online.changes.detection import Looking
 from sysid_node.online.changes.score_test import Contradiction, Reference, contradiction, disagreement
 from sysid_node.online.frequency.regression_signals import Layout
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.settings import METHODS, Settings
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()
 RATE, SECONDS, CHANGED_AT = 100.0, 22.0, 18.0
 LAYOUT = Layout(("alpha", "q", "de"), ("de",), ())
-PLAN = least_squares.plan({"CL": ("0", "alpha", "de"), "Cm": ("0", "alpha", "q", "de")}, LAYOUT)
+PLAN = normal_equations.plan({"CL": ("0", "alpha", "de"), "Cm": ("0", "alpha", "q", "de")}, LAYOUT)
 SPECTRUM = spectrum(2.0 * math.pi * np.arange(0.1, 2.0, 0.04), math.inf)
 LINES = 2 * SPECTRUM.omega.size
 

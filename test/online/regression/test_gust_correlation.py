@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from plant import made_aircraft
 
 from sysid_node.online.frequency.regression_signals import layout
-from sysid_node.online.regression import gust_correlation, least_squares
+from sysid_node.online.regression import gust_correlation, normal_equations
 from sysid_node.online.regression.gust_correlation import ALLOWED
 from sysid_node.online.regression.heteroskedasticity import DOUBT, Unevenness
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
@@ -45,7 +45,7 @@ def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -
 
 def test_the_sensors_part_of_a_residual_is_their_noise() -> None:
     """The gyro's noise differentiated, and the accelerometer's, against noise passed through the coefficients."""
-    plan = least_squares.plan({"CL": ("alpha",), "Cm": ("alpha",)}, signals := layout(AIRCRAFT, ()))
+    plan = normal_equations.plan({"CL": ("alpha",), "Cm": ("alpha",)}, signals := layout(AIRCRAFT, ()))
     still = Solution(np.zeros((1, 2)), np.zeros((1, 1)), np.zeros(2), np.zeros(2), np.array(True))
     omega, step = np.array([3.0, 4.0, 5.0]), 0.01
     nothing = np.zeros((signals.width, signals.width))

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from plant import made_aircraft
 
 from sysid_node.online.frequency.regression_signals import Layout, layout
-from sysid_node.online.regression import heteroskedasticity, least_squares
+from sysid_node.online.regression import heteroskedasticity, normal_equations
 from sysid_node.online.regression.heteroskedasticity import Unevenness
 
 Array = NDArray[np.float64]
@@ -14,9 +14,9 @@ AIRCRAFT = made_aircraft()
 STEP = 0.01  # s
 
 
-def bursts(seed: int, samples: int = 400) -> tuple[Layout, least_squares.Plan, Array]:
+def bursts(seed: int, samples: int = 400) -> tuple[Layout, normal_equations.Plan, Array]:
     """A roll motion of a few short bursts, as rows of signals."""
-    plan = least_squares.plan({"Cl": ("p", "da")}, layout := signals())
+    plan = normal_equations.plan({"Cl": ("p", "da")}, layout := signals())
     rows = np.zeros((samples, layout.transformed))
     rng = np.random.default_rng(seed)
     envelope = (np.arange(samples) % 100 < 15).astype(float)

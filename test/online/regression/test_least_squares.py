@@ -8,9 +8,9 @@ from made_lines import INSTRUMENTAL, PLAIN, ROWS, STRUCTURE, information, layout
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.information import BANDS
-from sysid_node.online.regression.least_squares import Plan
+from sysid_node.online.regression.normal_equations import Plan
 
 Array = NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def test_coloured_residuals_count_where_the_regressor_moves() -> None:
 
 def test_strength_is_that_of_the_first_stage() -> None:
     """One instrument that explains a share R^2 of its regressor: F = freedom R^2 / (1 - R^2)."""
-    plan = least_squares.plan({"Cl": ("p",)}, layout(("p",)))
+    plan = normal_equations.plan({"Cl": ("p",)}, layout(("p",)))
     rng = np.random.default_rng(8)
     lines = np.zeros((ROWS, plan.width))
     lines[:, plan.instruments[0]] = rng.normal(size=ROWS)
@@ -165,8 +165,8 @@ def test_strength_is_that_of_the_first_stage() -> None:
     R2 = np.corrcoef(lines[:, plan.instruments[0]], lines[:, plan.columns[0]])[0, 1] ** 2
     found = least_squares.hold(plan, least_squares.solve(plan, info.grams.sum(axis=0)), info)
     assert found.strength[0] == pytest.approx(ROWS * R2 / (1.0 - R2), rel=0.05)
-    assert least_squares.trusting(plan, np.array([100.0])) is plan
-    assert least_squares.trusting(plan, np.array([3.0])).least_squares
+    assert normal_equations.trusting(plan, np.array([100.0])) is plan
+    assert normal_equations.trusting(plan, np.array([3.0])).least_squares
 
 
 @pytest.mark.parametrize("hold", [0.8, 1.25])
@@ -189,13 +189,13 @@ def test_an_instrument_that_does_not_move_is_none() -> None:
     info = information(lines, 1.0)
     found = least_squares.hold(INSTRUMENTAL, least_squares.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info)
     assert found.strength[0] == 0.0
-    assert least_squares.trusting(INSTRUMENTAL, found.strength).instruments[0] == INSTRUMENTAL.columns[0]
+    assert normal_equations.trusting(INSTRUMENTAL, found.strength).instruments[0] == INSTRUMENTAL.columns[0]
 
 
 def test_weak_instruments_cost_their_block_alone() -> None:
     strength = np.full(INSTRUMENTAL.columns.size, 100.0)
     strength[INSTRUMENTAL.unknowns(3)[0]] = 2.0
-    mixed = least_squares.trusting(INSTRUMENTAL, strength)
+    mixed = normal_equations.trusting(INSTRUMENTAL, strength)
     weak = INSTRUMENTAL.group == INSTRUMENTAL.block[3]
     np.testing.assert_array_equal(mixed.instruments[weak], INSTRUMENTAL.columns[weak])
     np.testing.assert_array_equal(mixed.instruments[~weak], INSTRUMENTAL.instruments[~weak])

@@ -8,13 +8,13 @@ from plant import TRUTH, exact_flight, made_aircraft
 
 from sysid_node.aircraft.model import Derivative
 from sysid_node.online.frequency import regression_signals
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.mixed_estimation import beliefs, weighed
 from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 
 AIRCRAFT = made_aircraft()
-PLAN = least_squares.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
+PLAN = normal_equations.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
 
 
 def test_beliefs_are_the_file_s() -> None:

@@ -10,7 +10,7 @@ from plant import TRUTH, exact_flight, fly, made_aircraft, multisteps
 
 from sysid_node.aircraft.model import DEFAULT_NOISE, Aircraft
 from sysid_node.online.frequency import fourier_transform, regression_signals
-from sysid_node.online.regression import least_squares, regressor_noise
+from sysid_node.online.regression import least_squares, normal_equations, regressor_noise
 from sysid_node.online.replay import run
 from sysid_node.online.settings import Settings
 
@@ -90,7 +90,7 @@ def test_no_more_noise_is_subtracted_than_the_residuals_show(noisy_flights: tupl
 def test_all_that_the_residual_holds_is_allowed() -> None:
     """One regressor with noise of energy b: the residual holds theta^2 b, beyond which the column's share shrinks."""
     layout = regression_signals.Layout(("p",))
-    plan = least_squares.plan({"Cl": ("p",)}, layout)
+    plan = normal_equations.plan({"Cl": ("p",)}, layout)
     bias = np.zeros((layout.width, layout.width))
     p = layout.column("p")
     bias[p, p] = 3.0

@@ -4,13 +4,13 @@ import numpy as np
 from made_lines import INSTRUMENTAL, PLAIN, information, made
 from numpy.typing import NDArray
 
-from sysid_node.online.regression import least_squares
+from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.selection_bias import prudence
 
 Array = NDArray[np.float64]
 
 
-def judged(plan: least_squares.Plan, lines: Array, believed: Array, tolerance: float) -> Array:
+def judged(plan: normal_equations.Plan, lines: Array, believed: Array, tolerance: float) -> Array:
     info = information(lines, 1.0)
     gram = info.grams.sum(axis=0)
     solution = least_squares.solve(plan, gram)

@@ -7,7 +7,7 @@ from plant import made_aircraft
 from scipy.stats import t as student
 
 from sysid_node.online.frequency.regression_signals import layout
-from sysid_node.online.regression import least_squares, weak_instruments
+from sysid_node.online.regression import least_squares, normal_equations, weak_instruments
 from sysid_node.online.regression.derivative_index import table
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.regression.weak_instruments import Bend
@@ -39,7 +39,7 @@ def test_ends_are_where_the_density_of_the_tested_value_allows_no_more() -> None
         np.testing.assert_allclose(delta**2, allowed)
 
 
-PLAN = least_squares.plan({"Cl": ("p",)}, layout(AIRCRAFT, ("p",)))
+PLAN = normal_equations.plan({"Cl": ("p",)}, layout(AIRCRAFT, ("p",)))
 P, Z, Y = PLAN.columns[0], PLAN.instruments[0], PLAN.outputs[0]
 
 
