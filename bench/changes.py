@@ -23,7 +23,7 @@ from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.sim.signals.dryden import INTENSITIES
 
@@ -188,7 +188,7 @@ def main() -> None:
     """Print the tables, or put them in the documentation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=20, help="a change and weather (default: 20)")
-    parser.add_argument("--method", choices=METHODS, default=Settings().method)
+    parser.add_argument("--method", choices=METHODS, default=OnlineSettings().method)
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     with processes() as pool:

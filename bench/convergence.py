@@ -18,7 +18,7 @@ from evaluation.judging import LOWER, METHODS, UPPER, VALID, VALUE, Array, many,
 from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = "cdrw"
 WITHIN = 0.1  # of the truth
@@ -84,7 +84,7 @@ def main() -> None:
     """Print the table, or put it in the documentation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=20, help="an input (default: 20)")
-    parser.add_argument("--method", choices=METHODS, default=Settings().method)
+    parser.add_argument("--method", choices=METHODS, default=OnlineSettings().method)
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     with processes() as pool:

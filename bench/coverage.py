@@ -19,7 +19,7 @@ from evaluation.judging import METHODS, Verdict, judge, many, processes
 from evaluation.pages import publish, table
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = "cdrw"
 TIMES = np.array([5.01, 15.01, 59.99])  # s
@@ -137,7 +137,7 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=200, help="a setting (default: 200)")
     parser.add_argument("--quick", action="store_true", help="60 flights a setting")
     parser.add_argument("--setting", choices=[s.name for s in SETTINGS], help="only this one")
-    parser.add_argument("--method", choices=[*METHODS, "compare"], default=Settings().method)
+    parser.add_argument("--method", choices=[*METHODS, "compare"], default=OnlineSettings().method)
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     flights = 60 if args.quick else args.flights

@@ -20,7 +20,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
 from sysid_node.online.frequency import fourier_transform
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 Array = NDArray[np.float64]
 RATE, MINUTE = 200.0, 60.0
@@ -38,7 +38,7 @@ def samples(aircraft: Aircraft, start: float, rng: np.random.Generator) -> tuple
 
 def phase_error(start: float, rng: np.random.Generator) -> float:
     """Largest error of a minute's lines that begins at ``start`` (s), over the largest line."""
-    grid = fourier_transform.lines(*Settings().frequencies)
+    grid = fourier_transform.lines(*OnlineSettings().frequencies)
     at, x = start + np.arange(round(MINUTE * RATE)) / RATE, rng.normal(size=round(MINUTE * RATE))
     state, steps = fourier_transform.start(grid, 1), np.diff(at)
     areas, slants = 0.5 * steps * (x[1:] + x[:-1]), 0.5 * steps**2 * np.diff(x)
@@ -65,7 +65,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=int, default=1, help="of every hour that are flown")
     options = parser.parse_args()
     aircraft, rng = load_aircraft("cdrw"), np.random.default_rng(1)
-    state = estimator.init(aircraft, Settings())
+    state = estimator.init(aircraft, OnlineSettings())
     print(f"{'after hour':>10}{'us a sample':>14}{'memory, MB':>14}")
     for hour in range(options.hours):
         seconds, count = 0.0, 0

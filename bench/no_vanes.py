@@ -20,7 +20,7 @@ from evaluation.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 
 AIRCRAFT = "cdrw"
@@ -50,7 +50,7 @@ def both(setting: Setting, seeds: Sequence[int]) -> Array:
     return np.array(
         [
             [
-                _numbers(run(drawn(known, seed), Settings(), batch.time, flight, TIME)[0])
+                _numbers(run(drawn(known, seed), OnlineSettings(), batch.time, flight, TIME)[0])
                 for seed, flight in zip(seeds, samples, strict=True)
             ]
             for samples in (batch.samples, blind)

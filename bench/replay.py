@@ -28,7 +28,7 @@ from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
 from sysid_node.online.alignment.whole_record import align_streams
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.report.files.estimates_bag import write_estimates
 
 GRAVITY = 9.81
@@ -122,7 +122,7 @@ def best(work: Callable[[], object], repeat: int) -> float:
 
 def measure(bag: Path, aircraft: Aircraft, repeat: int, folder: Path) -> None:
     """One storage format: the parts, the whole, and the ratio."""
-    settings = Settings()
+    settings = OnlineSettings()
     reference = best(lambda: deserialise(bag), repeat)
     streams = read_streams(bag)
     flight = load(bag, aircraft)

@@ -25,11 +25,11 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online import estimator
 from sysid_node.online.alignment.whole_record import align_streams
-from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.validity import judge
-from sysid_node.online.settings import METHODS, Settings
-from sysid_node.online.state import State
+from sysid_node.online.settings import METHODS, OnlineSettings
+from sysid_node.online.state import EstimatorState
 
 Array = NDArray[np.float64]
 Bare = Callable[[float, Array], object]
@@ -104,12 +104,12 @@ def timed(work: Callable[[], object]) -> float:
     return (time.perf_counter_ns() - begin) / 1e3
 
 
-def step_by_step(state: State, moment: float, sample: list[float]) -> tuple[float, float, float]:
+def step_by_step(state: EstimatorState, moment: float, sample: list[float]) -> tuple[float, float, float]:
     """What taking in one sample, solving, and judging take, us."""
     begin = time.perf_counter_ns()
     estimator.update(state, moment, sample)
     updated = time.perf_counter_ns()
-    current, renewed = present(state), state.renewed
+    current, renewed = current_solution(state), state.renewed
     solved = time.perf_counter_ns()
     if current is not None and renewed is not None:
         judge(state, renewed, current, moment)
@@ -119,7 +119,7 @@ def step_by_step(state: State, moment: float, sample: list[float]) -> tuple[floa
 
 def measure(aircraft: Aircraft, bag: Path, method: str) -> dict[str, Array]:
     """Times in us of every sample, by what was done."""
-    settings = Settings(method=method)
+    settings = OnlineSettings(method=method)
     aligned = align_streams(aircraft, read_streams(bag), settings.max_gap)
     state = estimator.init(aircraft, settings)
     bare, x = {"naive NumPy": naive(), "tuned NumPy": tuned()}, np.random.default_rng(1).normal(size=(TURN, SIGNALS))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
 from .flying import Setting, fly, noisier
@@ -32,7 +32,7 @@ class Method:
     """One way to estimate; ``compensated``: whether the sensors' noise is made up for."""
 
     name: str
-    settings: Settings
+    settings: OnlineSettings
     compensated: bool = True
 
     def aircraft(self, aircraft: Aircraft, setting: Setting) -> Aircraft:
@@ -43,9 +43,9 @@ class Method:
 
 
 METHODS = {
-    "sls_rft": Method("sls_rft", Settings(method="sls_rft")),
-    "plain": Method("plain least squares", Settings(method="sls_rft"), compensated=False),
-    "iv_rft": Method("iv_rft", Settings(method="iv_rft")),
+    "sls_rft": Method("sls_rft", OnlineSettings(method="sls_rft")),
+    "plain": Method("plain least squares", OnlineSettings(method="sls_rft"), compensated=False),
+    "iv_rft": Method("iv_rft", OnlineSettings(method="iv_rft")),
 }
 
 

@@ -24,9 +24,9 @@ from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.alignment.schedule import due_times
-from sysid_node.online.alignment.whole_record import Aligned, align_streams
+from sysid_node.online.alignment.whole_record import AlignedSamples, align_streams
 from sysid_node.online.replay import run as run_online
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.bag_folder import remove_earlier_bag
 from sysid_node.report.files.estimates_bag import write_estimates
@@ -49,9 +49,9 @@ class Replay(EstimatedRun):
     """What a bag gave: aligned samples, and the estimates as the live node would have published them."""
 
     aircraft: Aircraft
-    settings: Settings
+    settings: OnlineSettings
     publish_rate: float  # Hz
-    aligned: Aligned
+    aligned: AlignedSamples
     history: Sequence[Estimates]
     stamps_ns: Stamps  # (K,) header stamps at which each of ``history`` (K,) fell due
     final: Estimates  # after the last sample, whether or not one was due
@@ -129,7 +129,7 @@ def replay(
 
 
 def _estimated(
-    flight: FlightFile, settings: Settings, publish_rate: float, truth: Truth, progress: Callable[[float], None]
+    flight: FlightFile, settings: OnlineSettings, publish_rate: float, truth: Truth, progress: Callable[[float], None]
 ) -> Replay:
     """Decodes, aligns and identifies."""
     streams = read_streams(flight.path, flight.topics, flight.body_frame)
@@ -160,7 +160,7 @@ def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> Faul
     return judge(found.aircraft, FaultSettings(), found.streams, read_commands(bag), heard, progress)
 
 
-def replay_settings(values: Mapping[str, object]) -> tuple[Settings, float]:
+def replay_settings(values: Mapping[str, object]) -> tuple[OnlineSettings, float]:
     """The estimator's settings and the publish rate (Hz). Raises InputError naming the key or value that is wrong."""
     others = dict(values)
     rate = others.pop("publish_rate", PUBLISH_RATE)
@@ -170,4 +170,4 @@ def replay_settings(values: Mapping[str, object]) -> tuple[Settings, float]:
         publish_rate = float("nan")
     if not 0.01 <= publish_rate <= 1000.0:
         raise InputError(f"setting publish_rate = {rate!r}: expected 0.01 to 1000 Hz")
-    return Settings.from_mapping(others), publish_rate
+    return OnlineSettings.from_mapping(others), publish_rate

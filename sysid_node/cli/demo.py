@@ -22,8 +22,8 @@ from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.streams import Streams
 from sysid_node.flight.topics import INPUT_TOPICS
 from sysid_node.flight.truth import read_truth
-from sysid_node.online.alignment.whole_record import Aligned, align_streams
-from sysid_node.online.settings import Settings
+from sysid_node.online.alignment.whole_record import AlignedSamples, align_streams
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.run_folder import write_run
 from sysid_node.report.results.from_replay import replay_result
@@ -51,7 +51,7 @@ class DemoFlight:
     bag: Path
     aircraft: Aircraft
     streams: Streams
-    aligned: Aligned
+    aligned: AlignedSamples
     truth: dict[str, float]  # empty where it is not known
 
     @property
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> None:
     follower, history = _fly(flight, args.aircraft, args.rate, args.out)
     result = replay_result(
         flight.aircraft,
-        Settings(),
+        OnlineSettings(),
         time=flight.aligned.time,
         samples=flight.aligned.samples,
         history=history,
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> None:
 
 def _read(bag: Path, aircraft: Aircraft) -> DemoFlight:
     streams = read_streams(bag)
-    aligned = align_streams(aircraft, streams, Settings().max_gap)
+    aligned = align_streams(aircraft, streams, OnlineSettings().max_gap)
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
     return DemoFlight(bag, aircraft, streams, aligned, read_truth(bag))

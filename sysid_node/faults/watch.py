@@ -26,7 +26,7 @@ from sysid_node.faults.types import ARRIVAL, SILENT, Fault
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.alignment import streaming as intake
-from sysid_node.online.alignment.streaming import Complete, IntakeState
+from sysid_node.online.alignment.streaming import AlignedSample, AlignmentState
 
 PERIOD = 0.1  # s between checks whether to report
 REPEATED = 1.0  # s after which the same faults are reported again
@@ -40,7 +40,7 @@ class MessageWatch:
 
     state: MonitorState
     servos: ServoState
-    intake: IntakeState
+    intake: AlignmentState
     stale_after: float  # s
     now: float = 0.0  # s, of the last sample
     stamp_ns: int = 0  # header stamp of the last sample
@@ -134,13 +134,13 @@ class Announcements:
         return True
 
 
-def _take(watch: MessageWatch, samples: Sequence[Complete]) -> None:
+def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
     for moment, sample, _ in samples:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
         monitor.update(watch.state, moment, sample)
 
 
-def _time_of(taken: IntakeState, stamp_ns: int) -> float:
+def _time_of(taken: AlignmentState, stamp_ns: int) -> float:
     """Seconds since the first IMU message, the samples' time."""
     base = taken.bases[-1]
     return (stamp_ns - base.stamp + base.since) / _SECOND

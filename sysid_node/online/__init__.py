@@ -1,8 +1,8 @@
 """Online estimation: recursive Fourier transform and sequential least squares. NumPy and SciPy only.
 
-``alignment`` turns the messages of three topics into samples on the IMU's time base; ``frequency`` makes signals of them
-(force and moment coefficients and their regressors) and transforms these recursively. With every half second of data
-``segment_update`` forms information matrices, solves them in ``regression``, and tests for ``changes`` of the aircraft;
-``estimates`` solves with all samples so far whenever the schedule says so, and judges what is valid. ``estimator`` holds
-``init`` and ``update``, which the live node and ``replay`` both call, followed by ``estimates.published.estimate``.
+``alignment`` turns the messages of three topics into samples on the IMU's time base. ``frequency`` makes signals of
+them (force and moment coefficients and their regressors) and transforms these recursively. With every half second of
+data ``segment_update`` forms information matrices, solves them in ``regression``, and tests for ``changes`` of the
+aircraft. ``estimates`` solves with all samples so far whenever the schedule says so, and judges what is valid.
+``estimator`` holds ``init`` and ``update``; the live node and ``replay`` call both, and then ``estimate``.
 """

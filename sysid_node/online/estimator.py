@@ -20,17 +20,17 @@ from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes.detection import PIECE
-from sysid_node.online.changes.excited_segments import experiences
+from sysid_node.online.changes.excited_segments import no_excited_segments
 from sysid_node.online.frequency import fourier_transform, regression_signals, sampled_transform
 from sysid_node.online.frequency.regression_signals import NUISANCES, OUTPUTS
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression import information, normal_equations
-from sysid_node.online.regression.derivative_index import table
-from sysid_node.online.regression.instruments import INSTRUMENTED, auxiliary_model
-from sysid_node.online.regression.mixed_estimation import beliefs
+from sysid_node.online.regression.derivative_index import derivative_index
+from sysid_node.online.regression.instruments import INSTRUMENTED, instrument_model
+from sysid_node.online.regression.mixed_estimation import believed_derivatives
 from sysid_node.online.segment_update import begin_segment, reach, renew
-from sysid_node.online.settings import Settings
-from sysid_node.online.state import Model, State
+from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.state import EstimatorModel, EstimatorState
 from sysid_node.online.status import vocabulary
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -43,7 +43,7 @@ JITTER = 1e-3  # s by which a stamp may be early and its sample still be the one
 SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorter steps would pass for acceleration
 
 
-def init(aircraft: Aircraft, settings: Settings) -> State:
+def init(aircraft: Aircraft, settings: OnlineSettings) -> EstimatorState:
     """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate."""
     layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
     unformed = regression_signals.unformed(aircraft)
@@ -54,27 +54,27 @@ def init(aircraft: Aircraft, settings: Settings) -> State:
     # lines are independent over one period of their spacing; windows and forgetting want several segments
     segment_time = min(1.0 / settings.frequencies[1], settings.window / 5.0 or math.inf, 2.0 * memory)
     grid = fourier_transform.lines(*settings.frequencies)
-    plan = normal_equations.plan(structure, layout)
-    model = Model(
+    plan = normal_equations.normal_equations(structure, layout)
+    model = EstimatorModel(
         aircraft=aircraft,
         settings=settings,
         layout=layout,
         plan=plan,
-        table=table(aircraft, plan, settings.valid_fraction),
+        table=derivative_index(aircraft, plan, settings.valid_fraction),
         vocabulary=vocabulary(aircraft, plan),
         spectrum=information.spectrum(grid.omega, memory),
         lowest=_lowest(len(aircraft.controls)),
         signals=regression_signals.scalar_signals(aircraft),
         momentum=regression_signals.momentum_gain(aircraft),
-        believed=beliefs(aircraft, plan),
-        auxiliary=auxiliary_model(aircraft, layout, grid.omega),
+        believed=believed_derivatives(aircraft, plan),
+        auxiliary=instrument_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
     )
     transform = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
     running = SampledTransform(layout, transform)
     nothing, flow = information.nothing(layout), flow_angle_filter.init(aircraft)
-    return State(model, running, plan, nothing, flow, experiences=experiences(plan, layout))
+    return EstimatorState(model, running, plan, nothing, flow, experiences=no_excited_segments(plan, layout))
 
 
 def _lowest(controls: int) -> tuple[float, ...]:
@@ -83,7 +83,7 @@ def _lowest(controls: int) -> tuple[float, ...]:
     return (*(special.get(column, -LIMIT) for column in SAMPLE_COLUMNS), *(-LIMIT,) * controls)
 
 
-def update(state: State, time: float, sample: Sequence[float]) -> None:
+def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s).
 
     A sample that lacks a value, has an impossible one, or does not come after the last one, is left out and counted in
@@ -119,18 +119,18 @@ def update(state: State, time: float, sample: Sequence[float]) -> None:
     state.intervals += sample[INTERVAL]
 
 
-def renew_early(state: State) -> None:
+def renew_early(state: EstimatorState) -> None:
     """Renew what is due to be renewed before the next sample; whoever has time before that comes may do it then."""
     if reach(state.transform.last, state.step) >= state.renew_at:
         renew(state)
 
 
-def first_counted(time: float, settings: Settings) -> float:
+def first_counted(time: float, settings: OnlineSettings) -> float:
     """Time (s) from which samples count, where the first comes at ``time``."""
     return time + settings.settle_time - JITTER
 
 
-def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[float]:
+def _completed(state: EstimatorState, time: float, sample: Sequence[float]) -> Sequence[float]:
     """The sample with unknown thrust taken as none; empty, and counted, where anything else is missing."""
     filled = list(sample)
     powerless = not abs(filled[THRUST]) < LIMIT and not state.thrust_known
@@ -148,13 +148,13 @@ def _completed(state: State, time: float, sample: Sequence[float]) -> Sequence[f
     return filled
 
 
-def leave_out(state: State, column: int) -> None:
+def leave_out(state: EstimatorState, column: int) -> None:
     """Count a sample that lacks a possible value of a column; the one behind them all stands for the time."""
     name = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols, "time")[column]
     state.incomplete[name] = state.incomplete.get(name, 0) + 1
 
 
-def interrupt(state: State, time: float, row: Sequence[float]) -> None:
+def interrupt(state: EstimatorState, time: float, row: Sequence[float]) -> None:
     """Finish the segment at the last sample and begin one at this: nothing is known of the time in between."""
     if state.transform.last > state.segment_start:
         renew(state, last=True)

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from sysid_node.online.settings import METHODS, Settings
+from sysid_node.online.settings import METHODS, OnlineSettings
 from sysid_node.parameter import Parameter, annotated_yaml, check_each
 
-_ESTIMATOR = Settings()
+_ESTIMATOR = OnlineSettings()
 
 PARAMETERS = (
     Parameter(
@@ -138,15 +138,15 @@ PARAMETERS = (
     ),
 )
 
-_ESTIMATION = frozenset(field.name for field in fields(Settings))
+_ESTIMATION = frozenset(field.name for field in fields(OnlineSettings))
 
 #: Parameters that may change while the node is configured.
 LIVE = frozenset({"save_directory", "stale_after"})
 
 
-def estimation_settings(values: Mapping[str, Any]) -> Settings:
+def estimation_settings(values: Mapping[str, Any]) -> OnlineSettings:
     """The estimator's settings among the node's parameters. Raises InputError on an impossible combination."""
-    return Settings.from_mapping({name: value for name, value in values.items() if name in _ESTIMATION})
+    return OnlineSettings.from_mapping({name: value for name, value in values.items() if name in _ESTIMATION})
 
 
 def check(values: Mapping[str, Any]) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ REPORT_EVERY = 512  # samples between reports of progress
 
 def run(
     aircraft: Aircraft,
-    settings: Settings,
+    settings: OnlineSettings,
     time: Array,
     samples: Array,
     publish_times: Array,

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes import detection
-from sysid_node.online.changes.detection import PIECE, Looking, Watch
-from sysid_node.online.changes.excited_segments import experiences, learn
+from sysid_node.online.changes.detection import PIECE, ChangeMonitor, ChangeTests
+from sysid_node.online.changes.excited_segments import no_excited_segments, remember
 from sysid_node.online.changes.score_test import Reference
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
@@ -32,13 +32,13 @@ from sysid_node.online.regression import (
     regressor_noise,
     weak_instruments,
 )
-from sysid_node.online.regression.actuator_lag_test import Timing
-from sysid_node.online.regression.heteroskedasticity import Unevenness
+from sysid_node.online.regression.actuator_lag_test import LagTest
+from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.regression.information import Information
-from sysid_node.online.regression.least_squares import Hold, Solution, Uncertainty
-from sysid_node.online.regression.normal_equations import Plan
-from sysid_node.online.regression.selection_bias import prudence
-from sysid_node.online.state import Renewed, State
+from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.selection_bias import selection_bias_factors
+from sysid_node.online.state import EstimatorState, SegmentSolution
 
 Array = NDArray[np.float64]
 RECENT = 8  # pieces about whose mean motion is counted
@@ -46,7 +46,7 @@ SOON = 20.0  # s of data up to which everything is renewed with every piece, the
 TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which changes more slowly still
 
 
-def renew(state: State, last: bool = False) -> None:
+def renew(state: EstimatorState, last: bool = False) -> None:
     """Renew what changes slowly, see ``Renewed``; all of it where this is the ``last`` time in the segment."""
     time = state.transform.last
     lines = sampled_transform.current(state.transform)
@@ -70,39 +70,39 @@ def reach(time: Any, step: Any) -> Any:
     return time + 0.5 * step
 
 
-def _is_due(state: State) -> bool:
+def _is_due(state: EstimatorState) -> bool:
     """Whether it is time to solve for everything again."""
     renewed = state.renewed
     return renewed is None or state.pieces - renewed.pieces >= 1 + int(renewed.total.energy / SOON)
 
 
-def begin_segment(state: State) -> None:
+def begin_segment(state: EstimatorState) -> None:
     """Begin a segment, of which alone the transform is, and a piece of the watch at the last sample."""
     time = state.transform.last
     sampled_transform.restart(state.transform)
     state.segment_start, state.samples, state.intervals = time, 0, 0.0
-    state.uneven, state.weighed_until = Unevenness(), time
+    state.uneven, state.weighed_until = NoiseMoments(), time
     _begin_piece(state)
 
 
-def _begin_piece(state: State) -> None:
+def _begin_piece(state: EstimatorState) -> None:
     time = state.transform.last
     state.piece, state.piece_start, state.renew_at = sampled_transform.current(state.transform), time, time + PIECE
 
 
-def _fading(state: State, since: float) -> float:
+def _fading(state: EstimatorState, since: float) -> float:
     """Share of a transform's amplitude that is left of what was there at ``since`` (s)."""
     return math.exp(0.5 * state.model.spectrum.rate * (since - state.transform.last))
 
 
-def _watch_piece(state: State, lines: Array) -> None:
+def _watch_piece(state: EstimatorState, lines: Array) -> None:
     """Hand the finished piece to the watch."""
     if state.transform.last > state.piece_start:
         piece = lines - state.piece * _fading(state, state.piece_start)
         state.watch.pieces.append((state.piece_start, piece))
 
 
-def _weigh_recent(state: State) -> None:
+def _weigh_recent(state: EstimatorState) -> None:
     """Count how unevenly the noise came since this was last counted."""
     now = state.transform.last
     duration = now - state.weighed_until
@@ -121,7 +121,7 @@ def _weigh_recent(state: State) -> None:
     state.transform.recent.clear()
 
 
-def _measure_segment(state: State, lines: Array) -> Information:
+def _measure_segment(state: EstimatorState, lines: Array) -> Information:
     """What the present segment says up to now."""
     model = state.model
     begin, end = state.segment_start, state.transform.last
@@ -137,12 +137,12 @@ def _measure_segment(state: State, lines: Array) -> Information:
     return info
 
 
-def _line_seconds(state: State, info: Information) -> float:
+def _line_seconds(state: EstimatorState, info: Information) -> float:
     """Lines times seconds over which noise counts; the nuisances take one line."""
     return max((state.model.spectrum.omega.size - 1) * info.energy, 1e-9)
 
 
-def _past(state: State) -> Information:
+def _past(state: EstimatorState) -> Information:
     """Sum of the finished segments, faded to now, without those that the window has left behind."""
     now, window = state.transform.last, state.model.settings.window
     if state.model.spectrum.rate and state.past.samples:
@@ -154,7 +154,7 @@ def _past(state: State) -> Information:
     return state.past
 
 
-def _solve_all(state: State, segment: Information) -> None:
+def _solve_all(state: EstimatorState, segment: Information) -> None:
     """Renew the estimates and what is known of their errors, from the finished segments and the present one."""
     past = _past(state)
     total = past + segment
@@ -171,7 +171,7 @@ def _solve_all(state: State, segment: Information) -> None:
     mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
     none = np.zeros(len(plan.coefficients), dtype=bool)
     timing, timed = _timing(state, solution, spread, gram)
-    state.renewed = Renewed(
+    state.renewed = SegmentSolution(
         time=now,
         pieces=state.pieces,
         timed=timed,
@@ -185,19 +185,19 @@ def _solve_all(state: State, segment: Information) -> None:
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
         timing=timing,
         hold=hold,
-        prudence=prudence(plan, solution, spread, hold, gram, *state.model.believed),
-        bend=weak_instruments.bend(plan, table, solution, gram, spread, noise_alone, mean, gusts),
+        prudence=selection_bias_factors(plan, solution, spread, hold, gram, *state.model.believed),
+        bend=weak_instruments.anderson_rubin_bounds(plan, table, solution, gram, spread, noise_alone, mean, gusts),
         lost=none,
         doubted=none,
     )
     state.watch.references.append(Reference(now, plan, solution, spread))
 
 
-def _solve(state: State, total: Information, gram: Array) -> tuple[Hold, Solution, Array | None]:
+def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:
     """The instruments' hold, the solution by the plan that it allows, and the noise's part in the equations."""
     full, last = state.model.plan, state.renewed
-    hold = least_squares.hold(full, least_squares.solve(full, gram), total)
-    plan = state.plan = normal_equations.trusting(full, hold.strength)
+    hold = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
+    plan = state.plan = normal_equations.with_strong_instruments(full, hold.strength)
     compensation = None
     if last is not None and last.solution.usable:
         share = regressor_noise.allowed(
@@ -210,14 +210,14 @@ def _solve(state: State, total: Information, gram: Array) -> tuple[Hold, Solutio
     return hold, solution, compensation
 
 
-def _timing(state: State, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[Timing, int]:
+def _timing(state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[LagTest, int]:
     """Whether controls are felt when they are measured, looked at now and then, and with which piece it was."""
     if state.renewed is None or state.pieces - state.renewed.timed >= TIMING_EVERY:
         return timing.examine(state.plan, state.model.layout, solution, spread, gram), state.pieces
     return state.renewed.timing, state.renewed.timed
 
 
-def _doubt(state: State, solution: Solution, total: Information) -> Array:
+def _doubt(state: EstimatorState, solution: Solution, total: Information) -> Array:
     """(C, P, P) what errors of the aircraft file bring to the covariance through reconstructed flow angles."""
     model = state.model
     return flow_angle_filter.doubt(
@@ -225,7 +225,9 @@ def _doubt(state: State, solution: Solution, total: Information) -> Array:
     )
 
 
-def _gusts(state: State, total: Information, plan: Plan, solution: Solution, spread: Uncertainty) -> Array:
+def _gusts(
+    state: EstimatorState, total: Information, plan: NormalEquations, solution: Solution, spread: Uncertainty
+) -> Array:
     """(C,) share of the residuals that are gusts."""
     aircraft, omega = state.model.aircraft, state.model.spectrum.omega
     per_line, step = total.bias / _line_seconds(state, total), total.energy / max(total.samples, 1.0)
@@ -233,7 +235,7 @@ def _gusts(state: State, total: Information, plan: Plan, solution: Solution, spr
     return gust_correlation.share_of_gusts(spread, sensed)
 
 
-def _look_for_changes(state: State, lines: Array) -> None:
+def _look_for_changes(state: EstimatorState, lines: Array) -> None:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
     model, now, renewed = state.model, state.transform.last, state.renewed
     if renewed is None:
@@ -245,21 +247,21 @@ def _look_for_changes(state: State, lines: Array) -> None:
     if finding.since is not None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:
-        state.changed_at, state.experiences = now, experiences(model.plan, model.layout)
+        state.changed_at, state.experiences = now, no_excited_segments(model.plan, model.layout)
 
 
-def _looking(state: State) -> Looking:
+def _looking(state: EstimatorState) -> ChangeTests:
     """What looks for changes share."""
     model = state.model
-    return Looking(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, _memory(state))
+    return ChangeTests(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, _memory(state))
 
 
-def _memory(state: State) -> float:
+def _memory(state: EstimatorState) -> float:
     """How long ago is not forgotten, s."""
     return state.model.settings.window or state.model.memory
 
 
-def _begin_anew(state: State, lines: Array, since: float) -> None:
+def _begin_anew(state: EstimatorState, lines: Array, since: float) -> None:
     """Forget all that was before ``since`` (s), the start of a piece."""
     now = state.transform.last
     _weigh_recent(state)
@@ -274,23 +276,23 @@ def _begin_anew(state: State, lines: Array, since: float) -> None:
     state.inside.clear()
     state.segment_start = since
     sampled_transform.take_out(state.transform, before)
-    state.watch = Watch()
+    state.watch = ChangeMonitor()
     _solve_all(state, _measure_segment(state, sampled_transform.current(state.transform)))
 
 
-def _learn_before(state: State, lines: Array, end: float) -> None:
+def _learn_before(state: EstimatorState, lines: Array, end: float) -> None:
     """Remember the part of the present segment until ``end`` (s), when the transform was ``lines``."""
     begin, model = state.segment_start, state.model
     if end - begin < PIECE:
         return
-    learn(state.experiences, information.measure(lines, model.auxiliary, model.spectrum, begin, end), end)
+    remember(state.experiences, information.measure(lines, model.auxiliary, model.spectrum, begin, end), end)
 
 
-def finish_segment(state: State) -> None:
+def finish_segment(state: EstimatorState) -> None:
     """Put the present segment to the finished ones."""
     if state.present is not None and state.renewed is not None:
         state.past = state.past + state.present
-        learn(state.experiences, state.present, state.transform.last)
+        remember(state.experiences, state.present, state.transform.last)
         detection.compare(state.model.plan, state.watch, state.experiences, _memory(state))
         if state.model.settings.window:
             state.inside.append((state.transform.last, state.present))

@@ -17,7 +17,7 @@ SHORTEST_MEMORY = 1.0  # s
 
 
 @dataclass(frozen=True)
-class Settings:
+class OnlineSettings:
     """Settings of the online estimator. Defaults suit UAVs of 1 to 20 kg. Raises InputError on impossible values."""
 
     frequencies: tuple[float, float, float] = (0.1, 0.04, 2.0)  # Hz: first line, step, last line
@@ -51,7 +51,7 @@ class Settings:
             raise InputError(f"valid_fraction {self.valid_fraction}: expected a positive fraction")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Settings:
+    def from_mapping(cls, values: Mapping[str, Any]) -> OnlineSettings:
         """From node parameters or ``--set key=value`` texts. Raises InputError naming the wrong key or value."""
         types = get_type_hints(cls)
         for key in values:

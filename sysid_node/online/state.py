@@ -10,47 +10,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.alignment.flow_angle_filter import Reconstruction
-from sysid_node.online.changes.detection import Watch
-from sysid_node.online.changes.excited_segments import Experience
+from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
+from sysid_node.online.changes.detection import ChangeMonitor
+from sysid_node.online.changes.excited_segments import ExcitedSegments
 from sysid_node.online.frequency.regression_signals import Layout, MomentumGain, ScalarSignals
 from sysid_node.online.frequency.sampled_transform import SampledTransform
-from sysid_node.online.regression.actuator_lag_test import Timing
-from sysid_node.online.regression.derivative_index import Table
-from sysid_node.online.regression.heteroskedasticity import Unevenness
+from sysid_node.online.regression.actuator_lag_test import LagTest
+from sysid_node.online.regression.derivative_index import DerivativeIndex
+from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.regression.information import Information, Spectrum
-from sysid_node.online.regression.instruments import Auxiliary
-from sysid_node.online.regression.least_squares import Hold, Solution, Uncertainty
-from sysid_node.online.regression.normal_equations import Plan
-from sysid_node.online.regression.weak_instruments import Bend
-from sysid_node.online.settings import Settings
+from sysid_node.online.regression.instruments import InstrumentModel
+from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.weak_instruments import AndersonRubinBounds
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.status import Codes, Vocabulary
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Model:
+class EstimatorModel:
     """What does not change in flight."""
 
     aircraft: Aircraft
-    settings: Settings
+    settings: OnlineSettings
     layout: Layout
-    plan: Plan
-    table: Table
+    plan: NormalEquations
+    table: DerivativeIndex
     vocabulary: Vocabulary
     spectrum: Spectrum
     lowest: tuple[float, ...]  # what each value of a sample must lie above
     signals: ScalarSignals
     momentum: MomentumGain
     believed: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
-    auxiliary: Auxiliary | None  # what makes instruments, where the method wants them
+    auxiliary: InstrumentModel | None  # what makes instruments, where the method wants them
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
 
 
 @dataclass(frozen=True)
-class Grounds:
+class ValidityBasis:
     """What the judgement of the D estimates rests on between renewals."""
 
     sound: NDArray[np.bool_]  # (D,) nothing speaks against it but what the present says
@@ -64,7 +64,7 @@ class Grounds:
 
 
 @dataclass
-class Renewed:
+class SegmentSolution:
     """What ``renew`` last found; per-sample estimates lean on it until the next time."""
 
     time: float  # s, when it was found
@@ -78,24 +78,24 @@ class Renewed:
     integrals: Array  # (W,) of the finished segments' signals
     trim_noise: Array  # (C,) squared error of the coefficients' integrals
     factors: Array  # (C, P) squared standard error over (P_jj residual)
-    timing: Timing  # whether the controls are felt when they are measured
-    hold: Hold  # of the instruments on the regressors
+    timing: LagTest  # whether the controls are felt when they are measured
+    hold: InstrumentStrength  # of the instruments on the regressors
     prudence: Array  # (P, C) see ``prudence``
-    bend: Bend  # of the intervals
+    bend: AndersonRubinBounds  # of the intervals
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
     doubted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
-    grounds: Grounds | None = None  # made when first wanted
+    grounds: ValidityBasis | None = None  # made when first wanted
 
 
 @dataclass
-class State:
+class EstimatorState:
     """All that the estimator remembers. Times in s."""
 
-    model: Model
+    model: EstimatorModel
     transform: SampledTransform  # of the present segment
-    plan: Plan  # the model's, with least squares where instruments are weak
+    plan: NormalEquations  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
-    flow: Reconstruction  # of the flow angles that are not measured
+    flow: FlowAngleFilter  # of the flow angles that are not measured
     past_time: float = math.nan
     inside: deque[tuple[float, Information]] = field(
         default_factory=deque
@@ -104,7 +104,7 @@ class State:
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
     weighed_until: float = math.nan  # time up to which ``uneven`` counts
-    uneven: Unevenness = field(default_factory=Unevenness)  # of the present segment
+    uneven: NoiseMoments = field(default_factory=NoiseMoments)  # of the present segment
     renew_at: float = math.inf
     step: float = 0.0  # s between the last two samples
     previous: tuple[float, tuple[float, ...]] | None = None  # the last sample: time, (p, q, r, ca, sa)
@@ -114,8 +114,8 @@ class State:
     incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
     thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
     present: Information | None = None  # the present segment's, at the last renewal
-    renewed: Renewed | None = None
-    watch: Watch = field(default_factory=Watch)
-    experiences: list[Experience] = field(default_factory=list)  # by block of the plan
+    renewed: SegmentSolution | None = None
+    watch: ChangeMonitor = field(default_factory=ChangeMonitor)
+    experiences: list[ExcitedSegments] = field(default_factory=list)  # by block of the plan
     pieces: int = 0  # of the watch, finished
     changed_at: float = -math.inf

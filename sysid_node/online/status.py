@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Codes = NDArray[np.uint8]
 
@@ -50,7 +50,7 @@ class Vocabulary:
         return tuple([self.words[code] for code in codes.tolist()])
 
 
-def vocabulary(aircraft: Aircraft, plan: Plan) -> Vocabulary:
+def vocabulary(aircraft: Aircraft, plan: NormalEquations) -> Vocabulary:
     """The words for the estimates by a ``plan``."""
     collinear = (f"collinear with {regressor}" for regressor in plan.regressors)
     late = (f"{control} not on time" for control in aircraft.control_symbols)

@@ -31,7 +31,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.online.estimates.saving import save_estimates
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.parameters import LIVE, PARAMETERS, check, estimation_settings
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.session import Due, Session
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, refusal, values_of
@@ -51,7 +51,7 @@ class Identifier(CarefulNode):
     Raises InputError on parameters of a wrong type or value, and SystemExit(2) where it cannot start by itself.
     """
 
-    def __init__(self, make_session: Callable[[Aircraft, Settings, float], Session] = Session) -> None:
+    def __init__(self, make_session: Callable[[Aircraft, OnlineSettings, float], Session] = Session) -> None:
         """``make_session`` makes a session of the aircraft, the estimator's settings and the publication rate (Hz)."""
         super().__init__("identifier")
         self._make_session = make_session

@@ -11,10 +11,10 @@ from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
-from sysid_node.online.estimates.current_solution import Present, present
+from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
 
@@ -23,13 +23,13 @@ class Due(NamedTuple):
 
     stamp_ns: int
     estimates: Estimates
-    current: Present | None
+    current: CurrentSolution | None
 
 
 class Session:
     """Aligns messages, updates the estimator with every sample, and estimates when the schedule says so."""
 
-    def __init__(self, aircraft: Aircraft, settings: Settings, publish_rate: float) -> None:
+    def __init__(self, aircraft: Aircraft, settings: OnlineSettings, publish_rate: float) -> None:
         self.aircraft = aircraft
         self.settings = settings
         self.publish_rate = publish_rate  # Hz
@@ -58,7 +58,7 @@ class Session:
         """What is known ``silence`` s after the last sample. There must be one."""
         last = self.schedule.previous
         assert last is not None
-        current = present(self.state)
+        current = current_solution(self.state)
         estimates = estimate_of(self.state, current, last + silence)
         return Due(streaming.stamp_of(self.intake, last), estimates, current)
 
@@ -86,7 +86,7 @@ class Session:
         """Take joint positions: rad, throttle 0..1 or N."""
         return self._take(streaming.on_actuators(self.intake, stamp_ns, names, positions))
 
-    def _take(self, samples: Iterable[streaming.Complete]) -> list[Due]:
+    def _take(self, samples: Iterable[streaming.AlignedSample]) -> list[Due]:
         results = []
         for moment, sample, wait in samples:
             start = time.perf_counter()

@@ -25,11 +25,11 @@ from sysid_node.online import estimator
 from sysid_node.online.alignment import streaming
 from sysid_node.online.alignment.schedule import Schedule, due
 from sysid_node.online.estimates import published
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = made_aircraft()
 LINES = {"frequencies": (0.2, 0.2, 2.0)}
-SETTINGS = Settings.from_mapping(LINES)
+SETTINGS = OnlineSettings.from_mapping(LINES)
 KEYS = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
 
 
@@ -121,7 +121,7 @@ def test_the_bag_of_estimates_holds_every_one(arguments, tmp_path, bag):
     assert len(messages) == len(done.history)
     for (log_ns, m), known, stamp in zip(messages, done.history, done.stamps_ns.tolist(), strict=True):
         assert log_ns == m.header.stamp.sec * 10**9 + m.header.stamp.nanosec == stamp
-        assert (m.aircraft, m.method, m.header.frame_id) == ("made", Settings().method, "imu")
+        assert (m.aircraft, m.method, m.header.frame_id) == ("made", OnlineSettings().method, "imu")
         for told, d in zip(m.derivatives, known.derivatives.values(), strict=True):
             assert (told.name, told.status, told.valid) == (d.name, d.status, d.valid)
             ours, theirs = ([getattr(x, f) for f in ("value", "standard_error", "lower", "upper")] for x in (told, d))

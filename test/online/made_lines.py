@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, Information, nothing
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 STRUCTURE = {
@@ -25,7 +25,7 @@ def layout(instrumented: tuple[str, ...] = ()) -> Layout:
     return Layout(("alpha", "q", "beta", "p", "de", "dr"), ("de", "dr"), instrumented)
 
 
-def made(plan: Plan, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:
+def made(plan: NormalEquations, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:
     """Lines (ROWS, W) of regressors, their instruments, and outputs of a known model with white noise."""
     rng = np.random.default_rng(seed)
     lines = rng.normal(size=(ROWS, plan.width))
@@ -48,5 +48,5 @@ def information(lines: Array, density: float) -> Information:
     return info
 
 
-PLAIN = normal_equations.plan(STRUCTURE, layout())
-INSTRUMENTAL = normal_equations.plan(STRUCTURE, layout(INSTRUMENTED))
+PLAIN = normal_equations.normal_equations(STRUCTURE, layout())
+INSTRUMENTAL = normal_equations.normal_equations(STRUCTURE, layout(INSTRUMENTED))

@@ -16,11 +16,11 @@ from sysid_node.aircraft.model import Derivative
 from sysid_node.errors import InputError
 from sysid_node.online import estimator
 from sysid_node.online.alignment import streaming
-from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.model_gap import model_gap
 from sysid_node.online.estimates.published import estimate
-from sysid_node.online.settings import METHODS, Settings
-from sysid_node.online.state import State
+from sysid_node.online.settings import METHODS, OnlineSettings
+from sysid_node.online.state import EstimatorState
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 AIRCRAFT = made_aircraft()
@@ -32,7 +32,7 @@ anything = st.one_of(
 )
 
 
-def assert_sound(state: State) -> None:
+def assert_sound(state: EstimatorState) -> None:
     """What is marked valid is a finite value inside a finite interval of positive length."""
     for d in estimate(state).derivatives.values():
         assert d.valid == (d.status == "ok")
@@ -40,12 +40,12 @@ def assert_sound(state: State) -> None:
             assert all(map(math.isfinite, d[1:5])), d
             assert d.lower < d.value < d.upper
             assert d.standard_error > 0.0
-    model_gap(state, present(state))
+    model_gap(state, current_solution(state))
 
 
-def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: str = "iv_rft") -> State:
+def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: str = "iv_rft") -> EstimatorState:
     """The state after the samples; numerical warnings count as errors."""
-    state = estimator.init(AIRCRAFT, Settings(method=method, settle_time=0.0))
+    state = estimator.init(AIRCRAFT, OnlineSettings(method=method, settle_time=0.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for time, sample in zip(times, samples, strict=True):
@@ -54,7 +54,7 @@ def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: st
     return state
 
 
-def left_out(state: State) -> int:
+def left_out(state: EstimatorState) -> int:
     """Samples that were counted as left out."""
     return sum(state.incomplete.values())
 
@@ -104,7 +104,7 @@ def test_nothing_but_nonsense(samples: list[list[float]]) -> None:
 def test_any_messages(data: st.DataObject) -> None:
     """Messages with any values and stamps through the intake, as the node and the replay feed them."""
     door = streaming.init(AIRCRAFT, 0.2)
-    state = estimator.init(AIRCRAFT, Settings(settle_time=0.0))
+    state = estimator.init(AIRCRAFT, OnlineSettings(settle_time=0.0))
     stamps = (1_000_000_000 + np.round(TIME * 1e9)).astype(int).tolist()
     odd = dict(data.draw(st.lists(st.tuples(st.integers(0, len(TIME) - 1), st.integers(-(10**9), 10**18)), max_size=8)))
     wrong = dict(data.draw(st.lists(st.tuples(st.integers(0, len(TIME) - 1), anything), max_size=8)))
@@ -154,7 +154,7 @@ def test_a_long_silence_is_not_bridged() -> None:
 
 
 def test_settling_counts_from_the_first_sample() -> None:
-    state = estimator.init(AIRCRAFT, Settings(settle_time=2.0))
+    state = estimator.init(AIRCRAFT, OnlineSettings(settle_time=2.0))
     for time, sample in zip((TIME + 50.0).tolist(), SAMPLES.tolist(), strict=True):
         estimator.update(state, time, sample)
         if time < 52.0:
@@ -165,11 +165,13 @@ def test_settling_counts_from_the_first_sample() -> None:
 def test_a_model_of_offsets_alone_is_refused() -> None:
     aircraft = replace(AIRCRAFT, derivatives={"CL_0": Derivative(0.1), "Cm_0": Derivative(0.0)})
     with pytest.raises(InputError, match="at least one besides offsets"):
-        estimator.init(aircraft, Settings())
+        estimator.init(aircraft, OnlineSettings())
 
 
-@pytest.mark.parametrize("settings", [Settings(window=10.0), Settings(forgetting_time=5.0)], ids=["window", "fading"])
-def test_what_was_flown_long_ago_is_forgotten(settings: Settings) -> None:
+@pytest.mark.parametrize(
+    "settings", [OnlineSettings(window=10.0), OnlineSettings(forgetting_time=5.0)], ids=["window", "fading"]
+)
+def test_what_was_flown_long_ago_is_forgotten(settings: OnlineSettings) -> None:
     """The elevator's effect changes without a test for changes: after five memories the new one alone is known."""
     changed = made_aircraft({**TRUTH, "Cm_de": 0.6 * TRUTH["Cm_de"]})
     time = np.arange(0.0, 60.0, 0.02)
@@ -186,7 +188,7 @@ def test_memory_does_not_grow() -> None:
     """Containers after two minutes are no longer than after one."""
     time = np.arange(0.0, 120.0, 0.05)
     samples = exact_flight(AIRCRAFT, time)
-    state = estimator.init(AIRCRAFT, Settings(window=20.0))
+    state = estimator.init(AIRCRAFT, OnlineSettings(window=20.0))
     sizes = []
     for i, (t, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
         estimator.update(state, t, sample)

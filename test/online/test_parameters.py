@@ -8,15 +8,15 @@ import yaml
 
 from sysid_node.errors import InputError
 from sysid_node.online.parameters import PARAMETERS, check, estimation_settings, identifier_yaml
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 
 
 def test_every_setting_of_the_estimator_is_a_parameter_with_the_same_default() -> None:
-    assert {field.name for field in fields(Settings)} <= DEFAULTS.keys()
-    assert estimation_settings(DEFAULTS) == Settings()
+    assert {field.name for field in fields(OnlineSettings)} <= DEFAULTS.keys()
+    assert estimation_settings(DEFAULTS) == OnlineSettings()
 
 
 def test_shipped_file_is_the_table() -> None:

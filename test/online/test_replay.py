@@ -10,7 +10,7 @@ from plant import exact_flight, made_aircraft
 
 from sysid_node.aircraft.model import Sensors
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -32,15 +32,15 @@ def flight(seed: int = 0, seconds: float = SECONDS) -> tuple[Array, Array]:
 @pytest.mark.parametrize(
     "settings",
     [
-        Settings(),
-        Settings(method="sls_rft", forgetting_time=5.0),
-        Settings(window=10.0, use_prior=True),
-        Settings(frequencies=(0.2, 0.1, 1.1), settle_time=0.0),  # ten lines: not a whole number of registers
-        Settings(frequencies=(0.5, 0.5, 10.0)),  # lines whose period is near the sampling interval
+        OnlineSettings(),
+        OnlineSettings(method="sls_rft", forgetting_time=5.0),
+        OnlineSettings(window=10.0, use_prior=True),
+        OnlineSettings(frequencies=(0.2, 0.1, 1.1), settle_time=0.0),  # ten lines: not a whole number of registers
+        OnlineSettings(frequencies=(0.5, 0.5, 10.0)),  # lines whose period is near the sampling interval
     ],
     ids=str,
 )
-def test_estimates_are_the_same_bits_however_often_they_are_asked_for(settings: Settings) -> None:
+def test_estimates_are_the_same_bits_however_often_they_are_asked_for(settings: OnlineSettings) -> None:
     """Samples are transformed when estimates are asked for; ``repr`` of a float tells every bit of it."""
     time, samples = flight()
     samples[700:703, 7] = math.nan
@@ -56,7 +56,7 @@ def test_estimates_are_the_same_bits_however_often_they_are_asked_for(settings: 
 def test_samples_without_thrust_are_left_out_once_it_is_known(lost: slice) -> None:
     time, samples = flight(2)
     samples[lost, THRUST] = np.nan
-    kept, settings = np.isfinite(samples[:, THRUST]), Settings(detect_changes=False)
+    kept, settings = np.isfinite(samples[:, THRUST]), OnlineSettings(detect_changes=False)
     found = run(AIRCRAFT, settings, time, samples, np.array([9.0]))
     assert repr(found) == repr(run(AIRCRAFT, settings, time[kept], samples[kept], np.array([9.0])))
     assert found[0].derivatives["CL_0"].status != "thrust not measured"
@@ -65,26 +65,26 @@ def test_samples_without_thrust_are_left_out_once_it_is_known(lost: slice) -> No
 def test_thrust_that_comes_late_is_not_believed() -> None:
     time, samples = flight(2)
     samples[:300, THRUST] = np.nan
-    found = run(AIRCRAFT, Settings(detect_changes=False), time, samples, np.array([13.0]))
+    found = run(AIRCRAFT, OnlineSettings(detect_changes=False), time, samples, np.array([13.0]))
     assert found[0].derivatives["CL_0"].status == "thrust not measured"
 
 
 def test_at_most_one_estimate_a_sample_and_none_beyond_the_end() -> None:
     time, samples = flight(5, 0.5)
-    found = run(AIRCRAFT, Settings(settle_time=0.0), time, samples, np.arange(0.0, 10.0, 0.001))
+    found = run(AIRCRAFT, OnlineSettings(settle_time=0.0), time, samples, np.arange(0.0, 10.0, 0.001))
     assert [one.time for one in found] == time.tolist()
 
 
 def test_progress_is_told() -> None:
     time, samples = flight(6)
     heard: list[float] = []
-    run(AIRCRAFT, Settings(), time, samples, np.empty(0), heard.append)
+    run(AIRCRAFT, OnlineSettings(), time, samples, np.empty(0), heard.append)
     assert heard == sorted(set(heard))
     assert heard[-1] == time[-1]
 
 
 def test_no_samples_give_no_estimates() -> None:
-    assert run(AIRCRAFT, Settings(), np.empty(0), np.empty((0, 15)), np.array([1.0])) == []
+    assert run(AIRCRAFT, OnlineSettings(), np.empty(0), np.empty((0, 15)), np.array([1.0])) == []
 
 
 def test_a_heavier_aircraft_is_noticed_between_renewals() -> None:
@@ -94,6 +94,6 @@ def test_a_heavier_aircraft_is_noticed_between_renewals() -> None:
     before, after = (exact_flight(aircraft, time, 4) for aircraft in (AIRCRAFT, other))
     samples = np.where(time[:, None] < 36.0, before, after)
     samples[:, :9] *= 1.0 + 0.05 * rng.normal(size=(time.size, 9))
-    found = run(AIRCRAFT, Settings(), time, samples, np.arange(0.1, 48.0, 0.1))
+    found = run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(0.1, 48.0, 0.1))
     statuses = {d.status for estimates in found for d in estimates.derivatives.values() if estimates.time > 36.0}
     assert statuses - {"ok", "converging"}

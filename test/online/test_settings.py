@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from sysid_node.errors import InputError
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 
 def test_texts_and_values_are_parsed_alike() -> None:
@@ -24,15 +24,15 @@ def test_texts_and_values_are_parsed_alike() -> None:
         "use_prior": True,
         "detect_changes": False,
     }
-    expected = Settings((0.2, 0.1, 1.5), "sls_rft", window=30.0, use_prior=True, detect_changes=False)
-    assert Settings.from_mapping(texts) == Settings.from_mapping(values) == expected
-    assert Settings.from_mapping({}) == Settings()
+    expected = OnlineSettings((0.2, 0.1, 1.5), "sls_rft", window=30.0, use_prior=True, detect_changes=False)
+    assert OnlineSettings.from_mapping(texts) == OnlineSettings.from_mapping(values) == expected
+    assert OnlineSettings.from_mapping({}) == OnlineSettings()
 
 
 def test_plain_values_come_back() -> None:
-    settings = Settings(window=12.0)
-    assert list(settings.as_dict()) == [field.name for field in fields(Settings)]
-    assert Settings.from_mapping(settings.as_dict()) == settings
+    settings = OnlineSettings(window=12.0)
+    assert list(settings.as_dict()) == [field.name for field in fields(OnlineSettings)]
+    assert OnlineSettings.from_mapping(settings.as_dict()) == settings
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_plain_values_come_back() -> None:
 )
 def test_what_is_impossible_is_said_in_one_line(key: str, value: Any, words: str) -> None:
     with pytest.raises(InputError) as error:
-        Settings.from_mapping({key: value})
+        OnlineSettings.from_mapping({key: value})
     text = str(error.value)
     assert words in text
     assert key in text
@@ -73,4 +73,4 @@ def test_what_is_impossible_is_said_in_one_line(key: str, value: Any, words: str
 
 def test_one_way_to_forget_at_a_time() -> None:
     with pytest.raises(InputError, match="one of them"):
-        Settings(forgetting_time=20.0, window=20.0)
+        OnlineSettings(forgetting_time=20.0, window=20.0)

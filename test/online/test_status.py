@@ -5,23 +5,23 @@ import pytest
 from plant import exact_flight, fly, made_aircraft, multisteps
 
 from sysid_node.online import estimator, status
-from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate, estimate_of
 from sysid_node.online.estimates.validity import SETTLING, STALE, judge
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import normal_equations
-from sysid_node.online.settings import METHODS, Settings
-from sysid_node.online.state import State
+from sysid_node.online.settings import METHODS, OnlineSettings
+from sysid_node.online.state import EstimatorState
 from sysid_node.online.status import vocabulary
 
 AIRCRAFT = made_aircraft()
-PLAN = normal_equations.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
+PLAN = normal_equations.normal_equations(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
 
 
-def flown(seconds: float, method: str = "iv_rft") -> State:
+def flown(seconds: float, method: str = "iv_rft") -> EstimatorState:
     """The state after 3-2-1-1s in light turbulence."""
     time, flights = fly(AIRCRAFT, multisteps(seconds, 100.0), gusts=0.5, closed_loop=False)
-    state = estimator.init(AIRCRAFT, Settings(method=method))
+    state = estimator.init(AIRCRAFT, OnlineSettings(method=method))
     for t, sample in zip(time.tolist(), flights[0].tolist(), strict=True):
         estimator.update(state, t, sample)
     return state
@@ -42,7 +42,7 @@ def test_every_number_has_its_word() -> None:
 @pytest.mark.parametrize("seconds", [3.0, 8.0, 25.0])
 def test_what_is_decided_at_a_sample_is_what_is_published_of_it(method: str, seconds: float) -> None:
     state = flown(seconds, method)
-    current, renewed = present(state), state.renewed
+    current, renewed = current_solution(state), state.renewed
     assert current is not None and renewed is not None
     codes = judge(state, renewed, current, state.transform.last)
     told = estimate(state).derivatives
@@ -54,7 +54,7 @@ def test_what_is_decided_at_a_sample_is_what_is_published_of_it(method: str, sec
 
 def test_what_holds_of_a_moment_holds_of_all_estimates() -> None:
     state = flown(12.0)
-    current, renewed, last = present(state), state.renewed, state.transform.last
+    current, renewed, last = current_solution(state), state.renewed, state.transform.last
     assert current is not None and renewed is not None
     assert set(judge(state, renewed, current, last + 1.01 * STALE)) == {status.STALE}
     state.changed_at = last - 0.99 * SETTLING
@@ -64,7 +64,7 @@ def test_what_holds_of_a_moment_holds_of_all_estimates() -> None:
 def test_intervals_without_an_end_are_not_valid() -> None:
     """However small the standard error is said to be that is allowed."""
     state = flown(25.0)
-    current, renewed = present(state), state.renewed
+    current, renewed = current_solution(state), state.renewed
     assert current is not None and renewed is not None
     good = judge(state, renewed, current, state.transform.last) == status.OK
     assert good.any()
@@ -78,10 +78,10 @@ def test_where_equations_cannot_be_solved_nothing_is_excited() -> None:
     """Nothing moves at all: no line has any energy."""
     time = np.arange(0.0, 3.0, 0.01)
     still = np.tile(exact_flight(AIRCRAFT, time[:2])[:1], (time.size, 1))
-    state = estimator.init(AIRCRAFT, Settings(method="sls_rft"))
+    state = estimator.init(AIRCRAFT, OnlineSettings(method="sls_rft"))
     for t, sample in zip(time.tolist(), still.tolist(), strict=True):
         estimator.update(state, t, sample)
-    current, renewed = present(state), state.renewed
+    current, renewed = current_solution(state), state.renewed
     assert current is not None and renewed is not None
     current.solution.usable = np.array(False)
     assert set(judge(state, renewed, current, state.transform.last)) == {status.NOT_EXCITED}

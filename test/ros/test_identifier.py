@@ -19,14 +19,14 @@ from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
 
 def expected_of(streams: Streams) -> dict[int, Estimates]:
     """What the desk makes of a flight at the default publish rate: header stamp -> estimates."""
-    aircraft, settings = load_aircraft("cdrw"), Settings()
+    aircraft, settings = load_aircraft("cdrw"), OnlineSettings()
     aligned = align_streams(aircraft, streams, settings.max_gap)
     due = due_times(aligned.time, aligned.wait, 20.0)
     results = run(aircraft, settings, aligned.time, aligned.samples, due)
@@ -171,7 +171,7 @@ def test_reset_and_save(probe: Probe, tmp_path: Path) -> None:
         content = json.loads(Path(saved.message).read_text(encoding="utf-8"))
         assert content["aircraft"] == "cdrw"
         assert content["samples"] == 599
-        assert content["settings"]["frequencies"] == list(Settings().frequencies)
+        assert content["settings"]["frequencies"] == list(OnlineSettings().frequencies)
         assert content["derivatives"].keys() == load_aircraft("cdrw").derivatives.keys()
         assert {"value", "standard_error", "lower", "upper", "valid", "status"} == content["derivatives"]["Cm_q"].keys()
         assert [path.name for path in folder.iterdir()] == [Path(saved.message).name]

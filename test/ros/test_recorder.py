@@ -11,7 +11,7 @@ from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
 SECONDS = 8.0
@@ -30,7 +30,7 @@ def test_a_bag_of_the_loop_replays_to_the_same_estimates(probe: Probe, tmp_path:
         stack.enter_context(ended(start("adaptive_controller", "--ros-args", "-p", "aircraft:=cdrw")))
         stack.enter_context(ended(start("flight_simulator", "--ros-args", *slow)))
         probe.until(lambda: len(probe.estimates) > SECONDS * 20.0, 90.0)
-    aircraft, settings = load_aircraft("cdrw"), Settings(method="sls_rft")
+    aircraft, settings = load_aircraft("cdrw"), OnlineSettings(method="sls_rft")
     aligned = align_streams(aircraft, read_streams(bag), settings.max_gap)
     due = due_times(aligned.time, aligned.wait, 20.0)
     stamps = aligned.stamps[np.searchsorted(aligned.time, due)].tolist()

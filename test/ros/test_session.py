@@ -10,7 +10,7 @@ from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.session import Due, Session
 
 
@@ -32,7 +32,7 @@ def fly(session: Session, flight: Streams, order: str) -> list[Due]:
 
 @pytest.fixture
 def session() -> Session:
-    return Session(load_aircraft("cdrw"), Settings(), 10.0)
+    return Session(load_aircraft("cdrw"), OnlineSettings(), 10.0)
 
 
 def test_estimates_fall_due_in_the_time_of_the_data(session: Session) -> None:
@@ -43,7 +43,8 @@ def test_estimates_fall_due_in_the_time_of_the_data(session: Session) -> None:
 
 def test_the_order_of_arrival_does_not_matter() -> None:
     one, other = (
-        fly(Session(load_aircraft("cdrw"), Settings(), 10.0), made_up_streams(5.0), order) for order in ("iaj", "jai")
+        fly(Session(load_aircraft("cdrw"), OnlineSettings(), 10.0), made_up_streams(5.0), order)
+        for order in ("iaj", "jai")
     )
     assert repr(one) == repr(other)
 
@@ -52,9 +53,9 @@ def test_flow_angles_that_fail_in_flight_make_estimates_stale_live_and_at_the_de
     """For a second no angle of attack is measured; samples go on, and what is known grows old meanwhile."""
     aircraft, flight = load_aircraft("cdrw"), made_up_streams(8.0)
     flight.air_data.values[500:600, 1] = math.nan
-    live = fly(Session(aircraft, Settings(), 10.0), flight, "iaj")
-    aligned = align_streams(aircraft, flight, Settings().max_gap)
-    desk = run(aircraft, Settings(), aligned.time, aligned.samples, due_times(aligned.time, aligned.wait, 10.0))
+    live = fly(Session(aircraft, OnlineSettings(), 10.0), flight, "iaj")
+    aligned = align_streams(aircraft, flight, OnlineSettings().max_gap)
+    desk = run(aircraft, OnlineSettings(), aligned.time, aligned.samples, due_times(aligned.time, aligned.wait, 10.0))
     assert repr([one.estimates for one in live]) == repr(desk)
     stale = [
         i for i, one in enumerate(live) if {d.status for d in one.estimates.derivatives.values()} == {"stale input"}

@@ -25,7 +25,7 @@ from sysid_node.flight.logs import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.truth import read_truth
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings as OnlineSettings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]

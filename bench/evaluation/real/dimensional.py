@@ -45,7 +45,7 @@ def regress(
     ``rates``: the left sides are the signals' rates of change. ``breaks`` (s): where the record begins anew.
     """
     layout = Layout(tuple(regressors))
-    plan = normal_equations.plan(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
+    plan = normal_equations.normal_equations(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
     grid = fourier_transform.lines(*frequencies)
     lines = information.spectrum(grid.omega, np.inf)
     total = information.nothing(layout)

@@ -32,7 +32,7 @@ from sysid_node.dynamics.forces import lift_and_drag
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.least_squares import Solution
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ Report = tuple[float, list[float], list[float]]
 
 
 @dataclass
-class Reconstruction:
+class FlowAngleFilter:
     """The filter: u v w m/s of the IMU's point against the mean air, phi theta rad, biases of p and q rad/s."""
 
     kinematics: Kinematics | None  # None: the aircraft file has no lift slope or no side-force slope
@@ -105,12 +105,12 @@ class Reconstruction:
         return self.missing is not None and any(self.missing)
 
 
-def init(aircraft: Aircraft) -> Reconstruction:
+def init(aircraft: Aircraft) -> FlowAngleFilter:
     """A filter that has seen nothing."""
-    return Reconstruction(_kinematics(aircraft))
+    return FlowAngleFilter(_kinematics(aircraft))
 
 
-def complete(filter_: Reconstruction, time: float, sample: Sequence[float], max_gap: float) -> Sequence[float]:
+def complete(filter_: FlowAngleFilter, time: float, sample: Sequence[float], max_gap: float) -> Sequence[float]:
     """The sample (``SAMPLE_COLUMNS``, controls), with the angles that its aircraft does not measure.
 
     The first sample decides which those are. NaN where the sample lacks what reconstruction needs. After a gap
@@ -131,7 +131,7 @@ def complete(filter_: Reconstruction, time: float, sample: Sequence[float], max_
     return filled
 
 
-def complete_many(filter_: Reconstruction, time: Array, samples: Array, max_gap: float) -> Array:
+def complete_many(filter_: FlowAngleFilter, time: Array, samples: Array, max_gap: float) -> Array:
     """``complete`` of samples (N, M) at ``time`` (N,) s, one after the other: the same bits."""
     if not time.size or (filter_.missing is not None and not filter_.active):
         return samples
@@ -142,7 +142,7 @@ def complete_many(filter_: Reconstruction, time: Array, samples: Array, max_gap:
     return np.array([first, *(complete(filter_, t, sample, max_gap) for t, sample in rest)])
 
 
-def remarks(filter_: Reconstruction) -> list[str]:
+def remarks(filter_: FlowAngleFilter) -> list[str]:
     """What a reader of the estimates should know of the angles; nothing where vanes measure both."""
     missing = filter_.missing or (False, False)
     angles = [angle for angle, absent in zip(("angle of attack", "sideslip"), missing, strict=True) if absent]
@@ -151,7 +151,7 @@ def remarks(filter_: Reconstruction) -> list[str]:
     return [f"Not measured, so reconstructed from IMU and airspeed: {' and '.join(angles)}."]
 
 
-def flaw(filter_: Reconstruction, at: float, name: str, regressors: Sequence[str]) -> str:
+def flaw(filter_: FlowAngleFilter, at: float, name: str, regressors: Sequence[str]) -> str:
     """Why the derivative of this name and coefficient's regressors cannot be known ``at`` (s); "" where it can."""
     if not filter_.active or filter_.missing is None:
         return ""
@@ -167,12 +167,12 @@ def flaw(filter_: Reconstruction, at: float, name: str, regressors: Sequence[str
 
 
 def doubt(
-    filter_: Reconstruction,
+    filter_: FlowAngleFilter,
     at: float,
     aircraft: Aircraft,
     layout: Layout,
     lines: Spectrum,
-    plan: Plan,
+    plan: NormalEquations,
     solution: Solution,
     info: Information,
 ) -> Array:
@@ -196,7 +196,7 @@ def doubt(
 
 
 def _error_energies(
-    filter_: Reconstruction, at: float, aircraft: Aircraft, layout: Layout, lines: Spectrum, info: Information
+    filter_: FlowAngleFilter, at: float, aircraft: Aircraft, layout: Layout, lines: Spectrum, info: Information
 ) -> list[float]:
     """Energies over the lines of the errors of alpha and beta that the file's errors make.
 
@@ -228,7 +228,7 @@ def _slack(aircraft: Aircraft, layout: Layout, coefficient: str, of: str) -> Arr
     return slack
 
 
-def _report(filter_: Reconstruction, at: float) -> Report:
+def _report(filter_: FlowAngleFilter, at: float) -> Report:
     """The report that stood ``at`` (s): a record at once completes samples long before they are looked at."""
     return next((report for report in reversed(filter_.reports) if report[0] <= at), (at, [0.0] * 3, [0.0] * 3))
 
@@ -265,7 +265,7 @@ def _linear(aircraft: Aircraft, coefficient: str, of: str) -> tuple[float, float
 
 
 def _angles(
-    filter_: Reconstruction, k: Kinematics, time: float, sample: Sequence[float], max_gap: float
+    filter_: FlowAngleFilter, k: Kinematics, time: float, sample: Sequence[float], max_gap: float
 ) -> tuple[float, float]:
     """Alpha and beta (rad) at the probe, after this sample; NaN where it lacks what they need."""
     V = sample[6]
@@ -291,7 +291,7 @@ def _angles(
     return _at_probe(filter_.state, k, sample)
 
 
-def _begin(filter_: Reconstruction, k: Kinematics, time: float, sample: Sequence[float]) -> None:
+def _begin(filter_: FlowAngleFilter, k: Kinematics, time: float, sample: Sequence[float]) -> None:
     """At the file's angle of attack, without sideslip, in a turn that neither slips nor speeds up."""
     ax, ay, az, _, _, r, V = sample[:7]
     alpha = max(min(_asked(k, sample, 0.0, (0.0, 0.0))[0], 0.3), -0.3)
@@ -314,7 +314,7 @@ def _sane(state: Sequence[float]) -> bool:
     return u > 0.5 and abs(pitch) < _STEEPEST and math.hypot(v, w) < u * math.tan(_STEEPEST)
 
 
-def _integrate(filter_: Reconstruction, step: float, sample: Sequence[float]) -> None:
+def _integrate(filter_: FlowAngleFilter, step: float, sample: Sequence[float]) -> None:
     """Heun's rule over the interval between two IMU messages: no half a sample's delay."""
     x = filter_.state
     first = _slopes(x, filter_.imu)
@@ -352,7 +352,7 @@ def _asked(k: Kinematics, sample: Sequence[float], alpha: float, biases: Sequenc
     return asked[0], asked[1]
 
 
-def _compare(filter_: Reconstruction, k: Kinematics, sample: Sequence[float]) -> None:
+def _compare(filter_: FlowAngleFilter, k: Kinematics, sample: Sequence[float]) -> None:
     """Sum up by how much airspeed and the references differ from the filter's."""
     u, v, w = _at_cg(filter_.state, k, sample)
     alpha, V = math.atan2(w, u), math.sqrt(u * u + v * v + w * w)
@@ -364,7 +364,7 @@ def _compare(filter_: Reconstruction, k: Kinematics, sample: Sequence[float]) ->
     filter_.count += 1
 
 
-def _correct(filter_: Reconstruction, k: Kinematics, time: float, air_interval: float) -> None:
+def _correct(filter_: FlowAngleFilter, k: Kinematics, time: float, air_interval: float) -> None:
     """Predict the covariance over the time since the last correction and take the mean surprises in.
 
     The airspeed is new every ``air_interval`` s.
@@ -395,7 +395,7 @@ def _correct(filter_: Reconstruction, k: Kinematics, time: float, air_interval: 
     )
 
 
-def _weigh(filter_: Reconstruction, span: float, values: Sequence[float], noise: float) -> None:
+def _weigh(filter_: FlowAngleFilter, span: float, values: Sequence[float], noise: float) -> None:
     """Count the energies of gusts in the airspeed (gusts across are as strong) and of the angles, in the band.
 
     ``noise`` is the variance that the sensor alone gives the airspeed's share.

@@ -75,7 +75,7 @@ class _Missing(Enum):
     FOR_GOOD = auto()
 
 
-class Complete(NamedTuple):
+class AlignedSample(NamedTuple):
     """A sample that is complete: SAMPLE_COLUMNS, then the aircraft's controls."""
 
     time: float  # s
@@ -124,7 +124,7 @@ class _Neighbours:
 
 
 @dataclass(slots=True)
-class IntakeState:
+class AlignmentState:
     """All that the intake remembers. ``accepted`` and ``rejected`` count messages by topic (and reason)."""
 
     actuation: Actuation
@@ -142,15 +142,15 @@ class IntakeState:
     rejected: Rejected = field(default_factory=lambda: {IMU: {}, AIR_DATA: {}, ACTUATORS: {}})
 
 
-def init(aircraft: Aircraft, max_gap: float) -> IntakeState:
+def init(aircraft: Aircraft, max_gap: float) -> AlignmentState:
     """An intake for an aircraft; ``max_gap`` s is the longest spacing of messages that is interpolated across."""
     actuation = Actuation.of(aircraft)
-    state = IntakeState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap))
+    state = AlignmentState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap))
     state.joints = ((), actuation.places(()))
     return state
 
 
-def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[Complete]:
+def on_imu(state: AlignmentState, stamp_ns: int, values: Values) -> list[AlignedSample]:
     """Takes ax ay az (m/s^2) p q r (rad/s), FRD; returns the samples that are now complete.
 
     Never raises for any numbers.
@@ -175,7 +175,7 @@ def on_imu(state: IntakeState, stamp_ns: int, values: Values) -> list[Complete]:
     return complete
 
 
-def on_air_data(state: IntakeState, stamp_ns: int, values: Values) -> list[Complete]:
+def on_air_data(state: AlignmentState, stamp_ns: int, values: Values) -> list[AlignedSample]:
     """Takes V (m/s), alpha, beta (rad), rho (kg/m^3); NaN = not measured. Returns as ``on_imu`` does.
 
     The angle of attack and the sideslip may be NaN, and are then NaN in the samples; where the density is, the aircraft
@@ -187,7 +187,9 @@ def on_air_data(state: IntakeState, stamp_ns: int, values: Values) -> list[Compl
     return _on_neighbour(state, state.air_data, stamp_ns, fault or known)
 
 
-def on_actuators(state: IntakeState, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> list[Complete]:
+def on_actuators(
+    state: AlignmentState, stamp_ns: int, names: Sequence[str], positions: Sequence[float]
+) -> list[AlignedSample]:
     """Takes joint positions (rad; throttle 0..1 or N) by name. Returns as ``on_imu`` does.
 
     Joints that the aircraft file does not name are ignored; without its throttle joint the thrust is NaN.
@@ -199,14 +201,14 @@ def on_actuators(state: IntakeState, stamp_ns: int, names: Sequence[str], positi
     return _on_neighbour(state, state.actuators, stamp_ns, state.actuation.of_message(places, positions))
 
 
-def stamp_of(state: IntakeState, time: float) -> int:
+def stamp_of(state: AlignmentState, time: float) -> int:
     """The header stamp, in ns, of the IMU message whose sample has this time; for samples just returned."""
     since = round(time * 1e9)
     base = next(base for base in reversed(state.bases) if base.since <= since)
     return base.stamp + since - base.since
 
 
-def _on_neighbour(state: IntakeState, topic: _Neighbours, stamp: int, values: Values | str) -> list[Complete]:
+def _on_neighbour(state: AlignmentState, topic: _Neighbours, stamp: int, values: Values | str) -> list[AlignedSample]:
     """Takes a message of an interpolated topic, or the reason why not."""
     fault = values if isinstance(values, str) else topic.clock.fault(stamp)
     if fault is not None or isinstance(values, str):
@@ -223,9 +225,9 @@ def _on_neighbour(state: IntakeState, topic: _Neighbours, stamp: int, values: Va
     return _release(state)
 
 
-def _release(state: IntakeState) -> list[Complete]:
+def _release(state: AlignmentState) -> list[AlignedSample]:
     """The samples whose neighbours have come, in order; counts those that have none close enough."""
-    complete: list[Complete] = []
+    complete: list[AlignedSample] = []
     waiting = state.waiting
     while waiting:
         imu = waiting[0]
@@ -245,12 +247,12 @@ def _release(state: IntakeState) -> list[Complete]:
     return complete
 
 
-def _completed(imu: _Waiting, air_data: _Pair, actuators: _Pair) -> Complete:
+def _completed(imu: _Waiting, air_data: _Pair, actuators: _Pair) -> AlignedSample:
     """The IMU message with what the other topics say at its stamp."""
     thrust, *controls = _interpolated(actuators, imu.stamp)
     right = air_data[1]
     sample = (*imu.values, *_interpolated(air_data, imu.stamp), thrust, right.interval / 1e9, *controls)
-    return Complete(imu.since / 1e9, sample, (max(right.stamp, actuators[1].stamp) - imu.stamp) / 1e9)
+    return AlignedSample(imu.since / 1e9, sample, (max(right.stamp, actuators[1].stamp) - imu.stamp) / 1e9)
 
 
 def _interpolated(pair: _Pair, stamp: int) -> Sequence[float]:
@@ -262,7 +264,7 @@ def _interpolated(pair: _Pair, stamp: int) -> Sequence[float]:
     return [a + weight * (b - a) for a, b in zip(left.values, right.values, strict=True)]
 
 
-def _give_up(state: IntakeState) -> None:
+def _give_up(state: AlignmentState) -> None:
     """Leaves out the IMU message that has waited longest, and takes it that the topics' clocks are set apart."""
     imu = state.waiting.popleft()
     missing = isinstance(_neighbours_of(state, state.air_data, imu), _Missing)
@@ -271,7 +273,7 @@ def _give_up(state: IntakeState) -> None:
         topic.ahead = topic.clock.epoch - state.clock.epoch
 
 
-def _neighbours_of(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Pair | _Missing:
+def _neighbours_of(state: AlignmentState, topic: _Neighbours, imu: _Waiting) -> _Pair | _Missing:
     """A topic's messages on both sides of an IMU message's stamp, or why there are none.
 
     A message of the same stamp stands on both sides. Forgets messages that are no longer needed.
@@ -296,7 +298,7 @@ def _neighbours_of(state: IntakeState, topic: _Neighbours, imu: _Waiting) -> _Pa
     return (left, right) if right.stamp - left.stamp <= state.gap else _Missing.FOR_GOOD
 
 
-def refuse(state: IntakeState, topic: str, reason: str) -> None:
+def refuse(state: AlignmentState, topic: str, reason: str) -> None:
     """Counts a message that is left out."""
     reasons = state.rejected[topic]
     reasons[reason] = reasons.get(reason, 0) + 1

@@ -18,7 +18,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.online.alignment.streaming import (
     KEPT_BUFFERS,
-    Complete,
+    AlignedSample,
     init,
     on_actuators,
     on_air_data,
@@ -28,7 +28,7 @@ from sysid_node.online.alignment.streaming import (
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 
-class Aligned(NamedTuple):
+class AlignedSamples(NamedTuple):
     """Samples in bulk: what feeding the messages one by one gives, to the last bit."""
 
     time: Array  # (N,) s
@@ -38,11 +38,11 @@ class Aligned(NamedTuple):
     wait: Array  # (N,) s from each to the last of the messages that it lies before
 
 
-def align_streams(aircraft: Aircraft, streams: Streams, max_gap: float) -> Aligned:
+def align_streams(aircraft: Aircraft, streams: Streams, max_gap: float) -> AlignedSamples:
     """The samples of a recording: all at once where clocks ran on and topics came together, else message by message."""
     bulk = align(aircraft, streams, max_gap)
     if is_regular(bulk, streams, max_gap):
-        return Aligned(bulk.time, bulk.samples, bulk.rejected, bulk.stamps, bulk.wait)
+        return AlignedSamples(bulk.time, bulk.samples, bulk.rejected, bulk.stamps, bulk.wait)
     return align_by_message(aircraft, streams, max_gap)
 
 
@@ -74,7 +74,7 @@ def _order_after(topic: ScreenedMessages, stamps: Stamps) -> Stamps:
     return np.append(topic.order, np.iinfo(np.int64).max)[after]
 
 
-def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> Aligned:
+def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> AlignedSamples:
     """Feeds the messages in the order in which they came."""
     state = init(aircraft, max_gap)
     imu, air_data, actuators = streams.imu, streams.air_data, streams.actuators
@@ -83,7 +83,7 @@ def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> Al
     rows = np.concatenate([np.arange(np.count_nonzero(topics == topic)) for topic in (0, 1, 2)])
     stamps = [stream.arrival.stamp_ns.tolist() for stream in (imu, air_data, actuators)]
     values = [stream.tolist() for stream in (imu.values, air_data.values, actuators.positions)]
-    complete: list[Complete] = []
+    complete: list[AlignedSample] = []
     sources: list[int] = []
     for place in np.argsort(order, kind="stable"):
         topic, row = int(topics[place]), int(rows[place])
@@ -98,4 +98,4 @@ def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> Al
     width = len(SAMPLE_COLUMNS) + len(aircraft.controls)
     time, samples, wait = (np.array([one[i] for one in complete]) for i in range(3))
     stamps_used = np.array(sources, np.int64)
-    return Aligned(time, samples.reshape(len(complete), width), state.rejected, stamps_used, wait)
+    return AlignedSamples(time, samples.reshape(len(complete), width), state.rejected, stamps_used, wait)

@@ -22,11 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.changes.excited_segments import Experience, recall
-from sysid_node.online.changes.score_test import Contradiction, Reference, contradiction, disagreement
+from sysid_node.online.changes.excited_segments import ExcitedSegments, estimates_of
+from sysid_node.online.changes.score_test import Reference, ScoreTest, disagreement, score_test
 from sysid_node.online.regression.information import Spectrum, clean_lines
-from sysid_node.online.regression.instruments import Auxiliary
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.instruments import InstrumentModel
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -47,7 +47,7 @@ OUTLIER = 10.0  # an F beyond this is no usual one
 
 
 @dataclass
-class Watch:
+class ChangeMonitor:
     """The last pieces of the transform, the estimates that belong to their starts, and what was found of the spans."""
 
     pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, W)
@@ -60,7 +60,7 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Finding:
+class ChangeDecision:
     """What the last seconds say of each coefficient (C,), and since when (s) all must be learned anew, if it must."""
 
     doubted: Flags
@@ -70,13 +70,13 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Looking:
+class ChangeTests:
     """What all tests of one time share."""
 
-    full: Plan
-    model: Auxiliary | None
+    full: NormalEquations
+    model: InstrumentModel | None
     spectrum: Spectrum
-    watch: Watch
+    watch: ChangeMonitor
     now: float
     memory: float  # s, inf = nothing is forgotten
 
@@ -84,7 +84,7 @@ class Looking:
         """Start (s) and clean lines of the last ``span`` pieces."""
         return self.watch.pieces[-span][0], clean_lines(_summed(self.watch.pieces, span), self.model)
 
-    def contradictions(self, spans: Iterable[int]) -> Iterator[tuple[int, Contradiction]]:
+    def contradictions(self, spans: Iterable[int]) -> Iterator[tuple[int, ScoreTest]]:
         """How the last pieces contradict the estimates from before them: of the ``spans`` (rising) that have such."""
         known = list(_stretches(self.watch, self.watch.pieces, self.now, spans))
         return zip(spans, _tested(known, self.model, self.spectrum), strict=False)
@@ -105,7 +105,7 @@ def _summed(pieces: Sequence[tuple[float, Array]], span: int) -> Array:
 
 
 def _stretches(
-    watch: Watch, pieces: Sequence[tuple[float, Array]], end: float, spans: Iterable[int]
+    watch: ChangeMonitor, pieces: Sequence[tuple[float, Array]], end: float, spans: Iterable[int]
 ) -> Iterator[_Stretch]:
     """The last of the ``pieces``, up to ``end`` (s): of the ``spans`` up to the first without estimates before it."""
     for span in spans:
@@ -116,12 +116,12 @@ def _stretches(
         yield _Stretch(start, end, _summed(pieces, span), reference)
 
 
-def _tested(stretches: Sequence[_Stretch], model: Auxiliary | None, spectrum: Spectrum) -> Iterator[Contradiction]:
+def _tested(stretches: Sequence[_Stretch], model: InstrumentModel | None, spectrum: Spectrum) -> Iterator[ScoreTest]:
     """How each contradicts the estimates from before it; those by the same equations at once."""
     for _, some in groupby(stretches, key=lambda stretch: id(stretch.before.plan)):
         starts, ends, parts, references = zip(*some, strict=True)
         lines, duration = clean_lines(np.array(parts), model), np.array(ends) - np.array(starts)
-        yield from contradiction(Reference.stacked(references), lines, spectrum, duration).each()
+        yield from score_test(Reference.stacked(references), lines, spectrum, duration).each()
 
 
 def _due(look: int) -> list[int]:
@@ -129,7 +129,7 @@ def _due(look: int) -> list[int]:
     return [span for span in SPANS if not look % max(span // EVERY, 1)]
 
 
-def examine(looking: Looking, experiences: list[Experience]) -> Finding:
+def examine(looking: ChangeTests, experiences: list[ExcitedSegments]) -> ChangeDecision:
     """Test the spans that are due; see the module's text."""
     watch, C = looking.watch, len(looking.full.coefficients)
     watch.looks += 1
@@ -146,48 +146,48 @@ def examine(looking: Looking, experiences: list[Experience]) -> Finding:
     doubted = np.any([none if watch.disowned is None else watch.disowned, *watch.doubted.values()], axis=0)
     lost = none if watch.lost is None else watch.lost
     if surest >= FALSE_ALARM:
-        return Finding(doubted, lost)
+        return ChangeDecision(doubted, lost)
     span = _onset(looking)
     changed = any(_contradicted(looking, span, experience, block) for block, experience in enumerate(experiences))
     # the change fell somewhere in the oldest piece: what came after it is all new
-    return Finding(doubted, lost, watch.pieces[1 - span][0], changed)
+    return ChangeDecision(doubted, lost, watch.pieces[1 - span][0], changed)
 
 
-def _usual(watch: Watch, span: int, C: int) -> Array:
+def _usual(watch: ChangeMonitor, span: int, C: int) -> Array:
     """(C,) the usual F before the last ``span`` pieces, at least 1."""
     return watch.usual[-span] if span <= len(watch.usual) else np.ones(C)
 
 
-def _get_used_to(watch: Watch, found: Contradiction, C: int) -> None:
+def _get_used_to(watch: ChangeMonitor, found: ScoreTest, C: int) -> None:
     """Where models are not exact F is usually more than chance makes it."""
     last = watch.usual[-1] if watch.usual else np.ones(C)
     watch.usual.append(np.maximum(last + LEARNING * (np.minimum(found.statistic, OUTLIER) - last), 1.0))
 
 
-def _onset(looking: Looking) -> int:
+def _onset(looking: ChangeTests) -> int:
     """Pieces since the change: the shortest span that contradicts about as much as any."""
     every = looking.contradictions(range(SPANS[0], len(looking.watch.pieces) + 1))
     quadratics = [float((found.statistic * found.count)[found.freedom >= KNOWN].max(initial=0.0)) for _, found in every]
     return SPANS[0] + int(np.argmax(np.array(quadratics) >= AS_MUCH * max(quadratics)))
 
 
-def _contradicted(looking: Looking, span: int, experience: Experience, block: int) -> bool:
+def _contradicted(looking: ChangeTests, span: int, experience: ExcitedSegments, block: int) -> bool:
     """Whether the last ``span`` pieces contradict earlier manoeuvres that moved the controls as much."""
     start, lines = looking.lines(span)
-    reference = recall(experience, looking.full, looking.now - looking.memory, start)
+    reference = estimates_of(experience, looking.full, looking.now - looking.memory, start)
     if reference is None or experience.beyond((lines[:, experience.controls] ** 2).sum(axis=0)):
         return False
-    found = contradiction(reference, lines, looking.spectrum, looking.now - start)
+    found = score_test(reference, lines, looking.spectrum, looking.now - start)
     mine = (looking.full.block == block) & (found.freedom >= KNOWN)
     return bool((found.chance(MARGIN)[mine] < FALSE_ALARM).any())
 
 
-def compare(full: Plan, watch: Watch, experiences: list[Experience], memory: float) -> None:
+def compare(full: NormalEquations, watch: ChangeMonitor, experiences: list[ExcitedSegments], memory: float) -> None:
     """Doubt the estimates of a long time that those from well-excited flight contradict."""
     published = watch.references[-1]
     watch.disowned = np.zeros(len(full.coefficients), dtype=bool)
     for block, experience in enumerate(experiences):
-        reference = recall(experience, full, published.time - memory, published.time)
+        reference = estimates_of(experience, full, published.time - memory, published.time)
         if reference is not None:
             firm = (full.block == block) & (reference.uncertainty.freedom >= KNOWN)
             watch.disowned |= firm & (disagreement(reference, published) < DOUBT)

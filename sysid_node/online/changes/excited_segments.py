@@ -19,7 +19,7 @@ from sysid_node.online.changes.score_test import Reference
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.information import Information
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Segment:
 
 
 @dataclass
-class Experience:
+class ExcitedSegments:
     """Of one block of equations: the last segments in which any of its controls moved much."""
 
     controls: NDArray[np.intp]  # columns of the block's controls
@@ -56,14 +56,14 @@ class Experience:
         return bool((COMPARABLE * energy > self.peaks()).any())
 
 
-def experiences(plan: Plan, layout: Layout) -> list[Experience]:
+def no_excited_segments(plan: NormalEquations, layout: Layout) -> list[ExcitedSegments]:
     """None as yet, for each block of the plan."""
     blocks = (plan.columns[plan.group == block] for block in range(int(plan.group.max()) + 1))
     moved = np.arange(layout.width)[layout.deflections]
-    return [Experience(columns[np.isin(columns, moved)]) for columns in blocks]
+    return [ExcitedSegments(columns[np.isin(columns, moved)]) for columns in blocks]
 
 
-def learn(known: Sequence[Experience], said: Information, end: float) -> None:
+def remember(known: Sequence[ExcitedSegments], said: Information, end: float) -> None:
     """Remember a segment that ended at ``end`` (s) where its controls moved much."""
     energies = said.grams.sum(axis=0).diagonal()
     for experience in known:
@@ -72,7 +72,7 @@ def learn(known: Sequence[Experience], said: Information, end: float) -> None:
             experience.segments.append(Segment(end, energy, said))
 
 
-def recall(experience: Experience, full: Plan, since: float, before: float) -> Reference | None:
+def estimates_of(experience: ExcitedSegments, full: NormalEquations, since: float, before: float) -> Reference | None:
     """The estimates by the well-excited segments that ended in ``since``..``before`` (s); None where there are none."""
     chosen = [s for s in experience.segments if since < s.end <= before + 1e-6 and experience.within_reach(s.energy)]
     if not chosen:
@@ -81,7 +81,7 @@ def recall(experience: Experience, full: Plan, since: float, before: float) -> R
     for segment in chosen[1:]:
         said = said + segment.said
     gram = said.grams.sum(axis=0)
-    hold = least_squares.hold(full, least_squares.solve(full, gram), said)
-    plan = normal_equations.trusting(full, hold.strength)
+    hold = least_squares.instrument_strength(full, least_squares.solve(full, gram), said)
+    plan = normal_equations.with_strong_instruments(full, hold.strength)
     solution = least_squares.solve(plan, gram)
     return Reference(chosen[-1].end, plan, solution, least_squares.uncertainty(plan, solution, said))

@@ -28,7 +28,7 @@ from scipy.special import fdtrc
 
 from sysid_node.online.regression.information import Spectrum
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Reference:
     """The estimates as they stood at one time (s), and by which equations."""
 
     time: float
-    plan: Plan
+    plan: NormalEquations
     solution: Solution
     uncertainty: Uncertainty
 
@@ -59,7 +59,7 @@ def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArr
 
 
 @dataclass(frozen=True)
-class Contradiction:
+class ScoreTest:
     """Of C coefficients over one stretch, or over each of several (...)."""
 
     statistic: Array  # (..., C) F
@@ -72,14 +72,14 @@ class Contradiction:
         """(..., C) probability of a statistic so large, ``margin`` times over, where nothing has changed."""
         return np.asarray(fdtrc(self.count, np.maximum(self.freedom, 1.0), self.statistic / margin))
 
-    def each(self) -> Iterator[Contradiction]:
+    def each(self) -> Iterator[ScoreTest]:
         """Those of the several stretches, one by one."""
         freedom = np.broadcast_to(self.freedom, self.statistic.shape)
         for some in zip(self.statistic, freedom, self.unexplained, self.share, strict=True):
-            yield Contradiction(some[0], self.count, *some[1:])
+            yield ScoreTest(some[0], self.count, *some[1:])
 
 
-def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, duration: Any) -> Contradiction:
+def score_test(reference: Reference, lines: Array, spectrum: Spectrum, duration: Any) -> ScoreTest:
     """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
     plan, known = reference.plan, reference.uncertainty
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
@@ -99,10 +99,10 @@ def contradiction(reference: Reference, lines: Array, spectrum: Spectrum, durati
     spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
     score = (left_over.take(plan.instruments, axis=-2) * plan.mine).swapaxes(-1, -2)
     motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(plan.outputs, axis=-1), TINY)
-    return Contradiction(_normalised(plan, spread, score) / count, count, known.freedom, excess, rest / motion)
+    return ScoreTest(_normalised(plan, spread, score) / count, count, known.freedom, excess, rest / motion)
 
 
-def _unexplained(plan: Plan, reference: Reference, regressed: Array, left_over: Array) -> Array:
+def _unexplained(plan: NormalEquations, reference: Reference, regressed: Array, left_over: Array) -> Array:
     """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
     misfit: Array = left_over.take(plan.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
     score = left_over.take(plan.columns, axis=-2) * plan.mine
@@ -126,7 +126,7 @@ def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
     return np.tile(np.searchsorted(ends, np.arange(ends[-1]), side="right"), 2)
 
 
-def _normalised(plan: Plan, spread: Array, score: Array) -> Array:
+def _normalised(plan: NormalEquations, spread: Array, score: Array) -> Array:
     """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong."""
     mine = plan.mine.T
     variance = spread.diagonal(axis1=-2, axis2=-1) * mine

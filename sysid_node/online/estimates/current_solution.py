@@ -13,14 +13,14 @@ from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.information import products
 from sysid_node.online.regression.least_squares import Solution
 from sysid_node.online.regression.mixed_estimation import weighed
-from sysid_node.online.regression.normal_equations import Plan
-from sysid_node.online.state import Renewed, State
+from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.state import EstimatorState, SegmentSolution
 
 Array = NDArray[np.float64]
 
 
 @dataclass
-class Present:
+class CurrentSolution:
     """What is solved for with all samples so far: D derivatives, P unknowns, W signals."""
 
     time: float  # s, of the last sample
@@ -31,7 +31,7 @@ class Present:
     size: Array  # (P,) absolute values of the inverse's diagonal
 
 
-def present(state: State) -> Present | None:
+def current_solution(state: EstimatorState) -> CurrentSolution | None:
     """Values and variances of all derivatives with every sample so far; None before the first half second of data."""
     renewed, plan = state.renewed, state.plan
     if renewed is None:
@@ -53,10 +53,10 @@ def present(state: State) -> Present | None:
     numbers[0, :, :P], numbers[1, :, :P] = slopes, variances
     numbers[0, :, P], numbers[1, :, P] = _offsets(plan, renewed, integrals, slopes)
     values, squares = numbers.reshape(2, C * (P + 1)).take(state.model.table.place, axis=-1)
-    return Present(time, values, np.maximum(squares, 0.0), solution, gram, size)
+    return CurrentSolution(time, values, np.maximum(squares, 0.0), solution, gram, size)
 
 
-def slope_variances(renewed: Renewed, residual: Array, size: Array, growth: float) -> Array:
+def slope_variances(renewed: SegmentSolution, residual: Array, size: Array, growth: float) -> Array:
     """(C, P) squared standard errors of the slopes, before the aircraft file's values are counted in.
 
     ``residual`` (C,) and ``size`` (P,): of the present solution; ``growth``: see ``growth_since``.
@@ -66,7 +66,7 @@ def slope_variances(renewed: Renewed, residual: Array, size: Array, growth: floa
     return variances
 
 
-def growth_since(renewed: Renewed, time: float) -> float:
+def growth_since(renewed: SegmentSolution, time: float) -> float:
     """How many times as much time is counted at ``time`` (s) as at the last renewal.
 
     The noise's part in the equations has grown by so much since, and the variances have shrunk by it.
@@ -75,14 +75,14 @@ def growth_since(renewed: Renewed, time: float) -> float:
     return (energy + (time - renewed.time)) / max(energy, 1e-9)
 
 
-def _with_beliefs(state: State, renewed: Renewed, slopes: Array) -> tuple[Array, Array]:
+def _with_beliefs(state: EstimatorState, renewed: SegmentSolution, slopes: Array) -> tuple[Array, Array]:
     """(C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their variances."""
     covariance = renewed.uncertainty.covariance
     values, spread = weighed(state.plan, slopes.T, covariance, *state.model.believed)
     return values.T, spread.diagonal(axis1=1, axis2=2)
 
 
-def _offsets(plan: Plan, renewed: Renewed, integrals: Array, slopes: Array) -> tuple[Array, Array]:
+def _offsets(plan: NormalEquations, renewed: SegmentSolution, integrals: Array, slopes: Array) -> tuple[Array, Array]:
     """(C,) offsets and their variances, from the ``integrals`` (W,) of all signals.
 
     At zero frequency k C_0 = y - sum k C_j x_j, with the ``slopes`` (C, P).

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.estimates.current_solution import Present, growth_since, slope_variances
+from sysid_node.online.estimates.current_solution import CurrentSolution, growth_since, slope_variances
 from sysid_node.online.regression import least_squares
-from sysid_node.online.state import State
+from sysid_node.online.state import EstimatorState
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class CoefficientGap(NamedTuple):
     deviation: float  # ... in standard errors of the difference, tolerance included; NaN = not known
 
 
-def model_gap(state: State, current: Present | None) -> list[CoefficientGap]:
+def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[CoefficientGap]:
     """Gap of every coefficient whose equation can be formed, at the moment ``current``; empty before there is one."""
     renewed = state.renewed
     if current is None or renewed is None or not current.solution.usable:

@@ -8,23 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online import status
-from sysid_node.online.estimates.current_solution import Present, present
+from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.estimates.rows import DerivativeRows, FitRows
-from sysid_node.online.estimates.validity import grounds_of, judge
+from sysid_node.online.estimates.validity import judge, validity_basis
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import weak_instruments
-from sysid_node.online.state import Renewed, State
+from sysid_node.online.state import EstimatorState, SegmentSolution
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
 
 
-def estimate(state: State, now: float | None = None) -> Estimates:
+def estimate(state: EstimatorState, now: float | None = None) -> Estimates:
     """All derivatives of the aircraft's model with their intervals; ``now`` (s) tells how old the last sample is."""
-    return estimate_of(state, present(state), now)
+    return estimate_of(state, current_solution(state), now)
 
 
-def estimate_of(state: State, current: Present | None, now: float | None = None) -> Estimates:
+def estimate_of(state: EstimatorState, current: CurrentSolution | None, now: float | None = None) -> Estimates:
     """The same from what was just solved for."""
     time, renewed = state.transform.last, state.renewed
     if current is None or renewed is None:
@@ -40,29 +40,29 @@ def estimate_of(state: State, current: Present | None, now: float | None = None)
     return Estimates(time, derivatives, FitRows(model.plan.coefficients, _fits(state, renewed, current)))
 
 
-def _intervals(state: State, renewed: Renewed, current: Present) -> Array:
+def _intervals(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolution) -> Array:
     """(D, 4) value, standard error, lower and upper end of the interval of each derivative."""
     values, variances = current.values, current.variances
-    below, above = weak_instruments.reach(grounds_of(state, renewed).squares * variances, renewed.bend)
+    below, above = weak_instruments.interval_arms(validity_basis(state, renewed).squares * variances, renewed.bend)
     return np.stack([values, np.sqrt(variances), values - below, values + above], axis=-1)
 
 
-def _fits(state: State, renewed: Renewed, current: Present) -> Array:
+def _fits(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolution) -> Array:
     """(C, 4) numbers of the fits, see ``rows``."""
     solution = current.solution
     fits = np.empty((solution.motion.size, 4))
     explained = 1.0 - solution.residual / np.maximum(solution.motion, 1e-300)
-    fits[:, 0], fits[:, 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), grounds_of(state, renewed).fits
+    fits[:, 0], fits[:, 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), validity_basis(state, renewed).fits
     return fits
 
 
-def _nothing_known(state: State) -> dict[str, DerivativeEstimate]:
+def _nothing_known(state: EstimatorState) -> dict[str, DerivativeEstimate]:
     """All derivatives before there is anything to solve."""
     every = (f"{c}_{r}" for c, regressors in state.model.aircraft.model_structure.items() for r in regressors)
     return {name: _unknown(state, name) for name in every}
 
 
-def _unknown(state: State, name: str) -> DerivativeEstimate:
+def _unknown(state: EstimatorState, name: str) -> DerivativeEstimate:
     """A derivative of which nothing is known, and why."""
     reason = regression_signals.unformed(state.model.aircraft).get(name.partition("_")[0])
     if reason is None and state.incomplete and state.samples == 0:

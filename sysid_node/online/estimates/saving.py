@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sysid_node.errors import InputError
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
 
@@ -18,7 +18,7 @@ def save_estimates(
     estimates: Estimates,
     *,
     aircraft: str,
-    settings: Settings,
+    settings: OnlineSettings,
     stamp_ns: int,
     samples: int,
     rejected: Mapping[str, int],

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from sysid_node.online import status
 from sysid_node.online.alignment import flow_angle_filter
-from sysid_node.online.estimates.current_solution import Present
+from sysid_node.online.estimates.current_solution import CurrentSolution
 from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.least_squares import student_95
-from sysid_node.online.state import Grounds, Renewed, State
+from sysid_node.online.state import EstimatorState, SegmentSolution, ValidityBasis
 from sysid_node.online.status import Codes
 
 Array = NDArray[np.float64]
@@ -30,13 +30,13 @@ NARROWEST = 1e-12  # share of an estimate under which its standard error is roun
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
-def grounds_of(state: State, renewed: Renewed) -> Grounds:
+def validity_basis(state: EstimatorState, renewed: SegmentSolution) -> ValidityBasis:
     """What the judgement of all estimates rests on until the next renewal; weighed once."""
     renewed.grounds = renewed.grounds or _weigh(state, renewed)
     return renewed.grounds
 
 
-def _weigh(state: State, renewed: Renewed) -> Grounds:
+def _weigh(state: EstimatorState, renewed: SegmentSolution) -> ValidityBasis:
     """See ``grounds_of``."""
     table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
     c = table.coefficient
@@ -47,7 +47,7 @@ def _weigh(state: State, renewed: Renewed) -> Grounds:
     cautions = np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])
     caution, longest = np.maximum(cautions, 1.0), renewed.bend.longest(squares)
     stds, samples = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density), round(renewed.total.samples)
-    return Grounds(
+    return ValidityBasis(
         sound=(held >= normal_equations.STRONG)[c] & (against == status.OK),
         against=against,
         squares=squares,
@@ -59,7 +59,7 @@ def _weigh(state: State, renewed: Renewed) -> Grounds:
     )
 
 
-def _against(state: State, renewed: Renewed) -> Codes:
+def _against(state: EstimatorState, renewed: SegmentSolution) -> Codes:
     """(D,) what speaks against each whatever the present says; what is found later counts more."""
     table, words = state.model.table, state.model.vocabulary
     c = table.coefficient
@@ -79,9 +79,9 @@ def _against(state: State, renewed: Renewed) -> Codes:
     return against
 
 
-def judge(state: State, renewed: Renewed, current: Present, now: float) -> Codes:
+def judge(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolution, now: float) -> Codes:
     """(D,) statuses of the estimates ``current``, at ``now`` (s)."""
-    table, plan, grounds = state.model.table, state.plan, grounds_of(state, renewed)
+    table, plan, grounds = state.model.table, state.plan, validity_basis(state, renewed)
     motion = current.gram.reshape(-1).take(plan.energy)
     inflation = current.size * motion
     buried = motion < grounds.floor
@@ -102,7 +102,7 @@ def judge(state: State, renewed: Renewed, current: Present, now: float) -> Codes
     return codes
 
 
-def _narrow(grounds: Grounds, current: Present) -> Flags:
+def _narrow(grounds: ValidityBasis, current: CurrentSolution) -> Flags:
     """(D,) whether standard errors are small enough, and no rounding; and intervals have an end."""
     squares, allowed = current.values * current.values, grounds.allowed
     if grounds.relative is not None:
@@ -113,20 +113,27 @@ def _narrow(grounds: Grounds, current: Present) -> Flags:
     return narrow
 
 
-def _poor(current: Present) -> Flags:
+def _poor(current: CurrentSolution) -> Flags:
     """(C,) whether the model leaves most of a coefficient's motion unexplained: its interval means nothing then."""
     residual, motion = current.solution.residual, current.solution.motion
     poor: Flags = residual > POOR * np.maximum(motion, least_squares.TINY)
     return poor
 
 
-def _lost_with(state: State, hidden: Flags) -> Flags:
+def _lost_with(state: EstimatorState, hidden: Flags) -> Flags:
     """(D,) offsets that hold what a hidden slope (P,) of their coefficient does."""
     table = state.model.table
     return np.asarray(((hidden @ state.plan.mine) > 0.0).take(table.coefficient) & table.offset)
 
 
-def _reasons(state: State, grounds: Grounds, current: Present, inflation: Array, buried: Flags, poor: Flags) -> Codes:
+def _reasons(
+    state: EstimatorState,
+    grounds: ValidityBasis,
+    current: CurrentSolution,
+    inflation: Array,
+    buried: Flags,
+    poor: Flags,
+) -> Codes:
     """(D,) what speaks against each.
 
     ``inflation`` (P,) of its unknown's variance, a regressor ``buried`` (P,) in noise, a ``poor`` (C,) fit.
@@ -136,7 +143,7 @@ def _reasons(state: State, grounds: Grounds, current: Present, inflation: Array,
     reasons = np.where(poor.take(table.coefficient), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
     collinear = (inflation.take(table.unknown) > COLLINEAR) & slope
     if collinear.any():
-        rivals = least_squares.rivals(state.plan, current.solution).take(table.unknown)
+        rivals = least_squares.most_correlated(state.plan, current.solution).take(table.unknown)
         reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
     reasons[buried.take(table.unknown) & slope] = status.NOT_EXCITED
     np.copyto(reasons, grounds.against, where=grounds.against != status.OK)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Lag(NamedTuple):
     standard_error: float
 
 
-class Timing(NamedTuple):
+class LagTest(NamedTuple):
     """The surest lag of each control, and the estimates that it spoils."""
 
     lags: tuple[Lag, ...]
@@ -42,7 +42,7 @@ class Timing(NamedTuple):
     blamed: dict[int, str]  # coefficient -> control
 
 
-def examine(plan: Plan, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array) -> Timing:
+def examine(plan: NormalEquations, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array) -> LagTest:
     """Solve every equation again with the rate of each of its controls; ``gram`` (W, W) is that of ``solution``."""
     spoilt = np.zeros(plan.mine.shape, dtype=bool)
     blamed: dict[int, str] = {}
@@ -64,11 +64,18 @@ def examine(plan: Plan, layout: Layout, solution: Solution, spread: Uncertainty,
             if abs(lag.delay) > SURE * lag.standard_error and bad.any():
                 spoilt[mine[bad], c] = True
                 blamed[c] = symbol
-    return Timing(tuple(best.values()), spoilt, blamed)
+    return LagTest(tuple(best.values()), spoilt, blamed)
 
 
 def _with_rate(
-    plan: Plan, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array, c: int, symbol: str, place: int
+    plan: NormalEquations,
+    layout: Layout,
+    solution: Solution,
+    spread: Uncertainty,
+    gram: Array,
+    c: int,
+    symbol: str,
+    place: int,
 ) -> tuple[Lag | None, Array]:
     """The control's lag by one coefficient's equation, and how far (p,) its estimates move when it is allowed for."""
     mine = plan.unknowns(c)

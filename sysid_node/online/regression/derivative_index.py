@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 
 @dataclass(frozen=True)
-class Table:
+class DerivativeIndex:
     """Over the D derivatives whose equations can be formed, in the aircraft file's order."""
 
     names: tuple[str, ...]
@@ -34,7 +34,7 @@ class Table:
         return self.names + self.unformed
 
 
-def table(aircraft: Aircraft, plan: Plan, valid_fraction: float) -> Table:
+def derivative_index(aircraft: Aircraft, plan: NormalEquations, valid_fraction: float) -> DerivativeIndex:
     """The aircraft's derivatives in the solution of its ``plan``.
 
     A standard error is measured against the believed size of a derivative, or twice its tolerance where that is more:
@@ -55,7 +55,7 @@ def table(aircraft: Aircraft, plan: Plan, valid_fraction: float) -> Table:
         sizes.append(max(abs(belief.value), 2.0 * (belief.tolerance or 0.0)))
     coefficient, unknown, offset = np.array(coefficients, np.intp), np.array(unknowns, np.intp), np.array(offsets)
     P = len(plan.regressors)
-    return Table(
+    return DerivativeIndex(
         names=tuple(names),
         coefficient=coefficient,
         unknown=unknown,

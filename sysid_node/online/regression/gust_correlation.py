@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.heteroskedasticity import DOUBT, Unevenness
+from sysid_node.online.regression.heteroskedasticity import DOUBT, NoiseMoments
 from sysid_node.online.regression.least_squares import Solution, Uncertainty, misfits
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,13 @@ def inflation(spread: Uncertainty, gusts: Array) -> Array:
 
 
 def sensed(
-    aircraft: Aircraft, plan: Plan, solution: Solution, bias: Array, uneven: Unevenness, step: float, omega: Array
+    aircraft: Aircraft,
+    plan: NormalEquations,
+    solution: Solution,
+    bias: Array,
+    uneven: NoiseMoments,
+    step: float,
+    omega: Array,
 ) -> Array:
     """(C,) density of the sensors' noise in the residuals.
 

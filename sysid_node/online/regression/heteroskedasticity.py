@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 DOUBT = 1.5  # times the sensors' noise that a residual holds before it is more than that
@@ -27,7 +27,7 @@ RIDGE, TINY = 1e-9, 1e-100  # set regressors apart that moved alike, or not at a
 
 
 @dataclass
-class Unevenness:
+class NoiseMoments:
     """Integrals over time, of C coefficients and P unknowns."""
 
     weighted: Array | float = 0.0  # (C, P, P) of w x x'
@@ -38,24 +38,24 @@ class Unevenness:
     steady: Array | float = 0.0  # (C,) of the accelerometer's noise density, where it matters beside that w
     duration: float = 0.0  # s
 
-    def __add__(self, other: Unevenness) -> Unevenness:
-        return Unevenness(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+    def __add__(self, other: NoiseMoments) -> NoiseMoments:
+        return NoiseMoments(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
 
-    def __mul__(self, factor: float) -> Unevenness:
-        return Unevenness(*(getattr(self, f.name) * factor for f in fields(self)))
+    def __mul__(self, factor: float) -> NoiseMoments:
+        return NoiseMoments(*(getattr(self, f.name) * factor for f in fields(self)))
 
 
 def measure(
     aircraft: Aircraft,
     layout: Layout,
-    plan: Plan,
+    plan: NormalEquations,
     theta: Array,
     rows: Array,
     mean: Array,
     duration: float,
     every: float,
     boxes: int,
-) -> Unevenness:
+) -> NoiseMoments:
     """Of a stretch of ``duration`` (s): signals ``rows`` (N, T) about their ``mean`` (T,).
 
     ``theta`` (P, C): derivatives, right in size, such as the aircraft file's. ``every`` (s): the air data's interval,
@@ -78,7 +78,7 @@ def measure(
     sums = [np.add.reduceat(density, starts) * (every * step) for density in (w, lifted)]
     weighted, by_lift = ((w.T[:, :, None] * slow).swapaxes(1, 2) @ slow for w in sums)
     powers = [w.sum(axis=0) for w in sums]
-    return Unevenness(weighted, powers[0], (counts * slow).T @ slow * step, by_lift, powers[1], steady, duration)
+    return NoiseMoments(weighted, powers[0], (counts * slow).T @ slow * step, by_lift, powers[1], steady, duration)
 
 
 def _per_acceleration(aircraft: Aircraft) -> float:
@@ -87,7 +87,7 @@ def _per_acceleration(aircraft: Aircraft) -> float:
     return aircraft.mass / (0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S)
 
 
-def excess(uneven: Unevenness, even: Array, same: Array, density: Array) -> Array | float:
+def heteroskedastic_excess(uneven: NoiseMoments, even: Array, same: Array, density: Array) -> Array | float:
     """(C, P, P) what the unevenness adds to the scores' covariance; ``even`` (P, P) is theirs for noise of density 1.
 
     ``same`` (P, P): 1 where two unknowns belong to one block. The integrals hold more than the lines' band, so they are

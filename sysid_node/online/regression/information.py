@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import dger
 
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
-from sysid_node.online.regression.heteroskedasticity import Unevenness
-from sysid_node.online.regression.instruments import Auxiliary, fill_in
+from sysid_node.online.regression.heteroskedasticity import NoiseMoments
+from sysid_node.online.regression.instruments import InstrumentModel, fill_in
 
 Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
@@ -50,7 +50,7 @@ class Information:
     bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
     integrals: Array  # (W,) of the transformed signals over time
     samples: float
-    uneven: Unevenness = field(default_factory=Unevenness)
+    uneven: NoiseMoments = field(default_factory=NoiseMoments)
 
     def __add__(self, other: Information) -> Information:
         return Information(*(getattr(self, f) + getattr(other, f) for f in self.__dataclass_fields__))
@@ -102,7 +102,7 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
     return Spectrum(omega, bands, order, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
 
 
-def about_mean(transform: Array, model: Auxiliary | None) -> Array:
+def about_mean(transform: Array, model: InstrumentModel | None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) whose signals are taken about their means, and of instruments.
 
     The lines are made where the transforms lie, which must be in one piece. Nuisances are kept. The airspeed's noise is
@@ -166,12 +166,12 @@ def window_energy(duration: float, rate: float) -> float:
     return -math.expm1(-rate * duration) / rate if rate else duration
 
 
-def clean_lines(transform: Array, model: Auxiliary | None) -> Array:
+def clean_lines(transform: Array, model: InstrumentModel | None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) without offset, constant and drift, with their instruments."""
     return project(about_mean(transform.copy(), model))
 
 
-def products(transform: Array, model: Auxiliary | None) -> Array:
+def products(transform: Array, model: InstrumentModel | None) -> Array:
     """(W, W) Gram matrix of a transform's (2F + 1, W) clean lines, constant and drift projected out.
 
     The transform is overwritten.
@@ -191,7 +191,7 @@ def _project_out(gram: Array) -> None:
             dger(-1.0 / left, row, row, a=gram.T, overwrite_a=True)
 
 
-def measure(transform: Array, model: Auxiliary | None, lines: Spectrum, begin: float, end: float) -> Information:
+def measure(transform: Array, model: InstrumentModel | None, lines: Spectrum, begin: float, end: float) -> Information:
     """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
     clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)

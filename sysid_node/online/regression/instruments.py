@@ -28,24 +28,24 @@ _LEAK = 0.1  # 1/s: keeps spiral and phugoid, which are not in question, off the
 
 
 @dataclass(frozen=True)
-class Auxiliary:
+class InstrumentModel:
     """Frequency response of the instruments to the controls."""
 
     gains: NDArray[np.complex128]  # (F, I, m)
     controls: slice  # columns of the m controls
 
 
-def auxiliary_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Auxiliary | None:
+def instrument_model(aircraft: Aircraft, layout: Layout, omega: Array) -> InstrumentModel | None:
     """Response at omega (F,) rad/s of the ``layout``'s instruments; None where it has none."""
     if not layout.instrumented:
         return None
     A, B, rows, scales = _linear(aircraft, layout)
     resolvent = np.linalg.inv(1j * omega[:, None, None] * np.eye(len(STATES)) - A)
     gains = scales[:, None] * (resolvent[:, rows] @ B)
-    return Auxiliary(gains, layout.deflections)
+    return InstrumentModel(gains, layout.deflections)
 
 
-def fill_in(model: Auxiliary, lines: Array) -> None:
+def fill_in(model: InstrumentModel, lines: Array) -> None:
     """Write the instruments of lines (..., 2F, W) into their last columns, by the deflections' columns."""
     F, made, controls = model.gains.shape
     deflections = np.empty((*lines.shape[:-2], F, controls, 1), dtype=complex)

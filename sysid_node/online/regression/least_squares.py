@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from sysid_node.online.regression import heteroskedasticity
 from sysid_node.online.regression.information import BANDS, Information
-from sysid_node.online.regression.normal_equations import Index, Plan, without
+from sysid_node.online.regression.normal_equations import Index, NormalEquations, with_least_squares_in
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Solution:
     usable: bool | NDArray[np.bool_]  # an array where solutions are stacked
 
 
-def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
+def solve(plan: NormalEquations, gram: Array, bias: Array | None = None) -> Solution:
     """Solve (Z'A - bias) theta = Z'y - bias from a summed Gram matrix (W, W); ``bias`` is from ``bias_of``.
 
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
@@ -59,7 +59,7 @@ def solve(plan: Plan, gram: Array, bias: Array | None = None) -> Solution:
     return Solution(theta, solved[:, :P], residual, motion, usable)
 
 
-def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
+def _factorised(plan: NormalEquations, cross: Array) -> tuple[Array, bool]:
     """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), zero and False where there are none."""
     solved, fault = _factorise(plan, cross)
     if fault:
@@ -73,7 +73,7 @@ def _factorised(plan: Plan, cross: Array) -> tuple[Array, bool]:
     return solved, True
 
 
-def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
+def _factorise(plan: NormalEquations, cross: Array) -> tuple[Array, int]:
     """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), and LAPACK's fault, 0 for none."""
     P = plan.columns.size
     known = plan.known.copy()
@@ -83,12 +83,12 @@ def _factorise(plan: Plan, cross: Array) -> tuple[Array, int]:
     return solved, fault
 
 
-def bias_of(plan: Plan, bias: Array) -> Array:
+def bias_of(plan: NormalEquations, bias: Array) -> Array:
     """(P + C, P) the entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts."""
     return np.asarray(bias.take(plan.entries[1]) * plan.counted[1])
 
 
-def misfits(plan: Plan, theta: Array) -> Array:
+def misfits(plan: NormalEquations, theta: Array) -> Array:
     """(W, C) the combinations of signals y - sum theta_j x_j that ``theta`` (P, C) leaves of each coefficient."""
     C = plan.outputs.size
     v = np.zeros((plan.width, C))
@@ -107,7 +107,7 @@ class Uncertainty:
     freedom: Array  # (C,) degrees of freedom
 
 
-def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertainty:
+def uncertainty(plan: NormalEquations, solution: Solution, info: Information) -> Uncertainty:
     """Sandwich covariance with the residual's density estimated in each band, and with noise that comes and goes."""
     C, P = len(plan.coefficients), plan.columns.size
     if not solution.usable or info.trace_square <= 0.0:
@@ -124,20 +124,20 @@ def uncertainty(plan: Plan, solution: Solution, info: Information) -> Uncertaint
     share = expected * (freedom / whole)[:, None]
     bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
     middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
-    middle += heteroskedasticity.excess(info.uneven, scores.sum(axis=0), plan.same, density)
+    middle += heteroskedasticity.heteroskedastic_excess(info.uneven, scores.sum(axis=0), plan.same, density)
     covariance = solution.inverse @ middle @ solution.inverse.T
     covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
     return Uncertainty(covariance, density, bands, freedom)
 
 
-class Hold(NamedTuple):
+class InstrumentStrength(NamedTuple):
     """How firmly instruments hold on to the regressors. Of each of the P unknowns."""
 
     strength: Array  # F statistic: what instruments explain of a regressor over what they do not
     luck: Array  # by how much variances would be larger without chance; at least 1
 
 
-def hold(plan: Plan, solution: Solution, info: Information) -> Hold:
+def instrument_strength(plan: NormalEquations, solution: Solution, info: Information) -> InstrumentStrength:
     """The instruments' strength, and the luck that is in the solution.
 
     Under an F of about 10 estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
@@ -149,14 +149,14 @@ def hold(plan: Plan, solution: Solution, info: Information) -> Hold:
     """
     P = plan.columns.size
     if plan.least_squares:
-        return Hold(np.full(P, np.inf), np.ones(P))
+        return InstrumentStrength(np.full(P, np.inf), np.ones(P))
     if not solution.usable or info.trace_square <= 0.0:
-        return Hold(np.zeros(P), np.ones(P))
+        return InstrumentStrength(np.zeros(P), np.ones(P))
     gram = info.grams.sum(axis=0)
     outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
-    plain = solve(without(plan, tuple(range(int(plan.group.max()) + 1))), gram)
+    plain = solve(with_least_squares_in(plan, tuple(range(int(plan.group.max()) + 1))), gram)
     if not plain.usable:
-        return Hold(np.zeros(P), np.ones(P))
+        return InstrumentStrength(np.zeros(P), np.ones(P))
     achieved = np.maximum((solution.inverse @ outer @ solution.inverse.T).diagonal(), TINY)
     ridged = outer + plan.unit * (RIDGE * outer.diagonal() + TINY)
     expected = np.maximum(np.linalg.inv(ridged).diagonal(), achieved)
@@ -164,7 +164,7 @@ def hold(plan: Plan, solution: Solution, info: Information) -> Hold:
     freedom = float(info.traces.sum()) ** 2 / info.trace_square
     statistic: Array = freedom * efficiency / (1.0 - efficiency)
     statistic[outer.diagonal() <= TINY] = 0.0  # no instrument at all
-    return Hold(statistic, expected / achieved)
+    return InstrumentStrength(statistic, expected / achieved)
 
 
 def student_95(freedom: Array) -> Array:
@@ -172,7 +172,7 @@ def student_95(freedom: Array) -> Array:
     return np.asarray(stdtrit(np.maximum(freedom, 1.0), 0.975))
 
 
-def rivals(plan: Plan, solution: Solution) -> Index:
+def most_correlated(plan: NormalEquations, solution: Solution) -> Index:
     """(P,) of each unknown the one of the same equation whose estimate is most correlated with its own."""
     spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     # each row's own spread is common to all of it

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
 
-def beliefs(aircraft: Aircraft, plan: Plan) -> tuple[Array, Array]:
+def believed_derivatives(aircraft: Aircraft, plan: NormalEquations) -> tuple[Array, Array]:
     """(P, C) believed values and their precisions 1 / tolerance^2; precision 0 where the file states no tolerance."""
     values, precisions = np.zeros(plan.mine.shape), np.zeros(plan.mine.shape)
     for c, coefficient in enumerate(plan.coefficients):
@@ -27,8 +27,10 @@ def beliefs(aircraft: Aircraft, plan: Plan) -> tuple[Array, Array]:
     return values, precisions
 
 
-def weighed(plan: Plan, theta: Array, covariance: Array, values: Array, precisions: Array) -> tuple[Array, Array]:
-    """``theta`` (P, C) and its ``covariance`` (C, P, P) with the beliefs counted in."""
+def weighed(
+    plan: NormalEquations, theta: Array, covariance: Array, values: Array, precisions: Array
+) -> tuple[Array, Array]:
+    """``theta`` (P, C) and its ``covariance`` (C, P, P) with the aircraft file's values counted in."""
     believed = covariance @ (precisions * values).T[:, :, None]
     # gain form: needs no inverse of a covariance that may be near singular
     gain = plan.unit + covariance * precisions.T[:, None]

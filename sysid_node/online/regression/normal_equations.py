@@ -21,7 +21,7 @@ STRONG = 25.0
 
 
 @dataclass(frozen=True)
-class Plan:
+class NormalEquations:
     """Which entries of the W x W Gram matrix make the normal equations. P unknowns (blocks), C coefficients."""
 
     coefficients: tuple[str, ...]
@@ -44,7 +44,7 @@ class Plan:
     known: Array = field(init=False)  # (P + C, P) the unit matrix, and room for what is known
     instrumented: NDArray[np.bool_] = field(init=False)  # (C,) whether any of its regressors has an instrument
     least_squares: bool = field(init=False)  # whether every regressor is its own instrument
-    variants: dict[tuple[int, ...], Plan] = field(init=False, default_factory=dict, repr=False)  # see ``without``
+    variants: dict[tuple[int, ...], NormalEquations] = field(init=False, default_factory=dict, repr=False)  # kept
 
     def __post_init__(self) -> None:
         both = np.concatenate([self.columns, self.outputs])[:, None]
@@ -66,14 +66,14 @@ class Plan:
         return np.flatnonzero(self.group == self.block[coefficient])
 
 
-def plan(structure: dict[str, tuple[str, ...]], layout: Layout) -> Plan:
+def normal_equations(structure: dict[str, tuple[str, ...]], layout: Layout) -> NormalEquations:
     """Normal equations for a model structure, e.g. ``{"Cm": ("0", "alpha", "q", "de")}``; offsets come after."""
     slopes = {c: tuple(r for r in rs if r != "0") for c, rs in structure.items()}
     blocks = list(dict.fromkeys(slopes.values()))
     regressors = tuple(r for block in blocks for r in block)
     group = np.array([i for i, block in enumerate(blocks) for _ in block], dtype=np.intp)
     block = np.array([blocks.index(rs) for rs in slopes.values()], dtype=np.intp)
-    return Plan(
+    return NormalEquations(
         coefficients=tuple(slopes),
         regressors=regressors,
         group=group,
@@ -87,13 +87,13 @@ def plan(structure: dict[str, tuple[str, ...]], layout: Layout) -> Plan:
     )
 
 
-def trusting(full: Plan, strength: Array) -> Plan:
+def with_strong_instruments(full: NormalEquations, strength: Array) -> NormalEquations:
     """The plan with least squares in the blocks of which an instrument is weak: better biased a little than lost."""
     weak = full.group[strength < STRONG].tolist()
-    return without(full, tuple(sorted(set(weak)))) if weak else full
+    return with_least_squares_in(full, tuple(sorted(set(weak)))) if weak else full
 
 
-def without(full: Plan, blocks: tuple[int, ...]) -> Plan:
+def with_least_squares_in(full: NormalEquations, blocks: tuple[int, ...]) -> NormalEquations:
     """The plan with least squares in these blocks; made once."""
     if blocks not in full.variants:
         own = np.isin(full.group, blocks)

@@ -23,7 +23,7 @@ from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.least_squares import Solution
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
@@ -56,7 +56,7 @@ def gram_bias(aircraft: Aircraft, layout: Layout, mean: Array, step: float, air_
     return bias
 
 
-def allowed(plan: Plan, solution: Solution, density: Array, bias: Array) -> Array:
+def allowed(plan: NormalEquations, solution: Solution, density: Array, bias: Array) -> Array:
     """(W,) factors on the columns, at most one: as much of the noise as the residuals' ``density`` (C,) allows.
 
     ``bias`` (W, W) is per line and second. The residual of a coefficient holds v' bias v of the noise, v = (1, -theta);

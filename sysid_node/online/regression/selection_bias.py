@@ -14,17 +14,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.regression.least_squares import Hold, Solution, Uncertainty, misfits
+from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty, misfits
 from sysid_node.online.regression.mixed_estimation import weighed
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
 
-def prudence(
-    plan: Plan, solution: Solution, spread: Uncertainty, hold: Hold, gram: Array, values: Array, precisions: Array
+def selection_bias_factors(
+    plan: NormalEquations,
+    solution: Solution,
+    spread: Uncertainty,
+    hold: InstrumentStrength,
+    gram: Array,
+    values: Array,
+    precisions: Array,
 ) -> Array:
-    """(P, C) factors of the squared standard errors, at least 1; ``values`` and ``precisions`` as of ``beliefs``."""
+    """(P, C) factors of the squared standard errors, at least 1.
+
+    ``values`` and ``precisions`` (P, C) are those of ``mixed_estimation.believed_derivatives``.
+    """
     if plan.least_squares or not solution.usable:
         return np.ones_like(plan.mine)
     meeting, _ = weighed(plan, solution.theta, spread.covariance, values, precisions)

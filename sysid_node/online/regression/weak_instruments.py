@@ -20,14 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.regression.derivative_index import Table
+from sysid_node.online.regression.derivative_index import DerivativeIndex
 from sysid_node.online.regression.least_squares import ROUNDING, TINY, Solution, Uncertainty, misfits, student_95
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
 
-class Bend(NamedTuple):
+class AndersonRubinBounds(NamedTuple):
     """How the residual's sum of squares, relative to what it is, changes with each of D derivatives."""
 
     slope: Array  # (D,) per unit of the derivative
@@ -40,16 +40,16 @@ class Bend(NamedTuple):
         return np.divide(1.0 - 2.0 * ROUNDING, bent, out=np.full_like(bent, np.inf), where=bent > 0.0)
 
 
-def bend(
-    plan: Plan,
-    table: Table,
+def anderson_rubin_bounds(
+    plan: NormalEquations,
+    table: DerivativeIndex,
     solution: Solution,
     gram: Array,
     spread: Uncertainty,
     noise: Array,
     mean: Array,
     gusts: Array,
-) -> Bend:
+) -> AndersonRubinBounds:
     """From the ``gram`` (W, W), the regressors' ``mean`` (P,), and the share of ``gusts`` (C,) in the residuals.
 
     ``noise`` (C, P, P): the part of the ``spread``'s covariance that comes from the residual; the rest does not bend.
@@ -73,7 +73,7 @@ def bend(
     share = np.where(
         instrumented, _variances(noise, mean)[place] / np.maximum(_variances(covariance, mean)[place], TINY), 0.0
     )
-    return Bend(share * slope[place], share * curve[place], 1.0 - share * (1.0 - counted))
+    return AndersonRubinBounds(share * slope[place], share * curve[place], 1.0 - share * (1.0 - counted))
 
 
 def _variances(covariance: Array, mean: Array) -> Array:
@@ -81,15 +81,15 @@ def _variances(covariance: Array, mean: Array) -> Array:
     return np.concatenate([covariance.diagonal(axis1=1, axis2=2), (covariance @ mean @ mean)[:, None]], axis=1)
 
 
-def reach(squares: Array, bend: Bend) -> tuple[Array, Array]:
+def interval_arms(squares: Array, bounds: AndersonRubinBounds) -> tuple[Array, Array]:
     """How far the intervals (D,) go below and above the estimates, of which ``squares`` are t^2 se^2."""
-    h = squares * bend.counted
-    left = 1.0 - h * bend.curve
+    h = squares * bounds.counted
+    left = 1.0 - h * bounds.curve
     endless = left < ROUNDING
     if endless.any():
         left[endless] = 1.0
     h /= left
-    middle = (0.5 * bend.slope) * h
+    middle = (0.5 * bounds.slope) * h
     half = np.sqrt(middle * middle + h)
     below, above = half - middle, half + middle
     if endless.any():

@@ -16,7 +16,7 @@ from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.frequency.regression_signals import OFFSET, array_signals, layout, momentum_matrix
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.comparison import changes
@@ -48,7 +48,7 @@ class Motion:
 
 def replay_result(
     aircraft: Aircraft,
-    settings: Settings,
+    settings: OnlineSettings,
     *,
     time: Array,
     samples: Array,
@@ -138,7 +138,7 @@ def _modelled(aircraft: Aircraft, regressors: Mapping[str, Array], final: Estima
     return modelled
 
 
-def _spectra(settings: Settings, motion: Motion) -> Spectra:
+def _spectra(settings: OnlineSettings, motion: Motion) -> Spectra:
     """Inputs, coefficients and residuals at the frequencies in use."""
     start, step, stop = settings.frequencies
     frequency = np.arange(start, stop + 0.5 * step, step)
@@ -157,7 +157,7 @@ def _averaged(values: Array, every: int) -> Array:
     return np.asarray(whole.reshape(-1, every, *values.shape[1:]).mean(axis=1))
 
 
-def _responses(settings: Settings, motion: Motion) -> dict[str, Response]:
+def _responses(settings: OnlineSettings, motion: Motion) -> dict[str, Response]:
     """Measured and modelled coefficients, averaged over half the shortest period in use to remove noise above it."""
     step = float(np.median(np.diff(motion.time)))
     width = max(round(0.5 / (settings.frequencies[2] * step)), 1)

@@ -15,7 +15,7 @@ from sysid_node.flight.autopilots.px4 import AIRSPEED, IMU, MOTORS, SERVOS, Px4
 from sysid_node.flight.autopilots.recorded import LoggedSample, read_recorded, streams_of_samples
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.online.settings import Settings as Estimator
+from sysid_node.online.settings import OnlineSettings as Estimator
 from sysid_node.ros.session import Session
 
 JOINTS = "elevator=servo2:0:0.4 aileron=servo1:0:0.4 rudder=servo3:0:0.4 throttle=motor1:0:1"

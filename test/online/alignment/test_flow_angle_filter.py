@@ -17,7 +17,7 @@ from sysid_node.online import estimator, replay
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.alignment.flow_angle_filter import ALPHA, BETA
 from sysid_node.online.estimates.published import estimate
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ def wrong(name: str, tolerances: float) -> Aircraft:
 
 def identify(samples: Array, aircraft: Aircraft = AIRCRAFT) -> Estimates:
     time = flown()[0]
-    return replay.run(aircraft, Settings(), time, samples, time[-1:])[0]
+    return replay.run(aircraft, OnlineSettings(), time, samples, time[-1:])[0]
 
 
 def completed(aircraft: Aircraft, time: Array, samples: Array) -> Array:
@@ -120,10 +120,10 @@ def test_a_record_at_once_equals_its_samples_one_by_one(columns: tuple[int, ...]
     time, samples = np.delete(time, np.s_[900:960]), np.delete(without(samples, *columns), np.s_[900:960], axis=0)
     samples[1500:1510, 6] = math.nan
     time[1700] = time[1699]
-    state = estimator.init(AIRCRAFT, Settings())
+    state = estimator.init(AIRCRAFT, OnlineSettings())
     for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, t, sample)
-    whole = replay.run(AIRCRAFT, Settings(), time, samples, time[-1:])[0]
+    whole = replay.run(AIRCRAFT, OnlineSettings(), time, samples, time[-1:])[0]
     assert repr(estimate(state, time[-1])) == repr(whole)
 
 

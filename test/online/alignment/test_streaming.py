@@ -14,7 +14,7 @@ from sysid_node.flight.checks import CLOCK_STEP, DUPLICATE, OUT_OF_ORDER, UNSTAM
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.alignment.streaming import (
     BREAK_NS,
-    Complete,
+    AlignedSample,
     init,
     on_actuators,
     on_air_data,
@@ -34,7 +34,7 @@ class Feed:
 
     def __init__(self, max_gap: float = 0.2) -> None:
         self.state = init(AIRCRAFT, max_gap)
-        self.samples: list[Complete] = []
+        self.samples: list[AlignedSample] = []
 
     def imu(self, stamp, values=FORCE_AND_RATES):
         self.samples += on_imu(self.state, stamp, values)

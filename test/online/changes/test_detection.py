@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from plant import TRUTH, exact_flight, fly, made_aircraft, multisteps
 
 from sysid_node.online.replay import run
-from sysid_node.online.settings import METHODS, Settings
+from sysid_node.online.settings import METHODS, OnlineSettings
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def test_half_the_elevator_is_lost(gusts: float, closed_loop: bool, method: str)
     time, flights = fly(AIRCRAFT, commands, RATE, 6, seed=3, gusts=gusts, closed_loop=closed_loop, after=after)
     noticed = 0
     for samples in flights:
-        history = run(AIRCRAFT, Settings(method=method), time, samples, np.arange(5.0, 36.0, 0.25))
+        history = run(AIRCRAFT, OnlineSettings(method=method), time, samples, np.arange(5.0, 36.0, 0.25))
         times = announced(history)
         assert not times or times[0] > LOST_AT
         if times and times[0] <= LOST_AT + 4.0:
@@ -62,7 +62,7 @@ def test_no_estimate_is_valid_and_far_off_once_a_change_has_shown(changed: dict[
     after = (LOST_AT, changed)
     time, flights = fly(AIRCRAFT, multisteps(42.0, RATE, seed=6), RATE, 3, seed=3, gusts=0.7, after=after)
     truth = TRUTH[key] * changed[key]
-    histories = [run(AIRCRAFT, Settings(), time, samples, np.arange(36.0, 42.0, 0.25)) for samples in flights]
+    histories = [run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(36.0, 42.0, 0.25)) for samples in flights]
     valid = [d for history in histories for d in (e.derivatives[key] for e in history) if d.valid]
     far = [d for d in valid if abs(d.value - truth) > 4.0 * d.standard_error]
     assert len(far) <= 0.02 * len(valid)
@@ -74,7 +74,7 @@ def test_estimates_of_quiet_flight_are_learned_anew_without_a_change_being_annou
     commands[: round(20.0 * RATE)] = 0.0
     time, flights = fly(AIRCRAFT, commands, RATE, 3, seed=7, gusts=0.3)
     for samples in flights:
-        history = run(AIRCRAFT, Settings(), time, samples, np.arange(5.0, 40.0, 0.25))
+        history = run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(5.0, 40.0, 0.25))
         assert announced(history) == []
         assert history[-1].derivatives["Cm_de"].valid
         assert history[-1].derivatives["Cm_de"].value == pytest.approx(TRUTH["Cm_de"], rel=0.1)
@@ -85,7 +85,9 @@ def test_what_a_change_leaves_behind_is_forgotten() -> None:
     after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
     time, flights = fly(AIRCRAFT, multisteps(42.0, RATE), RATE, 1, seed=5, gusts=0.7, after=after)
     watched, blind = (
-        run(AIRCRAFT, Settings(method="sls_rft", detect_changes=detect), time, flights[0], time[-1:])[0].derivatives
+        run(AIRCRAFT, OnlineSettings(method="sls_rft", detect_changes=detect), time, flights[0], time[-1:])[
+            0
+        ].derivatives
         for detect in (True, False)
     )
     assert watched["Cm_de"].value == pytest.approx(0.5 * TRUTH["Cm_de"], rel=0.05)
@@ -97,7 +99,7 @@ def test_a_memory_that_fades_forgets_a_change_as_well() -> None:
     """Three seconds after the elevator's loss the lines hold the new aircraft alone: one model explains them."""
     after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
     time, flights = fly(AIRCRAFT, multisteps(33.0, RATE), RATE, 1, seed=5, after=after)
-    fading = Settings(method="sls_rft", forgetting_time=10.0)
+    fading = OnlineSettings(method="sls_rft", forgetting_time=10.0)
     assert run(AIRCRAFT, fading, time, flights[0], time[-1:])[0].fits["Cm"].r_squared > 0.97
 
 
@@ -107,7 +109,9 @@ def test_no_change_is_announced_in_unchanged_flight(gusts: float) -> None:
     time, flights = fly(AIRCRAFT, multisteps(120.0, RATE, seed=9), RATE, 3, seed=11, gusts=gusts)
     for method in METHODS:
         for samples in flights:
-            assert announced(run(AIRCRAFT, Settings(method=method), time, samples, np.arange(1.0, 120.0, 0.5))) == []
+            assert (
+                announced(run(AIRCRAFT, OnlineSettings(method=method), time, samples, np.arange(1.0, 120.0, 0.5))) == []
+            )
 
 
 def test_flight_that_the_model_does_not_explain_is_outside_it() -> None:
@@ -117,7 +121,7 @@ def test_flight_that_the_model_does_not_explain_is_outside_it() -> None:
     buffet = np.convolve(rng.normal(size=time.size), np.ones(30) / 30.0, "same") * np.where(time > 20.0, 1.5, 0.0)
     samples = exact_flight(AIRCRAFT, time, extra={"CL": buffet})
     samples[:, :9] += rng.normal(size=(time.size, 9)) * np.repeat([0.05, 0.003, 0.005], 3)
-    history = run(AIRCRAFT, Settings(method="sls_rft"), time, samples, np.arange(10.0, 30.0, 0.5))
+    history = run(AIRCRAFT, OnlineSettings(method="sls_rft"), time, samples, np.arange(10.0, 30.0, 0.5))
     before = [e for e in history if e.time < 20.0]
     assert not [d for e in before for d in e.derivatives.values() if d.status == "outside model"]
     after = [e for e in history if e.time > 23.0]
@@ -130,5 +134,5 @@ def test_flight_that_the_model_does_not_explain_is_outside_it() -> None:
 def test_detection_can_be_left_out() -> None:
     after = (10.0, dict.fromkeys(ELEVATOR, 0.3))
     time, flights = fly(AIRCRAFT, multisteps(20.0, RATE), RATE, 1, after=after)
-    history = run(AIRCRAFT, Settings(detect_changes=False), time, flights[0], np.arange(1.0, 20.0, 0.25))
+    history = run(AIRCRAFT, OnlineSettings(detect_changes=False), time, flights[0], np.arange(1.0, 20.0, 0.25))
     assert announced(history) == []

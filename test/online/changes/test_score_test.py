@@ -9,20 +9,20 @@ from plant import fly, made_aircraft, multisteps
 from scipy.stats import f as fisher
 
 from sysid_node.online import estimator
-from sysid_node.online.changes.detection import Looking
-from sysid_node.online.changes.score_test import Contradiction, Reference, contradiction, disagreement
+from sysid_node.online.changes.detection import ChangeTests
+from sysid_node.online.changes.score_test import Reference, ScoreTest, disagreement, score_test
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
-from sysid_node.online.settings import METHODS, Settings
-from sysid_node.online.state import State
+from sysid_node.online.settings import METHODS, OnlineSettings
+from sysid_node.online.state import EstimatorState
 
 Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()
 RATE, SECONDS, CHANGED_AT = 100.0, 22.0, 18.0
 LAYOUT = Layout(("alpha", "q", "de"), ("de",), ())
-PLAN = normal_equations.plan({"CL": ("0", "alpha", "de"), "Cm": ("0", "alpha", "q", "de")}, LAYOUT)
+PLAN = normal_equations.normal_equations({"CL": ("0", "alpha", "de"), "Cm": ("0", "alpha", "q", "de")}, LAYOUT)
 SPECTRUM = spectrum(2.0 * math.pi * np.arange(0.1, 2.0, 0.04), math.inf)
 LINES = 2 * SPECTRUM.omega.size
 
@@ -41,7 +41,7 @@ def test_statistic_is_that_of_plain_least_squares() -> None:
     lines, duration, density = rng.normal(size=(LINES, PLAN.width)), 500.0, 3.0
     P, C = PLAN.columns.size, PLAN.outputs.size
     theta = rng.normal(size=(P, C)) * PLAN.mine
-    found = contradiction(reference(theta, np.zeros((C, P, P)), density), lines, SPECTRUM, duration)
+    found = score_test(reference(theta, np.zeros((C, P, P)), density), lines, SPECTRUM, duration)
     for c in range(C):
         mine = PLAN.unknowns(c)
         X = lines[:, PLAN.columns[mine]]
@@ -61,7 +61,7 @@ def test_uncertain_estimates_contradict_less() -> None:
     P, C = PLAN.columns.size, PLAN.outputs.size
     covariances = [scale * np.tile(np.eye(P), (C, 1, 1)) for scale in (0.0, 1e-2, 1.0)]
     sure, less, hardly = (
-        contradiction(reference(np.zeros((P, C)), covariance, 1e-3), lines, SPECTRUM, 500.0).statistic
+        score_test(reference(np.zeros((P, C)), covariance, 1e-3), lines, SPECTRUM, 500.0).statistic
         for covariance in covariances
     )
     assert (sure > less).all()
@@ -79,16 +79,16 @@ def test_disagreement_is_the_chance_of_the_difference() -> None:
     assert chance[1] == pytest.approx(fisher.sf(9.0 / 3, 3, 30.0), rel=1e-6)
 
 
-def flown(samples: Array, time: Array, method: str) -> State:
-    state = estimator.init(AIRCRAFT, Settings(method=method, detect_changes=False))
+def flown(samples: Array, time: Array, method: str) -> EstimatorState:
+    state = estimator.init(AIRCRAFT, OnlineSettings(method=method, detect_changes=False))
     for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, t, sample)
     return state
 
 
-def looked(state: State, span: int) -> Contradiction:
+def looked(state: EstimatorState, span: int) -> ScoreTest:
     model = state.model
-    looking = Looking(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, math.inf)
+    looking = ChangeTests(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, math.inf)
     found = next((found for _, found in looking.contradictions([span])), None)
     assert found is not None
     return found

@@ -11,14 +11,14 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online import estimator
 from sysid_node.online.alignment.whole_record import align_streams
-from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
 # Instruments are made with the file's values; least squares does not depend on them.
-SETTINGS = Settings(method="sls_rft")
+SETTINGS = OnlineSettings(method="sls_rft")
 BAG = Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep"
 
 
@@ -26,10 +26,10 @@ def flown(aircraft: Aircraft) -> tuple[Estimates, dict[str, CoefficientGap]]:
     """Estimates and gap after 25 s of the bundled flight."""
     aligned = align_streams(aircraft, read_streams(BAG), SETTINGS.max_gap)
     state = estimator.init(aircraft, SETTINGS)
-    assert not model_gap(state, present(state))
+    assert not model_gap(state, current_solution(state))
     for time, sample in zip(aligned.time[:5000].tolist(), aligned.samples.tolist(), strict=False):
         estimator.update(state, time, sample)
-    return estimate(state), {gap.coefficient: gap for gap in model_gap(state, present(state))}
+    return estimate(state), {gap.coefficient: gap for gap in model_gap(state, current_solution(state))}
 
 
 def with_values(aircraft: Aircraft, values: dict[str, float]) -> Aircraft:

@@ -12,13 +12,13 @@ from scipy.stats import t as student
 
 from sysid_node.aircraft.model import Derivative
 from sysid_node.online import estimator
-from sysid_node.online.estimates.current_solution import present
+from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.validity import STALE
 from sysid_node.online.replay import run
 from sysid_node.online.segment_update import renew
-from sysid_node.online.settings import METHODS, Settings
-from sysid_node.online.state import State
+from sysid_node.online.settings import METHODS, OnlineSettings
+from sysid_node.online.state import EstimatorState
 from sysid_node.online.types import SAMPLE_COLUMNS, DerivativeEstimate
 
 Array = NDArray[np.float64]
@@ -26,9 +26,11 @@ AIRCRAFT = made_aircraft()
 SLOPES = [name for name in TRUTH if not name.endswith("_0")]
 
 
-def fed(time: Array, samples: Array, settings: Settings | None = None, aircraft: object = AIRCRAFT) -> State:
+def fed(
+    time: Array, samples: Array, settings: OnlineSettings | None = None, aircraft: object = AIRCRAFT
+) -> EstimatorState:
     """The state after all samples."""
-    state = estimator.init(aircraft, settings or Settings(method="sls_rft"))
+    state = estimator.init(aircraft, settings or OnlineSettings(method="sls_rft"))
     for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, t, sample)
     return state
@@ -55,7 +57,7 @@ def flown() -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_intervals_are_students_about_the_value(method: str, flown: tuple[Array, Array]) -> None:
-    found = estimate(fed(*flown, Settings(method=method)))
+    found = estimate(fed(*flown, OnlineSettings(method=method)))
     assert found.time == flown[0][-1]
     assert_sound(found.derivatives)
     assert all(found.derivatives[name].valid for name in SLOPES if abs(TRUTH[name]) > 0.05)
@@ -86,7 +88,7 @@ def test_between_renewals_estimates_use_every_sample(flown: tuple[Array, Array],
     time, rows = flown
     state = fed(time[:samples], rows[:samples])
     renew(state, last=True)
-    now = present(state)
+    now = current_solution(state)
     assert now is not None
     assert state.renewed is not None
     np.testing.assert_allclose(now.solution.theta, state.renewed.solution.theta, rtol=1e-6, atol=1e-9)
@@ -103,7 +105,7 @@ def test_nothing_is_known_before_half_a_second_of_data() -> None:
 
 def test_early_estimates_are_converging_and_intervals_shrink(flown: tuple[Array, Array]) -> None:
     time, samples = flown
-    history = run(AIRCRAFT, Settings(method="sls_rft"), time, samples, np.array([1.2, 5.0, 12.0, 24.0]))
+    history = run(AIRCRAFT, OnlineSettings(method="sls_rft"), time, samples, np.array([1.2, 5.0, 12.0, 24.0]))
     assert not any(d.valid for d in history[0].derivatives.values())
     for name in ("CL_alpha", "Cm_de", "Cl_p", "Cn_beta"):
         errors = [found.derivatives[name].standard_error for found in history[1:]]
@@ -179,7 +181,7 @@ def test_a_derivative_believed_to_be_nothing_is_judged_by_its_estimate() -> None
 
 def test_estimating_changes_nothing(flown: tuple[Array, Array]) -> None:
     time, samples = flown
-    quiet, asked = (estimator.init(AIRCRAFT, Settings()) for _ in range(2))
+    quiet, asked = (estimator.init(AIRCRAFT, OnlineSettings()) for _ in range(2))
     for t, sample in zip(time[:1200].tolist(), samples.tolist(), strict=False):
         estimator.update(quiet, t, sample)
         estimator.update(asked, t, sample)

@@ -8,7 +8,7 @@ import pytest
 
 from sysid_node.errors import InputError
 from sysid_node.online.estimates.saving import save_estimates
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 
 ESTIMATES = Estimates(
@@ -20,7 +20,13 @@ ESTIMATES = Estimates(
 
 def save(folder: Path) -> Path:
     return save_estimates(
-        folder, ESTIMATES, aircraft="cdrw", settings=Settings(), stamp_ns=7, samples=99, rejected={"imu/data: late": 3}
+        folder,
+        ESTIMATES,
+        aircraft="cdrw",
+        settings=OnlineSettings(),
+        stamp_ns=7,
+        samples=99,
+        rejected={"imu/data: late": 3},
     )
 
 

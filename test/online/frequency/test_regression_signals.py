@@ -12,10 +12,10 @@ from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
 
-LEAST_SQUARES = Settings(method="sls_rft", detect_changes=False)
+LEAST_SQUARES = OnlineSettings(method="sls_rft", detect_changes=False)
 FLAP = Control("flap", "df", {"flap": 1.0})
 
 

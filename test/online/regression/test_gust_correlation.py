@@ -8,7 +8,7 @@ from plant import made_aircraft
 from sysid_node.online.frequency.regression_signals import layout
 from sysid_node.online.regression import gust_correlation, normal_equations
 from sysid_node.online.regression.gust_correlation import ALLOWED
-from sysid_node.online.regression.heteroskedasticity import DOUBT, Unevenness
+from sysid_node.online.regression.heteroskedasticity import DOUBT, NoiseMoments
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 
 Array = NDArray[np.float64]
@@ -45,11 +45,11 @@ def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -
 
 def test_the_sensors_part_of_a_residual_is_their_noise() -> None:
     """The gyro's noise differentiated, and the accelerometer's, against noise passed through the coefficients."""
-    plan = normal_equations.plan({"CL": ("alpha",), "Cm": ("alpha",)}, signals := layout(AIRCRAFT, ()))
+    plan = normal_equations.normal_equations({"CL": ("alpha",), "Cm": ("alpha",)}, signals := layout(AIRCRAFT, ()))
     still = Solution(np.zeros((1, 2)), np.zeros((1, 1)), np.zeros(2), np.zeros(2), np.array(True))
     omega, step = np.array([3.0, 4.0, 5.0]), 0.01
     nothing = np.zeros((signals.width, signals.width))
-    lift, pitch = gust_correlation.sensed(AIRCRAFT, plan, still, nothing, Unevenness(), step, omega)
+    lift, pitch = gust_correlation.sensed(AIRCRAFT, plan, still, nothing, NoiseMoments(), step, omega)
     reference, g = AIRCRAFT.reference, AIRCRAFT.geometry
     qS = 0.5 * reference.air_density * reference.airspeed**2 * g.S
     assert lift == pytest.approx(step * (AIRCRAFT.noise["accel"] * AIRCRAFT.mass / qS) ** 2)

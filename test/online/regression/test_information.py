@@ -13,7 +13,7 @@ from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import information
 from sysid_node.online.regression.information import BANDS
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 Array = NDArray[np.float64]
 GRID = fourier_transform.lines(0.1, 0.1, 2.0)
@@ -166,7 +166,9 @@ def test_neither_estimates_nor_errors_depend_on_how_dense_the_grid_is(method: st
     ratios, moves = [], []
     for flight in samples:
         coarse, fine = (
-            run(aircraft, Settings(frequencies=(0.1, step, 1.5), method=method), time, flight, time[-1:])[0].derivatives
+            run(aircraft, OnlineSettings(frequencies=(0.1, step, 1.5), method=method), time, flight, time[-1:])[
+                0
+            ].derivatives
             for step in (0.04, 0.01)
         )
         slopes = [name for name in coarse if not name.endswith("_0")]

@@ -8,7 +8,7 @@ from sysid_node.online.regression import instruments
 from sysid_node.online.regression.information import about_mean
 from sysid_node.online.regression.instruments import INSTRUMENTED
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = made_aircraft()
 LAYOUT = regression_signals.layout(AIRCRAFT, INSTRUMENTED)
@@ -17,7 +17,7 @@ OMEGA = 2.0 * np.pi * np.array([0.3, 1.0, 1.8])
 
 def test_short_period_by_hand() -> None:
     """alpha and q answer the elevator as (s - Z_alpha)(s - M_q) - M_alpha (1 + Z_q) says, s = j omega + leak."""
-    model = instruments.auxiliary_model(AIRCRAFT, LAYOUT, OMEGA)
+    model = instruments.instrument_model(AIRCRAFT, LAYOUT, OMEGA)
     assert model is not None
     g, V = AIRCRAFT.geometry, AIRCRAFT.reference.airspeed
     qS, half = 0.5 * AIRCRAFT.reference.air_density * V**2 * g.S, g.cbar / (2.0 * V)
@@ -34,7 +34,7 @@ def test_short_period_by_hand() -> None:
 
 
 def test_instruments_lie_behind_the_lines_they_are_made_of() -> None:
-    model = instruments.auxiliary_model(AIRCRAFT, LAYOUT, OMEGA)
+    model = instruments.instrument_model(AIRCRAFT, LAYOUT, OMEGA)
     assert model is not None
     lines = np.random.default_rng(0).normal(size=(6, LAYOUT.transformed))
     every = np.hstack([lines, np.full((len(lines), model.gains.shape[1]), np.nan)])
@@ -47,7 +47,7 @@ def test_instruments_lie_behind_the_lines_they_are_made_of() -> None:
 
 
 def test_none_are_made_where_none_are_asked_for() -> None:
-    assert instruments.auxiliary_model(AIRCRAFT, regression_signals.layout(AIRCRAFT), OMEGA) is None
+    assert instruments.instrument_model(AIRCRAFT, regression_signals.layout(AIRCRAFT), OMEGA) is None
 
 
 def test_they_follow_the_motion_of_a_flight() -> None:
@@ -66,7 +66,7 @@ def test_they_follow_the_motion_of_a_flight() -> None:
         0.5 * steps[:, None] * (values[1:] + values[:-1]),
         0.5 * steps[:, None] ** 2 * np.diff(values, axis=0),
     )
-    lines = about_mean(fourier_transform.current(state), instruments.auxiliary_model(AIRCRAFT, LAYOUT, grid.omega))
+    lines = about_mean(fourier_transform.current(state), instruments.instrument_model(AIRCRAFT, LAYOUT, grid.omega))
     for name in LAYOUT.instrumented:
         flown, made = lines[:, LAYOUT.column(name)], lines[:, LAYOUT.instrument(name)]
         assert flown @ made / np.linalg.norm(flown) / np.linalg.norm(made) > 0.85, name
@@ -77,7 +77,7 @@ def test_the_file_need_not_be_right() -> None:
     wrong = made_aircraft({name: 1.3 * value for name, value in TRUTH.items()})
     time, flights = fly(AIRCRAFT, multisteps(40.0, 100.0), flights=4, seed=2, closed_loop=False)
     for samples in flights:
-        found = run(wrong, Settings(method="iv_rft"), time, samples, time[-1:])[0].derivatives
+        found = run(wrong, OnlineSettings(method="iv_rft"), time, samples, time[-1:])[0].derivatives
         for name in ("CL_alpha", "Cm_alpha", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr"):
             assert abs(found[name].value - TRUTH[name]) < 4.0 * found[name].standard_error, name
             assert found[name].standard_error < 0.15 * abs(TRUTH[name]), name

@@ -10,7 +10,7 @@ from scipy.stats import t as student
 
 from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.information import BANDS
-from sysid_node.online.regression.normal_equations import Plan
+from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def test_known_noise_is_taken_out_of_the_normal_equations() -> None:
 
 @pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
 @pytest.mark.parametrize("spoiled", ["nan", "inf", "more noise than motion"])
-def test_impossible_equations_are_not_usable_and_never_raise(plan: Plan, spoiled: str) -> None:
+def test_impossible_equations_are_not_usable_and_never_raise(plan: NormalEquations, spoiled: str) -> None:
     lines, _ = made(plan, 3)
     bias = None
     if spoiled == "more noise than motion":
@@ -85,7 +85,7 @@ def test_impossible_equations_are_not_usable_and_never_raise(plan: Plan, spoiled
 
 
 @pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
-def test_nothing_flown_says_nothing_of_anything(plan: Plan) -> None:
+def test_nothing_flown_says_nothing_of_anything(plan: NormalEquations) -> None:
     solution = least_squares.solve(plan, np.zeros((plan.width, plan.width)))
     assert not solution.theta.any()
     assert (solution.inverse.diagonal() > 1e15).all()
@@ -93,7 +93,7 @@ def test_nothing_flown_says_nothing_of_anything(plan: Plan) -> None:
 
 @pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
 @pytest.mark.parametrize("twin", [True, False], ids=["moves as another", "does not move"])
-def test_one_regressor_that_tells_nothing_costs_no_other(plan: Plan, twin: bool) -> None:
+def test_one_regressor_that_tells_nothing_costs_no_other(plan: NormalEquations, twin: bool) -> None:
     """Their own errors are without bound; the other equations, and the other regressors, are as ever."""
     lines, _ = made(plan, 3)
     alpha, q, de = plan.unknowns(0)
@@ -154,7 +154,7 @@ def test_coloured_residuals_count_where_the_regressor_moves() -> None:
 
 def test_strength_is_that_of_the_first_stage() -> None:
     """One instrument that explains a share R^2 of its regressor: F = freedom R^2 / (1 - R^2)."""
-    plan = normal_equations.plan({"Cl": ("p",)}, layout(("p",)))
+    plan = normal_equations.normal_equations({"Cl": ("p",)}, layout(("p",)))
     rng = np.random.default_rng(8)
     lines = np.zeros((ROWS, plan.width))
     lines[:, plan.instruments[0]] = rng.normal(size=ROWS)
@@ -163,10 +163,10 @@ def test_strength_is_that_of_the_first_stage() -> None:
     info = information(np.pad(lines, ((0, 0), (0, 19 - plan.width))), 1.0)
     info.grams = info.grams[:, : plan.width, : plan.width]
     R2 = np.corrcoef(lines[:, plan.instruments[0]], lines[:, plan.columns[0]])[0, 1] ** 2
-    found = least_squares.hold(plan, least_squares.solve(plan, info.grams.sum(axis=0)), info)
+    found = least_squares.instrument_strength(plan, least_squares.solve(plan, info.grams.sum(axis=0)), info)
     assert found.strength[0] == pytest.approx(ROWS * R2 / (1.0 - R2), rel=0.05)
-    assert normal_equations.trusting(plan, np.array([100.0])) is plan
-    assert normal_equations.trusting(plan, np.array([3.0])).least_squares
+    assert normal_equations.with_strong_instruments(plan, np.array([100.0])) is plan
+    assert normal_equations.with_strong_instruments(plan, np.array([3.0])).least_squares
 
 
 @pytest.mark.parametrize("hold", [0.8, 1.25])
@@ -176,7 +176,9 @@ def test_a_regressor_that_follows_its_instrument_more_than_expected_is_luck(hold
     columns, instruments = INSTRUMENTAL.columns, INSTRUMENTAL.instruments
     lines[:, columns] = hold * lines[:, instruments]
     info = information(lines, 1.0)
-    found = least_squares.hold(INSTRUMENTAL, least_squares.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info)
+    found = least_squares.instrument_strength(
+        INSTRUMENTAL, least_squares.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info
+    )
     free = columns != instruments
     np.testing.assert_allclose(found.luck[free & (INSTRUMENTAL.group == INSTRUMENTAL.block[5])], max(hold, 1.0) ** 2)
     assert (found.luck >= 1.0).all()
@@ -187,15 +189,19 @@ def test_an_instrument_that_does_not_move_is_none() -> None:
     lines, _ = made(INSTRUMENTAL, 2)
     lines[:, INSTRUMENTAL.instruments[0]] = 0.0
     info = information(lines, 1.0)
-    found = least_squares.hold(INSTRUMENTAL, least_squares.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info)
+    found = least_squares.instrument_strength(
+        INSTRUMENTAL, least_squares.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info
+    )
     assert found.strength[0] == 0.0
-    assert normal_equations.trusting(INSTRUMENTAL, found.strength).instruments[0] == INSTRUMENTAL.columns[0]
+    assert (
+        normal_equations.with_strong_instruments(INSTRUMENTAL, found.strength).instruments[0] == INSTRUMENTAL.columns[0]
+    )
 
 
 def test_weak_instruments_cost_their_block_alone() -> None:
     strength = np.full(INSTRUMENTAL.columns.size, 100.0)
     strength[INSTRUMENTAL.unknowns(3)[0]] = 2.0
-    mixed = normal_equations.trusting(INSTRUMENTAL, strength)
+    mixed = normal_equations.with_strong_instruments(INSTRUMENTAL, strength)
     weak = INSTRUMENTAL.group == INSTRUMENTAL.block[3]
     np.testing.assert_array_equal(mixed.instruments[weak], INSTRUMENTAL.columns[weak])
     np.testing.assert_array_equal(mixed.instruments[~weak], INSTRUMENTAL.instruments[~weak])
@@ -211,5 +217,5 @@ def test_a_rival_is_the_regressor_that_moved_alike() -> None:
     lines, _ = made(PLAIN, 9)
     alpha, q, de = (PLAIN.columns[i] for i in PLAIN.unknowns(0))
     lines[:, q] = lines[:, de] + 0.05 * lines[:, alpha] + 0.01 * np.random.default_rng(1).normal(size=ROWS)
-    names = least_squares.rivals(PLAIN, least_squares.solve(PLAIN, lines.T @ lines))
+    names = least_squares.most_correlated(PLAIN, least_squares.solve(PLAIN, lines.T @ lines))
     assert [PLAIN.regressors[names[i]] for i in PLAIN.unknowns(0)][1:] == ["de", "q"]

@@ -9,17 +9,17 @@ from plant import TRUTH, exact_flight, made_aircraft
 from sysid_node.aircraft.model import Derivative
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import normal_equations
-from sysid_node.online.regression.mixed_estimation import beliefs, weighed
+from sysid_node.online.regression.mixed_estimation import believed_derivatives, weighed
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = made_aircraft()
-PLAN = normal_equations.plan(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
+PLAN = normal_equations.normal_equations(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
 
 
 def test_beliefs_are_the_file_s() -> None:
     aircraft = replace(AIRCRAFT, derivatives={**AIRCRAFT.derivatives, "CL_q": Derivative(3.0)})
-    values, precisions = beliefs(aircraft, PLAN)
+    values, precisions = believed_derivatives(aircraft, PLAN)
     c = PLAN.coefficients.index("CL")
     named = {PLAN.regressors[i]: (values[i, c], precisions[i, c]) for i in PLAN.unknowns(c)}
     assert named["alpha"] == (TRUTH["CL_alpha"], pytest.approx((0.1 * TRUTH["CL_alpha"]) ** -2))
@@ -29,7 +29,7 @@ def test_beliefs_are_the_file_s() -> None:
 def test_the_mean_is_that_of_mixed_estimation() -> None:
     """Klein & Morelli (2006), sec. 5.4: (P^-1 + D^-1)^-1 (P^-1 theta + D^-1 believed)."""
     rng = np.random.default_rng(0)
-    values, precisions = beliefs(AIRCRAFT, PLAN)
+    values, precisions = believed_derivatives(AIRCRAFT, PLAN)
     theta = (values + 0.3 * rng.normal(size=values.shape)) * PLAN.mine
     covariance = np.zeros((theta.shape[1], *PLAN.same.shape))
     for c in range(theta.shape[1]):
@@ -45,7 +45,7 @@ def test_the_mean_is_that_of_mixed_estimation() -> None:
 
 
 def test_without_tolerances_nothing_changes() -> None:
-    values, precisions = beliefs(AIRCRAFT, PLAN)
+    values, precisions = believed_derivatives(AIRCRAFT, PLAN)
     theta, covariance = values + 1.0, np.tile(PLAN.same, (values.shape[1], 1, 1))
     mean, spread = weighed(PLAN, theta, covariance, values, 0.0 * precisions)
     for c in range(theta.shape[1]):
@@ -60,7 +60,7 @@ def test_a_flight_that_shows_little_leaves_the_beliefs() -> None:
     samples = exact_flight(AIRCRAFT, time)
     samples[:, :9] += 0.02 * np.random.default_rng(1).normal(size=(time.size, 9)) * np.abs(samples[:, :9]).mean(axis=0)
     plain, informed = (
-        run(AIRCRAFT, Settings(method="sls_rft", use_prior=use), time, samples, time[-1:])[0].derivatives
+        run(AIRCRAFT, OnlineSettings(method="sls_rft", use_prior=use), time, samples, time[-1:])[0].derivatives
         for use in (False, True)
     )
     for name, belief in AIRCRAFT.derivatives.items():

@@ -12,7 +12,7 @@ from sysid_node.aircraft.model import DEFAULT_NOISE, Aircraft
 from sysid_node.online.frequency import fourier_transform, regression_signals
 from sysid_node.online.regression import least_squares, normal_equations, regressor_noise
 from sysid_node.online.replay import run
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 
 Array = NDArray[np.float64]
 NOISY = made_aircraft(noise={**DEFAULT_NOISE, "alpha": 0.02, "beta": 0.02})
@@ -56,7 +56,9 @@ def test_expected_energy_is_that_of_noisy_samples() -> None:
 
 def mean_errors(aircraft: Aircraft, method: str, time: Array, flights: Array) -> tuple[Array, Array]:
     """Mean relative error of each derivative over the flights, and the mean's standard deviation."""
-    ends = [run(aircraft, Settings(method=method), time, samples, time[-1:])[0].derivatives for samples in flights]
+    ends = [
+        run(aircraft, OnlineSettings(method=method), time, samples, time[-1:])[0].derivatives for samples in flights
+    ]
     errors = np.array([[found[name].value / TRUTH[name] - 1.0 for name in NAMES] for found in ends])
     return errors.mean(axis=0), errors.std(axis=0) / np.sqrt(len(errors))
 
@@ -90,7 +92,7 @@ def test_no_more_noise_is_subtracted_than_the_residuals_show(noisy_flights: tupl
 def test_all_that_the_residual_holds_is_allowed() -> None:
     """One regressor with noise of energy b: the residual holds theta^2 b, beyond which the column's share shrinks."""
     layout = regression_signals.Layout(("p",))
-    plan = normal_equations.plan({"Cl": ("p",)}, layout)
+    plan = normal_equations.normal_equations({"Cl": ("p",)}, layout)
     bias = np.zeros((layout.width, layout.width))
     p = layout.column("p")
     bias[p, p] = 3.0

@@ -5,17 +5,20 @@ from made_lines import INSTRUMENTAL, PLAIN, information, made
 from numpy.typing import NDArray
 
 from sysid_node.online.regression import least_squares, normal_equations
-from sysid_node.online.regression.selection_bias import prudence
+from sysid_node.online.regression.selection_bias import selection_bias_factors
 
 Array = NDArray[np.float64]
 
 
-def judged(plan: normal_equations.Plan, lines: Array, believed: Array, tolerance: float) -> Array:
+def judged(plan: normal_equations.NormalEquations, lines: Array, believed: Array, tolerance: float) -> Array:
     info = information(lines, 1.0)
     gram = info.grams.sum(axis=0)
     solution = least_squares.solve(plan, gram)
-    hold, spread = least_squares.hold(plan, solution, info), least_squares.uncertainty(plan, solution, info)
-    return prudence(plan, solution, spread, hold, gram, believed, plan.mine * tolerance**-2)
+    hold, spread = (
+        least_squares.instrument_strength(plan, solution, info),
+        least_squares.uncertainty(plan, solution, info),
+    )
+    return selection_bias_factors(plan, solution, spread, hold, gram, believed, plan.mine * tolerance**-2)
 
 
 def test_least_squares_need_none() -> None:

@@ -8,9 +8,9 @@ from scipy.stats import t as student
 
 from sysid_node.online.frequency.regression_signals import layout
 from sysid_node.online.regression import least_squares, normal_equations, weak_instruments
-from sysid_node.online.regression.derivative_index import table
+from sysid_node.online.regression.derivative_index import derivative_index
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
-from sysid_node.online.regression.weak_instruments import Bend
+from sysid_node.online.regression.weak_instruments import AndersonRubinBounds
 
 Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()
@@ -20,8 +20,8 @@ def test_least_squares_have_students_interval() -> None:
     """With curve = 1 / (nu se^2), as the sum of squares of least squares has."""
     errors, freedom = np.array([0.1, 2.0]), np.array([4.0, 40.0])
     t = student.ppf(0.975, freedom)
-    bend = Bend(np.zeros(2), 1.0 / (freedom * errors**2), freedom / (freedom + t**2))
-    below, above = weak_instruments.reach((t * errors) ** 2, bend)
+    bend = AndersonRubinBounds(np.zeros(2), 1.0 / (freedom * errors**2), freedom / (freedom + t**2))
+    below, above = weak_instruments.interval_arms((t * errors) ** 2, bend)
     np.testing.assert_allclose(below, t * errors)
     np.testing.assert_allclose(above, t * errors)
 
@@ -29,8 +29,8 @@ def test_least_squares_have_students_interval() -> None:
 def test_ends_are_where_the_density_of_the_tested_value_allows_no_more() -> None:
     rng = np.random.default_rng(0)
     squares = rng.uniform(0.1, 1.0, 50) ** 2
-    bend = Bend(rng.normal(size=50), rng.uniform(0.01, 2.0, 50), rng.uniform(0.5, 1.0, 50))
-    below, above = weak_instruments.reach(squares, bend)
+    bend = AndersonRubinBounds(rng.normal(size=50), rng.uniform(0.01, 2.0, 50), rng.uniform(0.5, 1.0, 50))
+    below, above = weak_instruments.interval_arms(squares, bend)
     ended = np.isfinite(below)
     assert ended.sum() > 20
     np.testing.assert_array_equal(~ended, squares * bend.counted * bend.curve >= 1.0)
@@ -39,7 +39,7 @@ def test_ends_are_where_the_density_of_the_tested_value_allows_no_more() -> None
         np.testing.assert_allclose(delta**2, allowed)
 
 
-PLAN = normal_equations.plan({"Cl": ("p",)}, layout(AIRCRAFT, ("p",)))
+PLAN = normal_equations.normal_equations({"Cl": ("p",)}, layout(AIRCRAFT, ("p",)))
 P, Z, Y = PLAN.columns[0], PLAN.instruments[0], PLAN.outputs[0]
 
 
@@ -55,15 +55,21 @@ def solved(hold: float, endogeneity: float, rng: np.random.Generator, lines: int
     bend = bent(solution, gram, covariance, lines)
     error = np.sqrt(covariance[0, 0])
     t = student.ppf(0.975, lines)
-    return solution.theta[0], error, np.array(weak_instruments.reach((t * error) ** 2, Bend(*(b[:1] for b in bend))))
+    return (
+        solution.theta[0],
+        error,
+        np.array(weak_instruments.interval_arms((t * error) ** 2, AndersonRubinBounds(*(b[:1] for b in bend)))),
+    )
 
 
-def bent(solution: Solution, gram: Array, covariance: Array, freedom: float, gusts: float = 0.0) -> Bend:
+def bent(solution: Solution, gram: Array, covariance: Array, freedom: float, gusts: float = 0.0) -> AndersonRubinBounds:
     spread = Uncertainty(covariance, np.ones(1), np.ones((1, 1)), np.full(1, freedom))
-    return weak_instruments.bend(PLAN, TABLE, solution, gram, spread, covariance, np.ones(1), np.full(1, gusts))
+    return weak_instruments.anderson_rubin_bounds(
+        PLAN, TABLE, solution, gram, spread, covariance, np.ones(1), np.full(1, gusts)
+    )
 
 
-TABLE = table(AIRCRAFT, PLAN, 0.3)
+TABLE = derivative_index(AIRCRAFT, PLAN, 0.3)
 
 
 def test_for_the_share_of_gusts_students_quantile_is_not_paid_back() -> None:
@@ -81,7 +87,9 @@ def test_what_does_not_come_from_the_residual_does_not_bend() -> None:
     gram = values.T @ values
     solution, whole = least_squares.solve(PLAN, gram), np.ones((1, 1, 1))
     spread = Uncertainty(whole, np.ones(1), np.ones((1, 1)), np.full(1, 60.0))
-    half = weak_instruments.bend(PLAN, TABLE, solution, gram, spread, 0.5 * whole, np.ones(1), np.zeros(1))
+    half = weak_instruments.anderson_rubin_bounds(
+        PLAN, TABLE, solution, gram, spread, 0.5 * whole, np.ones(1), np.zeros(1)
+    )
     full = bent(solution, gram, whole, 60.0)
     np.testing.assert_allclose(half.curve, 0.5 * full.curve)
     np.testing.assert_allclose(half.slope, 0.5 * full.slope)

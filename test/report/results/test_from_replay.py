@@ -8,13 +8,13 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Sensors
-from sysid_node.online.settings import Settings
+from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS, DerivativeEstimate, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.files.run_folder import rebuild_report, write_run
 from sysid_node.report.results.from_replay import replay_result
 
-SETTINGS = Settings()
+SETTINGS = OnlineSettings()
 LONGITUDINAL = ("CL", "CD", "Cm")
 
 
