@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -290,13 +289,3 @@ def test_a_real_flight_through_the_two_commands(tmp_path, flights, capsys):
     assert found["samples"] == 401
     assert found["rejected"] == {}
     assert found["derivatives"]["Cm_alpha"]["value"] == pytest.approx(-1.466, abs=2 * 0.018)
-
-
-def test_the_documentations_python_runs(monkeypatch, capsys):
-    root = Path(__file__).resolve().parents[2]
-    if not (root / "bags" / "cdrw_multistep").is_dir():
-        pytest.skip("bags/cdrw_multistep is not there")
-    monkeypatch.chdir(root)
-    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "reference" / "bags.md").read_text(), re.DOTALL)
-    exec(compile(code, "docs/reference/bags.md", "exec"), {})
-    assert "DerivativeEstimate(name='Cm_alpha'" in capsys.readouterr().out
