@@ -19,8 +19,8 @@ from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter_settings import ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
+from sysid_node.online.session import Session
 from sysid_node.online.settings import OnlineSettings as Estimation
-from sysid_node.ros.session import Session
 from sysid_node.sim import Simulator, Trim, trim_flight
 from sysid_node.sim.flying import live
 from sysid_node.sim.flying.live import Air

@@ -31,8 +31,8 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.online.estimates.saving import save_estimates
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.parameters import LIVE, PARAMETERS, check, estimation_settings
+from sysid_node.online.session import Due, Session
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.ros.session import Due, Session
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, refusal, values_of
 from sysid_node.ros.support.diagnostics import Source

@@ -8,8 +8,8 @@ from harness import Probe, made_up_streams
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
+from sysid_node.online.session import Due, Session
 from sysid_node.ros.identifier import Identifier
-from sysid_node.ros.session import Due, Session
 
 
 class FaultySession(Session):

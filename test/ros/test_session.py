@@ -10,8 +10,8 @@ from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.replay import run
+from sysid_node.online.session import Due, Session
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.ros.session import Due, Session
 
 
 def fly(session: Session, flight: Streams, order: str) -> list[Due]:

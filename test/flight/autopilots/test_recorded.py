@@ -15,8 +15,8 @@ from sysid_node.flight.autopilots.px4 import AIRSPEED, IMU, MOTORS, SERVOS, Px4
 from sysid_node.flight.autopilots.recorded import LoggedSample, read_recorded, streams_of_samples
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
+from sysid_node.online.session import Session
 from sysid_node.online.settings import OnlineSettings as Estimator
-from sysid_node.ros.session import Session
 
 JOINTS = "elevator=servo2:0:0.4 aileron=servo1:0:0.4 rudder=servo3:0:0.4 throttle=motor1:0:1"
 CHANNELS = {"aileron": 0, "elevator": 1, "rudder": 2}
