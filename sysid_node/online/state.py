@@ -80,7 +80,7 @@ class SegmentSolution:
     factors: Array  # (C, P) squared standard error over (P_jj residual)
     timing: LagTest  # whether the controls are felt when they are measured
     hold: InstrumentStrength  # of the instruments on the regressors
-    prudence: Array  # (P, C) see ``prudence``
+    prudence: Array  # (P, C) see ``selection_bias_factors``
     bend: AndersonRubinBounds  # of the intervals
     lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
     doubted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict

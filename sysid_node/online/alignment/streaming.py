@@ -1,4 +1,4 @@
-"""Intake: from messages, one by one as they come, to aligned samples.
+"""Streaming alignment: from messages, one by one as they come, to aligned samples.
 
 The live node and the replay both feed this. Each message is checked (``flight.checks``: plausible values; here: its
 stamp), and every IMU message waits until air data and actuators stamped after it have come, so that both are
@@ -125,7 +125,7 @@ class _Neighbours:
 
 @dataclass(slots=True)
 class AlignmentState:
-    """All that the intake remembers. ``accepted`` and ``rejected`` count messages by topic (and reason)."""
+    """All that the alignment remembers. ``accepted`` and ``rejected`` count messages by topic (and reason)."""
 
     actuation: Actuation
     air_density: float
@@ -143,7 +143,7 @@ class AlignmentState:
 
 
 def init(aircraft: Aircraft, max_gap: float) -> AlignmentState:
-    """An intake for an aircraft; ``max_gap`` s is the longest spacing of messages that is interpolated across."""
+    """An alignment that has seen nothing; ``max_gap`` (s): the longest spacing that is interpolated across."""
     actuation = Actuation.of(aircraft)
     state = AlignmentState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap))
     state.joints = ((), actuation.places(()))
