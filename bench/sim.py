@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.sim import Inputs, Simulator, trim_flight
+from sysid_node.sim.compiled.xla import PLAIN_VARIABLE
 from sysid_node.sim.export.jsbsim import jsbsim_model
 from sysid_node.sim.flying.rollout import rollout
 from sysid_node.sim.model.layout import Layout, Model
@@ -60,6 +61,34 @@ def best(call: Callable[[], Any], repeat: int) -> Times:
         jax.block_until_ready(call())
         times.append((time.perf_counter() - begin[0], time.process_time() - begin[1]))
     return np.min(times, axis=0)
+
+
+PLAIN = """
+import time, numpy as np, jax
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.sim import Simulator, trim_flight
+simulator = Simulator(load_aircraft({aircraft!r}))
+trim = trim_flight(simulator)
+inputs = simulator.inputs(np.tile(trim.command, ({samples}, 1)))
+fly = lambda: jax.block_until_ready(simulator.rollout(simulator.neutral(), trim.initial, inputs))
+fly()
+times = []
+for _ in range({repeat}):
+    begin = time.perf_counter(), time.process_time()
+    fly()
+    times.append((time.perf_counter() - begin[0], time.process_time() - begin[1]))
+print(*np.min(times, axis=0))
+"""
+
+
+def without_options(aircraft: str, repeat: int) -> Times:
+    """A flight in a fresh process whose compiler has no options (``compiled.xla``)."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, PLAIN_VARIABLE: "1", "JAX_COMPILATION_CACHE_DIR": folder}
+        environment.pop("XLA_FLAGS", None)
+        code = PLAIN.format(aircraft=aircraft, samples=SAMPLES, repeat=repeat)
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    return np.array(done.stdout.split(), dtype=float)
 
 
 def compile_times(aircraft: str) -> tuple[Times, Times]:
@@ -129,11 +158,13 @@ def main() -> None:
     flight = best(lambda: simulator.rollout(theta, trim.initial, inputs), args.repeat)
     slopes = best(lambda: simulator.jacobian(theta, trim.initial, inputs), args.repeat)
     cold, cached = compile_times(args.aircraft)
+    plain = without_options(args.aircraft, args.repeat)
     batch, bare = batch_rate(simulator, args.repeat), jsbsim_rate(simulator, args.repeat)
     c172p = _frames(jsbsim.FGFDMExec(None), "c172p", 52.0, args.repeat)
     count = len(simulator.names)
     rows = [
         ("flight of 60 s at 100 Hz, ms", 1e3 * flight, "40"),
+        ("the same without the compiler's options, over with them", plain / flight, "5"),
         (f"its Jacobian, {count} parameters, s", slopes, "0.5"),
         ("first flight, s", cold[0], "15"),
         ("first flight, program from the cache, s", cached[0], "2"),

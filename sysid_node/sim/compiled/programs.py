@@ -1,6 +1,6 @@
 """Programs kept as JAX traced them: a process would trace anew, for seconds, what it then finds compiled.
 
-A program is kept under a digest of this package's sources, JAX's release, and what it was traced for; where any of
+A program is kept under a digest of the sources that shape it, JAX's release, and what it was traced for; where any of
 these differs it is another program. Without the ``flatbuffers`` package, by which JAX writes programs, all are traced.
 """
 
@@ -66,7 +66,9 @@ def _program(what: str, traced: Callable[[], export.Exported]) -> export.Exporte
     name = hashlib.sha256(f"{jax.__version__} {_sources()} {what}".encode()).hexdigest()
     path = cache_folder("programs") / name
     try:
-        return export.deserialize(bytearray(path.read_bytes()))
+        program = export.deserialize(bytearray(path.read_bytes()))
+        path.touch()  # used now: ``prune`` deletes others first
+        return program
     except Exception:  # whatever is there: another release's, half of one, none
         found = traced()
     try:
@@ -74,15 +76,43 @@ def _program(what: str, traced: Callable[[], export.Exported]) -> export.Exporte
         own = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         own.write_bytes(found.serialize())
         own.replace(path)
+        prune(path.parent)
     except OSError:
         pass  # a cache that cannot be written is none
     return found
 
 
+#: What shapes the programs: these layers, and of the diagnosis the residuals, whose functions are kept.
+_SHAPING = ("aircraft", "dynamics", "flight", "sim", "gap/residuals")
+
+#: Largest size of all programs that stay on the disk, bytes.
+LARGEST = 200_000_000
+
+
 @cache
 def _sources() -> str:
-    """Digest of the package's sources."""
+    """Digest of the sources that shape the programs."""
     digest, package = hashlib.sha256(), Path(__file__).parents[2]
-    for path in sorted(package.rglob("*.py")):
+    for path in sorted(path for room in _SHAPING for path in (package / room).rglob("*.py")):
         digest.update(str(path.relative_to(package)).encode() + path.read_bytes())
     return digest.hexdigest()
+
+
+def prune(folder: Path, largest: int = LARGEST) -> None:
+    """Delete the programs that were used longest ago until all are no larger than ``largest`` bytes together.
+
+    Programs of older sources are never used again, and so go first.
+    """
+    found = []
+    for path in folder.glob("*"):
+        try:
+            state = path.stat()
+        except OSError:
+            continue  # another process has deleted it
+        found.append((state.st_mtime_ns, state.st_size, path))
+    total = sum(size for _, size, _ in found)
+    for _, size, path in sorted(found):
+        if total <= largest:
+            return
+        path.unlink(missing_ok=True)
+        total -= size

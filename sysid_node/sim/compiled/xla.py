@@ -9,6 +9,7 @@ that has used JAX before it imports this package keeps its own, and only the spe
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 
 import jax
@@ -23,10 +24,22 @@ _OPTIONS = {
 #: Releases that have these options: one that has not would end the process at the first compilation.
 _KNOWS = "0.10."
 
+#: Environment variable that leaves the options out with the value 1, so that a bench can measure what they gain.
+PLAIN_VARIABLE = "SYSID_XLA_PLAIN"
+
 
 def configure() -> None:
-    """Set float64 and, where the user has not set them, the compiler's options and the persistent cache."""
-    if jax.__version__.startswith(_KNOWS):
+    """Set float64 and, where the user has not set them, the compiler's options and the persistent cache.
+
+    Warns where this release of JAX is not known to have the options: results are the same, flights take longer.
+    """
+    if not jax.__version__.startswith(_KNOWS):
+        message = (
+            f"JAX {jax.__version__}: the compiler's options for time loops are known for {_KNOWS}x alone and are left "
+            "out; simulated flights give the same results but may take about twenty times as long"
+        )
+        warnings.warn(message, RuntimeWarning, stacklevel=2)
+    elif os.environ.get(PLAIN_VARIABLE, "") != "1":
         flags = os.environ.get("XLA_FLAGS", "")
         missing = [f"{option}={value}" for option, value in _OPTIONS.items() if option not in flags]
         os.environ["XLA_FLAGS"] = " ".join([flags, *missing]).strip()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from sysid_node.sim.compiled import programs
-from sysid_node.sim.compiled.programs import kept
+from sysid_node.sim.compiled.programs import kept, prune
 from sysid_node.sim.model.layout import Scalar
 
 X = jnp.linspace(0.0, 1.0, 5)
@@ -75,3 +76,23 @@ def test_without_a_folder_to_write_or_flatbuffers_it_is_traced(folder: Path, mon
     np.testing.assert_array_equal(traced([])("once", {"x": X})[0], jnp.sin(X))
     monkeypatch.setattr(programs, "find_spec", lambda name: None)
     np.testing.assert_array_equal(traced([])("once", {"x": X})[0], jnp.sin(X))
+
+
+def test_programs_used_longest_ago_are_deleted_beyond_the_largest_size(tmp_path: Path) -> None:
+    for age, name in enumerate(("newest", "middle", "oldest")):
+        path = tmp_path / name
+        path.write_bytes(bytes(100))
+        os.utime(path, (1000.0 - age, 1000.0 - age))
+    prune(tmp_path, 250)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["middle", "newest"]
+    prune(tmp_path, 250)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_program_that_is_used_becomes_the_newest(folder: Path) -> None:
+    program = traced([])
+    program("one", {"x": X})
+    (path,) = folder.iterdir()
+    os.utime(path, (1000.0, 1000.0))
+    traced([])("one", {"x": X})
+    assert path.stat().st_mtime > 1000.0
