@@ -82,8 +82,8 @@ def _program(what: str, traced: Callable[[], export.Exported]) -> export.Exporte
     return found
 
 
-#: What shapes the programs: these layers, and of the diagnosis the residuals, whose functions are kept.
-_SHAPING = ("aircraft", "dynamics", "flight", "sim", "gap/residuals")
+#: Layers whose sources shape the programs: the diagnosis with its thresholds, and what it computes with.
+_SHAPING = ("aircraft", "dynamics", "flight", "sim", "gap")
 
 #: Largest size of all programs that stay on the disk, bytes.
 LARGEST = 200_000_000
