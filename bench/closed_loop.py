@@ -22,7 +22,7 @@ from evaluation.pages import publish, table
 from numpy.typing import NDArray
 
 from sysid_node.online.settings import METHODS
-from sysid_node.sim.flying.live import Air
+from sysid_node.sim.flying.live import LiveConditions
 from sysid_node.sim.pages.line_chart import Panel, draw
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ def failures(turbulence: str, flights: int, method: str) -> str:
     """The table of failures: mean of several flights."""
     rows = []
     for name, effects in FAILURES.items():
-        airs = [Air(turbulence, seed=seed + 1) for seed in range(flights)]
+        airs = [LiveConditions(turbulence, seed=seed + 1) for seed in range(flights)]
         pairs = [both(Sortie(effects, ONSET, END, air, method=method)) for air in airs]
         whole = np.array([[flown.error(SETTLED, END) for flown in pair] for pair in pairs])
         rest = [pair for pair in pairs if calm(*pair) >= LEAST_CALM]
@@ -124,7 +124,7 @@ def random_sortie(seed: int) -> Sortie:
     ]
     effects = tuple(kinds[draw.integers(len(kinds))])
     turbulence = ("none", "light", "moderate")[draw.integers(3)]
-    air = Air(turbulence, noise=draw.uniform(0.5, 2.0), seed=seed)
+    air = LiveConditions(turbulence, noise=draw.uniform(0.5, 2.0), seed=seed)
     excitation = EXCITATION if draw.random() < 0.75 else replace(EXCITATION, longest=1.0)
     return Sortie(effects, *DRAW, air, excitation=excitation, asked=draw.uniform(0.3, 1.3))
 
@@ -177,7 +177,7 @@ def exciter(flights: int, method: str) -> str:
             settings = replace(EXCITATION, manoeuvre=(spec,), derivatives=ASKED, accuracy=0.05, watch=False)
             took = []
             for seed in range(flights):
-                air = Air(turbulence, seed=seed + 1)
+                air = LiveConditions(turbulence, seed=seed + 1)
                 flown = fly(Sortie((), 1e9, FIXED + 4.0, air, False, settings, method=method))
                 ends = [event.time for event in flown.events if event.text.startswith("known")]
                 took.append(ends[0] - flown.events[0].time if ends else FIXED)
@@ -192,7 +192,7 @@ def picture(path: Path) -> None:
     """Pitch around the elevator's failure, adapted beside the baseline."""
     panels = []
     for name, axis in (("elevator at 40 % of its effect", 0), ("aileron at 50 % of its effect", 1)):
-        fixed, adapted = both(Sortie(FAILURES[name], ONSET, END, Air(seed=1)))
+        fixed, adapted = both(Sortie(FAILURES[name], ONSET, END, LiveConditions(seed=1)))
         off = [np.rad2deg((flown.attitude - flown.wanted)[:, axis]) for flown in (fixed, adapted)]
         panels.append(Panel(f"{name}: {('pitch', 'roll')[axis]} error, deg", fixed.time, *off))
     path.write_text(draw(panels, "tracking error, baseline grey, adapted blue"), encoding="utf-8")

@@ -33,7 +33,7 @@ from sysid_node.gap.flightdata.flow_angles import ANGLES
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.sim import EFFECTS, Simulator
 from sysid_node.sim.flying.recording import Recorder
-from sysid_node.sim.flying.sortie import Conditions, fly_sortie
+from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 from sysid_node.sim.pages.effects_page import AIRCRAFT, EXAMPLES
 
 RATE, DURATION = 100.0, 44.0
@@ -61,7 +61,7 @@ def fly(aircraft: Aircraft, belief: Aircraft, effect: str, plan: tuple[str, ...]
         deflections[:, column] = moved[name]
     thrust = aircraft.throttle.max_thrust if aircraft.throttle else None
     deflections[:, -1] *= thrust or 1.0
-    sortie = fly_sortie(simulator, deflections, Conditions([effect], seed=seed))
+    sortie = fly_sortie(simulator, deflections, SortieConditions([effect], seed=seed))
     record = flight_record(belief, Recorder(RATE, RATE, RATE).record(sortie), 0.2)
     unread = {} if vanes else {name: np.full(len(record), np.nan) for name in ANGLES}
     record = replace(record, columns={**record.columns, **unread})

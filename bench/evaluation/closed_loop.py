@@ -23,7 +23,7 @@ from sysid_node.online.session import Session
 from sysid_node.online.settings import OnlineSettings as Estimation
 from sysid_node.sim import Simulator, Trim, trim_flight
 from sysid_node.sim.flying import live
-from sysid_node.sim.flying.live import Air
+from sysid_node.sim.flying.live import LiveConditions
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Sortie:
     effects: tuple[str, ...] = ()
     onset: float = 30.0  # s
     seconds: float = 60.0
-    air: Air = field(default_factory=Air)
+    air: LiveConditions = field(default_factory=LiveConditions)
     adapt: bool = True
     excitation: ExcitationSettings = EXCITATION
     asked: float = 1.0  # size of the set-points
@@ -120,7 +120,7 @@ def fly(sortie: Sortie) -> Flown:
 
 
 def _estimate(
-    session: Session, pilot: controller.ControllerState, excitation: exciter.ExciterState, now: live.Reading
+    session: Session, pilot: controller.ControllerState, excitation: exciter.ExciterState, now: live.LiveReading
 ) -> None:
     """Messages into the estimator, and what falls due to those who use it."""
     stamp = round(1e9 * now.time)
@@ -140,7 +140,7 @@ def _estimate(
 
 
 def _command(
-    pilot: controller.ControllerState, excitation: exciter.ExciterState, now: live.Reading, points: SetPoints
+    pilot: controller.ControllerState, excitation: exciter.ExciterState, now: live.LiveReading, points: SetPoints
 ) -> tuple[Sequence[float], Array]:
     """Command (4,) and what was wanted: pitch, roll, sideslip (3,)."""
     _, _, az, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()

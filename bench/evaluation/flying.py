@@ -24,7 +24,7 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying.autopilot import Autopilot, autopilot_for, fly_held
-from sysid_node.sim.flying.rollout import Flight, Inputs
+from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
@@ -125,7 +125,7 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     return Batch(plan.time, _samples(np.asarray(flights.outputs), np.asarray(flights.surfaces), flights.states))
 
 
-def _flown(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, pilot: Autopilot | None) -> Flight:
+def _flown(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, pilot: Autopilot | None) -> SimulatedFlight:
     """One flight from trim, in the autopilot's hands if there is one."""
     if pilot is None:
         return simulator.rollout(theta, trim.initial, inputs)
@@ -134,7 +134,7 @@ def _flown(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, pilot
 
 def _flown_on(
     simulator: Simulator, thetas: tuple[Array, Array], trim: Trim, inputs: Inputs, pilot: Autopilot | None, onset: int
-) -> Flight:
+) -> SimulatedFlight:
     """One flight that goes on from sample ``onset`` as another aircraft, at what the autopilot's integrals were."""
     before = _flown(simulator, thetas[0], trim, jax.tree.map(lambda x: x[: onset + 1], inputs), pilot)
     rest = jax.tree.map(lambda x: x[onset:], inputs)
@@ -143,7 +143,7 @@ def _flown_on(
         integrals = before.commands[onset] - rest.commands[0] - pilot.gains @ error
         rest = rest._replace(commands=(rest.commands + integrals).at[0].set(before.commands[onset]))
     after = _flown(simulator, thetas[1], replace(trim, initial=before.states[onset]), rest, pilot)
-    return Flight(*(jnp.concatenate([a[:onset], b]) for a, b in zip(before, after, strict=True)))
+    return SimulatedFlight(*(jnp.concatenate([a[:onset], b]) for a, b in zip(before, after, strict=True)))
 
 
 @lru_cache

@@ -68,14 +68,14 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Flies, then writes the bag and the truth."""
     from sysid_node.sim.flying.recording import Recorder  # noqa: PLC0415  # JAX takes its time
-    from sysid_node.sim.flying.sortie import Conditions, fly_sortie  # noqa: PLC0415
+    from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
     if args.out.exists():
         raise InputError(f"bag {args.out}: exists already; remove it or choose another name")
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate))
-    conditions = Conditions(
+    conditions = SortieConditions(
         args.effect,
         args.airspeed,
         args.turbulence,

@@ -20,7 +20,7 @@ from sysid_node.excite.information import FisherInformation, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
 from sysid_node.excite.segment import Segment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
-from sysid_node.sim import Flight, Inputs, Simulator
+from sysid_node.sim import Inputs, SimulatedFlight, Simulator
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
 from sysid_node.sim.flying.rollout import rollout
 from sysid_node.sim.flying.trim import Trim, trim_flight
@@ -99,7 +99,7 @@ class Predictor:
         information = FisherInformation(self.names, self.values, eliminate(matrix, len(self.names)))
         return Prediction(manoeuvre, self._record(manoeuvre, flight), information)
 
-    def _record(self, manoeuvre: Manoeuvre, flight: Flight) -> FlightRecord:
+    def _record(self, manoeuvre: Manoeuvre, flight: SimulatedFlight) -> FlightRecord:
         columns = dict(zip(self.simulator.outputs, np.asarray(flight.outputs).T, strict=True))
         columns["rho"] = np.asarray(air_density(-flight.states[:, 2], jnp))
         controls = (*self.aircraft.control_symbols, "thrust")
@@ -114,13 +114,13 @@ class Predictor:
         _check_travel(self.aircraft, manoeuvre, commands)
         return commands
 
-    def _fly(self, commands: Array) -> Flight:
+    def _fly(self, commands: Array) -> SimulatedFlight:
         simulator, inputs, theta = self.simulator, self.simulator.inputs(_padded(commands)), self.simulator.neutral()
         if self.autopilot is None:
             flight = simulator.rollout(theta, self.trim.initial, inputs)
         else:
             flight = fly_held(simulator, theta, self.trim, inputs, self.autopilot)
-        return simulator.check(Flight(*(series[: len(commands)] for series in flight)))
+        return simulator.check(SimulatedFlight(*(series[: len(commands)] for series in flight)))
 
     def _slopes(self, commands: Array) -> Array:
         """Sensitivities (N, m, derivatives + initial states) of the measured outputs; rounding errors become zero."""

@@ -28,7 +28,7 @@ from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
 from sysid_node.ros.support.spin import run_program, serve
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying import live
-from sysid_node.sim.flying.live import Air, Reading
+from sysid_node.sim.flying.live import LiveConditions, LiveReading
 from sysid_node.sim.flying.pace import Pace
 from sysid_node.sim.signals.dryden import INTENSITIES
 
@@ -85,7 +85,7 @@ class FlightSimulator(LoopNode):
         self._simulator = Simulator(self.aircraft, values["rate"])
         self._trim = trim_flight(self._simulator)
         theta = live.vector(self._simulator, values["effects"].split())
-        air = Air(values["turbulence"], noise=values["noise"], seed=int(values["seed"]))
+        air = LiveConditions(values["turbulence"], noise=values["noise"], seed=int(values["seed"]))
         self._flight = live.start(self._simulator, self._trim, air, theta)
         self._command: list[float] = self._trim.command.tolist()
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
@@ -155,7 +155,7 @@ class FlightSimulator(LoopNode):
             self._publish(live.step(self._simulator, self._flight, self._command))
             self._steps.add(time.perf_counter() - start)
 
-    def _publish(self, now: Reading) -> None:
+    def _publish(self, now: LiveReading) -> None:
         stamp = self._start_ns + round(NANOSECONDS * now.time)
         if self._sim_time is not None:
             self._sim_time.publish(ClockMessage(clock=stamp_message(stamp)))

@@ -27,8 +27,18 @@ from sysid_node.sim.compiled import xla
 xla.configure()
 
 from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter  # noqa: E402
-from sysid_node.sim.flying.rollout import Flight, Inputs  # noqa: E402
+from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight  # noqa: E402
 from sysid_node.sim.flying.trim import Trim, trim_flight  # noqa: E402
 from sysid_node.sim.simulator import Simulator  # noqa: E402
 
-__all__ = ["EFFECTS", "STATIONS", "Effect", "Flight", "Inputs", "Parameter", "Simulator", "Trim", "trim_flight"]
+__all__ = [
+    "EFFECTS",
+    "STATIONS",
+    "Effect",
+    "Inputs",
+    "Parameter",
+    "SimulatedFlight",
+    "Simulator",
+    "Trim",
+    "trim_flight",
+]

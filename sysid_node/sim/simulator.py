@@ -17,7 +17,7 @@ from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.dynamics.attitude import quaternion
 from sysid_node.errors import InputError
 from sysid_node.sim.effects import Parameter
-from sysid_node.sim.flying.rollout import Flight, Inputs, rollout
+from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight, rollout
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar, layout_of, model_of
 from sysid_node.sim.model.state import STATES
@@ -64,12 +64,12 @@ class Simulator:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Columns of ``Flight.outputs``."""
+        """Columns of ``SimulatedFlight.outputs``."""
         return OUTPUTS
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Columns of ``Flight.states``."""
+        """Columns of ``SimulatedFlight.states``."""
         return STATES
 
     @property
@@ -151,12 +151,12 @@ class Simulator:
 
         return Inputs(jnp.asarray(commands), filled(gusts, 6), filled(turbulence, 6), filled(noise, len(OUTPUTS)))
 
-    def rollout(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> Flight:
+    def rollout(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> SimulatedFlight:
         """An open-loop flight: pure, compiled, may be transformed by ``jax.vmap`` and ``jax.jacfwd``.
 
         theta (P,), initial (13,). A flight that diverges is not finite: ``check`` says so.
         """
-        flight: Flight = _rollout(self.layout, self.model, theta, initial, inputs, self.step)
+        flight: SimulatedFlight = _rollout(self.layout, self.model, theta, initial, inputs, self.step)
         return flight
 
     def jacobian(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> Scalar:
@@ -164,7 +164,7 @@ class Simulator:
         slopes: Scalar = _jacobian(self.layout, self.model, theta, initial, inputs, self.step)
         return slopes
 
-    def check(self, flight: Flight) -> Flight:
+    def check(self, flight: SimulatedFlight) -> SimulatedFlight:
         """The flight, if it stays within what flies. Raises InputError naming the time at which it diverged."""
         sound = (np.abs(np.asarray(flight.outputs)) < _SOUND).all(axis=1)  # false for NaN
         if not sound.all():

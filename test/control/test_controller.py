@@ -52,12 +52,14 @@ def test_commands_move_at_a_bounded_rate() -> None:
     assert np.abs(np.subtract(after[:3], before[:3])).max() <= 1.0 * STEP + 1e-12
 
 
-def fly(points: SetPoints, seconds: float, excitation: float = 0.0) -> tuple[controller.ControllerState, live.Reading]:
+def fly(
+    points: SetPoints, seconds: float, excitation: float = 0.0
+) -> tuple[controller.ControllerState, live.LiveReading]:
     """The simulator, its actuators lagging, under the controller at 100 Hz."""
     simulator = Simulator(AIRCRAFT, 100.0)
     trim = trim_flight(simulator)
     flight = live.start(
-        simulator, trim, live.Air(noise=0.0), live.vector(simulator, ["actuator_lag:time_constant=0.05"])
+        simulator, trim, live.LiveConditions(noise=0.0), live.vector(simulator, ["actuator_lag:time_constant=0.05"])
     )
     state, command = controller.init(AIRCRAFT, ControllerSettings()), trim.command.tolist()
     for _ in range(round(seconds * 100)):

@@ -27,7 +27,7 @@ from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.sortie import Conditions, Sortie, fly_sortie
+from sysid_node.sim.flying.sortie import Sortie, SortieConditions, fly_sortie
 from sysid_node.sim.model.layout import OUTPUTS
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ def fly(seed: int, trial: Trial) -> FlightRecord:
     plan = parse_manoeuvre(trial.manoeuvres, AIRCRAFT, rate, SECONDS)
     deflections = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])
     effects = {"actuator_lag": {"time_constant": 0.04}}
-    conditions = Conditions(effects, turbulence=trial.turbulence, seed=seed, rotary_gusts=trial.rotary)
+    conditions = SortieConditions(effects, turbulence=trial.turbulence, seed=seed, rotary_gusts=trial.rotary)
     return _record(fly_sortie(_simulator(rate), deflections, conditions), f"flight {seed}", trial)
 
 

@@ -22,7 +22,7 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.flight_path_reconstruction import Motion, Sample, corrected_motion, rates_of_change
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.sim.flying.rollout import Carry, Pilot, advance, begin
+from sysid_node.sim.flying.rollout import Pilot, StepState, advance, begin
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
 from sysid_node.sim.signals.time_shift import shift_cubic
@@ -79,8 +79,8 @@ def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scala
 
 
 def _advance(
-    chain: Chain, carry: Carry, start: _Start, gusts: Scalar, command_: Scalar, next_gusts: Scalar, time: Scalar
-) -> tuple[Carry, tuple[Scalar, ...]]:
+    chain: Chain, carry: StepState, start: _Start, gusts: Scalar, command_: Scalar, next_gusts: Scalar, time: Scalar
+) -> tuple[StepState, tuple[Scalar, ...]]:
     """One sample: the start of a short flight where one begins, the readings, and the integration up to ``time``."""
 
     def fresh(new: Scalar, old: Scalar) -> Scalar:

@@ -31,7 +31,7 @@ from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.sortie import Conditions, fly_sortie
+from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
 #: Amplitude of the proposed deflections, as a share of each surface's limit, unless the words say otherwise.
 _USUAL = 0.2
@@ -152,7 +152,7 @@ def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> Residua
     throttle = simulator.aircraft.throttle
     if THROTTLE in plan.deflections and throttle is not None:
         deflections[:, -1] = (throttle.max_thrust or 1.0) * plan.deflections[THROTTLE][: len(record)]
-    sortie = fly_sortie(simulator, deflections, Conditions(_effects(simulator, fit.flights[0].point), noise=0.0))
+    sortie = fly_sortie(simulator, deflections, SortieConditions(_effects(simulator, fit.flights[0].point), noise=0.0))
     outputs = np.asarray(sortie.flight.outputs)
     columns = {name: outputs[:, i] for i, name in enumerate(simulator.outputs)}
     columns |= {name: np.asarray(sortie.flight.commands)[:, i] for i, name in enumerate(_symbols(simulator))}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.attitude import euler_angles
-from sysid_node.sim.flying.rollout import Flight, Inputs, fly
+from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight, fly
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
@@ -51,7 +51,7 @@ class Autopilot(NamedTuple):
     highest: Scalar
 
 
-class _State(NamedTuple):
+class _AutopilotState(NamedTuple):
     """Of the autopilot."""
 
     integral: Scalar  # (6,)
@@ -81,10 +81,10 @@ def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
     )
 
 
-def fly_held(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, autopilot: Autopilot) -> Flight:
+def fly_held(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, autopilot: Autopilot) -> SimulatedFlight:
     """A flight from trim with the autopilot on; ``inputs.commands`` are what is planned, trim included."""
     history = round(_LONGEST_DELAY * simulator.rate) + 2
-    flight: Flight = _fly_held(
+    flight: SimulatedFlight = _fly_held(
         simulator.layout, history, simulator.model, theta, trim.initial, inputs, simulator.step, autopilot
     )
     return flight
@@ -100,11 +100,11 @@ def _fly_held(
     inputs: Inputs,
     step: Scalar,
     autopilot: Autopilot,
-) -> Flight:
+) -> SimulatedFlight:
     chain = Chain.of(layout, model, theta, step, -initial[2])
     columns = jnp.array([OUTPUTS.index(name) for name in _SEEN])
 
-    def pilot(state: _State, outputs: Scalar, planned: Scalar) -> tuple[Scalar, Scalar, _State]:
+    def pilot(state: _AutopilotState, outputs: Scalar, planned: Scalar) -> tuple[Scalar, Scalar, _AutopilotState]:
         error = outputs[columns] - autopilot.hold
         # sums, not matrix products: XLA would call a library for these and leave the loop's kernel
         wanted = jnp.sum(autopilot.gains * error + autopilot.integral * state.integral, axis=1)
@@ -113,9 +113,9 @@ def _fly_held(
         given = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)
         past = jnp.concatenate([state.history[1:], given[None]])
         arriving = command.arrive_from_history(chain.effects, past, step)
-        return given, arriving, _State(state.integral + jnp.where(held, 0.0, error * step), past)
+        return given, arriving, _AutopilotState(state.integral + jnp.where(held, 0.0, error * step), past)
 
-    start = _State(jnp.zeros(len(_SEEN)), jnp.tile(inputs.commands[0], (history, 1)))
+    start = _AutopilotState(jnp.zeros(len(_SEEN)), jnp.tile(inputs.commands[0], (history, 1)))
     return fly(chain, initial, inputs, pilot, start)
 
 

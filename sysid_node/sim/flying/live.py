@@ -1,6 +1,6 @@
 """A flight one sample at a time: the same chain as ``rollout``, for a pilot that is another program.
 
-    flight = start(simulator, trim, Air(seed=1), simulator.neutral())
+    flight = start(simulator, trim, LiveConditions(seed=1), simulator.neutral())
     now = step(simulator, flight, command)     # what the instruments read now, and the flight moves on by a sample
 
 Effects are an argument of every step: they come and go in flight. What the command of one step asks for, the surfaces
@@ -45,7 +45,7 @@ _PARTS = (1, 1 + len(OUTPUTS), 1 + len(OUTPUTS) + len(STATES))
 
 
 @dataclass(frozen=True)
-class Air:
+class LiveConditions:
     """The weather and the instruments' noise (share of the aircraft file's); height above the ground in m."""
 
     turbulence: str = "none"  # none, light, moderate, severe
@@ -54,7 +54,7 @@ class Air:
     seed: int = 0
 
 
-class Reading(NamedTuple):
+class LiveReading(NamedTuple):
     """What one step gives: the instruments, and the truth, at the step's beginning."""
 
     time: float  # s
@@ -64,7 +64,7 @@ class Reading(NamedTuple):
     density: float  # kg/m^3
 
 
-class _Carried(NamedTuple):
+class _LiveState(NamedTuple):
     """What a step hands to the next."""
 
     carry: Any
@@ -73,7 +73,7 @@ class _Carried(NamedTuple):
 
 
 @dataclass
-class Live:
+class LiveFlight:
     """A flight under way."""
 
     theta: Array  # (P,) without weather and noise: may be replaced between steps
@@ -83,10 +83,10 @@ class Live:
     intensity: float  # m/s
     noise: float
     random: np.random.Generator
-    carried: _Carried
+    carried: _LiveState
 
 
-def start(simulator: Simulator, trim: Trim, air: Air, theta: Array) -> Live:
+def start(simulator: Simulator, trim: Trim, air: LiveConditions, theta: Array) -> LiveFlight:
     """A flight that begins in trim. Raises InputError on unknown turbulence or an effect of the clock."""
     if air.turbulence not in INTENSITIES:
         raise InputError(f"turbulence {air.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
@@ -100,10 +100,10 @@ def start(simulator: Simulator, trim: Trim, air: Air, theta: Array) -> Live:
     first = jnp.concatenate([jnp.asarray(trim.command), intensity * jnp.asarray(turbulence[0])])
     history = round(_LONGEST_DELAY * simulator.rate) + 2
     carried = _begin(simulator.layout, history, simulator.model, theta, simulator.step, trim.initial, first)
-    return Live(theta, 0, altitude, turbulence, intensity, air.noise, noise, carried)
+    return LiveFlight(theta, 0, altitude, turbulence, intensity, air.noise, noise, carried)
 
 
-def step(simulator: Simulator, live: Live, commands: Sequence[float]) -> Reading:
+def step(simulator: Simulator, live: LiveFlight, commands: Sequence[float]) -> LiveReading:
     """Read the instruments and fly on for one sample with commands (controls + 1,): rad, thrust in N."""
     time = live.samples * simulator.step
     gust = live.intensity * live.turbulence[(live.samples + 1) % len(live.turbulence)]
@@ -112,7 +112,7 @@ def step(simulator: Simulator, live: Live, commands: Sequence[float]) -> Reading
     live.carried, reading = _advance(simulator.layout, simulator.model, live.theta, simulator.step, live.carried, row)
     live.samples += 1
     density, outputs, state, surfaces = np.split(np.asarray(reading), _PARTS)
-    return Reading(time, outputs, state, surfaces, float(density[0]))
+    return LiveReading(time, outputs, state, surfaces, float(density[0]))
 
 
 def vector(simulator: Simulator, effects: Sequence[str]) -> Array:
@@ -126,17 +126,17 @@ def vector(simulator: Simulator, effects: Sequence[str]) -> Array:
 @partial(jax.jit, static_argnums=(0, 1))
 def _begin(
     layout: Layout, history: int, model: Model, theta: Scalar, step: Scalar, initial: Scalar, first: Scalar
-) -> _Carried:
+) -> _LiveState:
     chain = Chain.of(layout, model, theta, step, -initial[2])
     commands, gusts = first[:-6], first[-6:]
     carry, surfaces = begin(chain, initial, commands, gusts, ())
-    return _Carried(carry, jnp.tile(commands, (history, 1)), surfaces)
+    return _LiveState(carry, jnp.tile(commands, (history, 1)), surfaces)
 
 
 @partial(jax.jit, static_argnums=0)
 def _advance(
-    layout: Layout, model: Model, theta: Scalar, step: Scalar, carried: _Carried, row: Scalar
-) -> tuple[_Carried, Scalar]:
+    layout: Layout, model: Model, theta: Scalar, step: Scalar, carried: _LiveState, row: Scalar
+) -> tuple[_LiveState, Scalar]:
     m = len(layout.commands)
     commands, gust, noise, time, altitude = row[:m], row[m : m + 6], row[m + 6 : -2], row[-2], row[-1]
     chain = Chain.of(layout, model, theta, step, altitude)
@@ -149,7 +149,7 @@ def _advance(
     carry, (_, state, _, moved) = advance(chain, follow, carried.carry._replace(pilot=()), arriving, gusts, time, noise)
     density = air_density(-state[2], jnp)
     reading = jnp.concatenate([density[None], carry.pilot, state, carried.surfaces])
-    return _Carried(carry._replace(pilot=()), past, moved[:m]), reading
+    return _LiveState(carry._replace(pilot=()), past, moved[:m]), reading
 
 
 def _endless(dryden: Dryden, rate: float, speed: float, random: np.random.Generator) -> Array:

@@ -17,7 +17,7 @@ from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.dynamics.lever_arm import specific_force_at
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation
-from sysid_node.sim.model.chain import Chain, Drive, Motion, derivative, drive_of
+from sysid_node.sim.model.chain import Chain, Drive, SensedMotion, derivative, drive_of
 from sysid_node.sim.model.layout import Layout, Model, Scalar
 from sysid_node.sim.model.state import MODE_RATE, body_state
 from sysid_node.sim.stations import actuator, airflow, clock, command, propulsion, sensors, structure
@@ -33,7 +33,7 @@ class Inputs(NamedTuple):
     noise: Scalar  # (N, 12): unit white noise, scaled by the effect ``sensor_noise``
 
 
-class Flight(NamedTuple):
+class SimulatedFlight(NamedTuple):
     """What a flight gives; N samples."""
 
     outputs: Scalar  # (N, 12) readings of the sensors, columns layout.OUTPUTS
@@ -48,7 +48,7 @@ class Flight(NamedTuple):
 Pilot = Callable[[Any, Scalar, Scalar], tuple[Scalar, Scalar, Any]]
 
 
-class Carry(NamedTuple):
+class StepState(NamedTuple):
     """What one step hands to the next."""
 
     x: Scalar  # (16,) the continuous state
@@ -61,7 +61,9 @@ class Carry(NamedTuple):
     pilot: Any
 
 
-def rollout(layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs: Inputs, step: Scalar) -> Flight:
+def rollout(
+    layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs: Inputs, step: Scalar
+) -> SimulatedFlight:
     """An open-loop flight of parameters (P,) from the body's state (13,); pure. ``step`` is 1 / rate, s."""
     chain = Chain.of(layout, model, theta, step, -initial[2])
     arriving = command.arrive(chain.effects, inputs.commands, step)
@@ -70,7 +72,7 @@ def rollout(layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs
     return flight._replace(commands=inputs.commands)
 
 
-def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state: Any) -> Flight:
+def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state: Any) -> SimulatedFlight:
     """A flight at a pilot's hands; ``inputs.commands`` are what is planned for each sample."""
     time = jnp.arange(inputs.commands.shape[0]) * chain.step
     gusts = airflow.gusts(chain.model, chain.effects, inputs.gusts, inputs.turbulence, time)
@@ -81,12 +83,12 @@ def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state
     stamped = clock.stamp(chain.effects, _continuous_angles(readings), chain.step)
     outputs = sensors.noisy(chain.model, chain.effects, stamped, inputs.noise)
     surfaces, commands = jnp.split(_previous(jnp.concatenate([surfaces, inputs.commands[0]]), moved), 2, axis=1)
-    return Flight(outputs, states, surfaces, commands, coefficients)
+    return SimulatedFlight(outputs, states, surfaces, commands, coefficients)
 
 
 def advance(
-    chain: Chain, pilot: Pilot, carry: Carry, planned: Scalar, gusts: Scalar, time: Scalar, noise: Scalar
-) -> tuple[Carry, tuple[Scalar, ...]]:
+    chain: Chain, pilot: Pilot, carry: StepState, planned: Scalar, gusts: Scalar, time: Scalar, noise: Scalar
+) -> tuple[StepState, tuple[Scalar, ...]]:
     """Reads the instruments now, then moves on to ``time``, that of the next sample.
 
     Returns readings (12,), state (13,) and coefficients (6,) now; surfaces and command of the next sample in one row:
@@ -104,7 +106,7 @@ def advance(
     x = _runge_kutta(chain, carry.x, k1, carry.drive, drive)
     moved = jnp.concatenate([surfaces, given])
     row = (reading, carry.x[:13], jnp.stack(motion.coefficients), moved)
-    return Carry(x, actuators, motor, motor_command, drive, truth, probe, pilot_state), row
+    return StepState(x, actuators, motor, motor_command, drive, truth, probe, pilot_state), row
 
 
 #: Stages 2 to 4 of the classical rule: where each is evaluated, as a share of the step, and its weight.
@@ -129,7 +131,7 @@ def _runge_kutta(chain: Chain, x: Scalar, k1: Scalar, now: Drive, then: Drive) -
     return x + h / 6.0 * total
 
 
-def _read(chain: Chain, carry: Carry, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
+def _read(chain: Chain, carry: StepState, motion: SensedMotion) -> tuple[Scalar, Scalar, Scalar]:
     """At the probe: the truth (3,) and what the lagged probe holds (3,); and all readings (12,) without noise."""
     state = body_state(carry.x)
     truth = _at_probe(chain, motion)
@@ -144,7 +146,7 @@ def _read(chain: Chain, carry: Carry, motion: Motion) -> tuple[Scalar, Scalar, S
     return truth, probe, reading
 
 
-def _inertial(chain: Chain, rates: Vector, motion: Motion, mode_rate: Scalar) -> tuple[Scalar, ...]:
+def _inertial(chain: Chain, rates: Vector, motion: SensedMotion, mode_rate: Scalar) -> tuple[Scalar, ...]:
     """Readings of accelerometers and gyroscopes."""
     arm = sensors.imu_arm(chain.model, chain.effects, chain.body)
     force = specific_force_at(motion.specific_force, rates, motion.acceleration, arm)
@@ -155,13 +157,13 @@ def _inertial(chain: Chain, rates: Vector, motion: Motion, mode_rate: Scalar) ->
     )
 
 
-def _at_probe(chain: Chain, motion: Motion) -> Scalar:
+def _at_probe(chain: Chain, motion: SensedMotion) -> Scalar:
     """Airspeed, alpha, beta at the air-data probe."""
     arm = sensors.air_data_arm(chain.model, chain.effects, chain.body)
     return jnp.stack(sensors.at_probe(motion.air.velocity, motion.air.rates, arm))
 
 
-def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[Carry, Scalar]:
+def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[StepState, Scalar]:
     """Everything settled on the first sample's command and flow, and the surfaces (controls + 1,) there."""
     actuators = actuator.start(chain.model, planned[:-1])
     motor = propulsion.commanded(chain.model, planned[-1])
@@ -169,7 +171,7 @@ def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_s
     x = settled(chain, initial, drive)
     _, motion = derivative(chain, x, drive)
     truth = _at_probe(chain, motion)
-    return Carry(x, actuators, motor, motor, drive, truth, truth, pilot_state), surfaces
+    return StepState(x, actuators, motor, motor, drive, truth, truth, pilot_state), surfaces
 
 
 def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:

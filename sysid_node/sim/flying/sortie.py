@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.errors import InputError
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
-from sysid_node.sim.flying.rollout import Flight, Inputs
+from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.model.parameters import parse
@@ -24,7 +24,7 @@ Effects = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
-class Conditions:
+class SortieConditions:
     """In what the flight is flown."""
 
     effects: Effects | Sequence[str] = field(default_factory=dict)  # by which the aircraft differs from its file
@@ -42,12 +42,12 @@ class Sortie:
     """A flight and everything that made it."""
 
     simulator: Simulator
-    conditions: Conditions
+    conditions: SortieConditions
     effects: dict[str, dict[str, float]]  # all of them: those asked for, turbulence and noise
     theta: Array  # (P,)
     trim: Trim
     inputs: Inputs
-    flight: Flight
+    flight: SimulatedFlight
 
     @property
     def derivatives(self) -> dict[str, float]:
@@ -56,12 +56,12 @@ class Sortie:
         return {name: d.value + error.get(name, 0.0) for name, d in self.simulator.aircraft.derivatives.items()}
 
 
-def fly_sortie(simulator: Simulator, deflections: Array, conditions: Conditions | None = None) -> Sortie:
+def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieConditions | None = None) -> Sortie:
     """Fly deflections (N, controls + 1) from trim (rad, N), sampled at the simulator's rate.
 
     The flight begins in trim with its effects. Raises InputError: no trim, a surface beyond its limit, divergence.
     """
-    conditions = conditions or Conditions()
+    conditions = conditions or SortieConditions()
     effects = _all_effects(conditions)
     theta = simulator.vector(effects)
     trim = trim_flight(simulator, conditions.airspeed, theta)
@@ -75,7 +75,7 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: Conditions 
     return Sortie(simulator, conditions, effects, theta, trim, inputs, simulator.check(flight))
 
 
-def _all_effects(conditions: Conditions) -> dict[str, dict[str, float]]:
+def _all_effects(conditions: SortieConditions) -> dict[str, dict[str, float]]:
     """The effects asked for, with turbulence and noise as the conditions have them."""
     asked = conditions.effects if isinstance(conditions.effects, Mapping) else parse(conditions.effects)
     effects = {name: dict(values) for name, values in asked.items()}
@@ -100,7 +100,7 @@ def _check_travel(simulator: Simulator, commands: Array) -> None:
         )
 
 
-def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: Conditions) -> Inputs:
+def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: SortieConditions) -> Inputs:
     """Commands, with realisations of turbulence and noise from the seed."""
     turbulence, noise = np.random.default_rng(conditions.seed).spawn(2)
     samples = len(commands)

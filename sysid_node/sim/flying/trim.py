@@ -33,7 +33,7 @@ _TOLERANCE = 1e-8
 _ANGLES = ("alpha", "beta", "phi", "theta", "gamma")
 
 
-class Point(NamedTuple):
+class TrimPoint(NamedTuple):
     """Where a trim is sought."""
 
     airspeed: Scalar  # m/s
@@ -70,7 +70,7 @@ def trim_flight(
     if not (np.isfinite(speed) and speed > 0.0):
         raise InputError(f"trim: airspeed {speed:g} m/s: expected more than zero")
     height = altitude_of(reference.air_density) if altitude is None else altitude
-    point = Point(jnp.asarray(speed), jnp.asarray(height), jnp.asarray(heading))
+    point = TrimPoint(jnp.asarray(speed), jnp.asarray(height), jnp.asarray(heading))
     vector = simulator.neutral() if theta is None else theta
     start, lower, upper, free = _search_space(simulator, climb_angle)
     found, left = _solve(simulator, vector, point, start, (lower, upper), free)
@@ -81,7 +81,7 @@ def trim_flight(
 
 
 def _solve(
-    simulator: Simulator, theta: Array, point: Point, start: Array, bounds: tuple[Array, Array], free: Index
+    simulator: Simulator, theta: Array, point: TrimPoint, start: Array, bounds: tuple[Array, Array], free: Index
 ) -> tuple[Array, Array]:
     """Everything (angles, command) at the trim, and the residual there."""
     fixed = (simulator.layout, simulator.model, theta, point)
@@ -124,7 +124,7 @@ def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Arra
 
 
 @partial(jax.jit, static_argnums=0)
-def _residual(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scalar) -> Scalar:
+def _residual(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
     """Accelerations (6,) and what is wrong with the climb angle."""
     chain = Chain.of(layout, model, theta, jnp.asarray(0.01), point.altitude)
     command = z[len(_ANGLES) :]
@@ -139,13 +139,13 @@ def _residual(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scal
 
 
 @partial(jax.jit, static_argnums=0)
-def _slope(layout: Layout, model: Model, theta: Scalar, point: Point, z: Scalar) -> Scalar:
+def _slope(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
     """Of the residual, to everything."""
     slope: Scalar = jax.jacfwd(lambda y: _residual(layout, model, theta, point, y))(z)
     return slope
 
 
-def _state(point: Point, z: Scalar) -> Scalar:
+def _state(point: TrimPoint, z: Scalar) -> Scalar:
     """The body's state (13,)."""
     alpha, beta, phi, theta = z[0], z[1], z[2], z[3]
     zero = jnp.zeros(())

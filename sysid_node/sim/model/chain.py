@@ -61,7 +61,7 @@ class Load(NamedTuple):
     moment: Vector  # N m
 
 
-class Motion(NamedTuple):
+class SensedMotion(NamedTuple):
     """What the instruments feel of an instant."""
 
     air: Air
@@ -72,7 +72,7 @@ class Motion(NamedTuple):
 
 
 @jax.jit
-def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, Motion]:
+def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, SensedMotion]:
     """d/dt of the continuous state (16,), and the motion behind it."""
     effects, state = chain.effects, body_state(x)
     altitude = -state.position.z
@@ -93,7 +93,7 @@ def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, Motion]:
         mode_rate,
         mode_acceleration,
     )
-    return jnp.stack(rates), Motion(air, load.coefficients, specific_force, acceleration, mode_acceleration)
+    return jnp.stack(rates), SensedMotion(air, load.coefficients, specific_force, acceleration, mode_acceleration)
 
 
 def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb: Scalar) -> Load:

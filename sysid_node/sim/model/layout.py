@@ -68,7 +68,7 @@ class Model(NamedTuple):
     noise: Scalar  # (12,) 1 sigma of each output
 
 
-#: What the sensors measure, in the order of ``Flight.outputs``. Units of FlightRecord's columns.
+#: What the sensors measure, in the order of ``SimulatedFlight.outputs``. Units of FlightRecord's columns.
 OUTPUTS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "V", "alpha", "beta")
 
 _NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "alpha", "beta")

@@ -15,7 +15,7 @@ from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.sortie import Conditions, Sortie, fly_sortie
+from sysid_node.sim.flying.sortie import Sortie, SortieConditions, fly_sortie
 from sysid_node.sim.model.layout import OUTPUTS
 
 RATE = 100.0
@@ -33,7 +33,7 @@ def sortie(seed: int, **conditions: object) -> Sortie:
     plan = parse_manoeuvre(manoeuvres, KESTREL, RATE, 20.0)
     deflections = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])
     wanted = {"turbulence": "light", "seed": seed, "effects": {"actuator_lag": {"time_constant": 0.04}}}
-    return fly_sortie(simulator(), deflections, Conditions(**wanted | conditions))  # type: ignore[arg-type]
+    return fly_sortie(simulator(), deflections, SortieConditions(**wanted | conditions))  # type: ignore[arg-type]
 
 
 def record(flown: Sortie) -> FlightRecord:

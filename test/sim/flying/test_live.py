@@ -12,7 +12,9 @@ SAMPLES = 200
 EFFECTS = ["actuator_lag:time_constant=0.05", "command_delay:delay=0.03", "cg_shift:x=0.01"]
 
 
-def fly(simulator: Simulator, theta: np.ndarray, commands: np.ndarray, air: live.Air) -> list[live.Reading]:
+def fly(
+    simulator: Simulator, theta: np.ndarray, commands: np.ndarray, air: live.LiveConditions
+) -> list[live.LiveReading]:
     flight = live.start(simulator, trim_flight(simulator), air, theta)
     return [live.step(simulator, flight, row) for row in commands]
 
@@ -22,7 +24,7 @@ def test_step_by_step_is_the_rollout(simulator: Simulator) -> None:
     trim, theta = trim_flight(simulator), simulator.vector(EFFECTS)
     commands = trim.command + three_axes(SAMPLES, simulator.step)
     whole = simulator.rollout(theta, trim.initial, simulator.inputs(np.vstack([commands[:1], commands[:-1]])))
-    flown = fly(simulator, theta, commands, live.Air(noise=0.0))
+    flown = fly(simulator, theta, commands, live.LiveConditions(noise=0.0))
     outputs = np.array([now.outputs for now in flown])
     # what the rollout unwraps and the live flight does not is not reached here
     np.testing.assert_allclose(outputs, whole.outputs, rtol=1e-9, atol=1e-9)
@@ -35,7 +37,7 @@ def test_effects_come_and_go(simulator: Simulator) -> None:
     rolled = trim.command + np.array([0.0, 0.05, 0.0, 0.0])
     rates = []
     for theta in (sound, simulator.vector(["control_effectiveness_loss:aileron=1.0"])):
-        flight = live.start(simulator, trim, live.Air(noise=0.0), sound)
+        flight = live.start(simulator, trim, live.LiveConditions(noise=0.0), sound)
         flight.theta = theta
         rates.append(max(abs(live.step(simulator, flight, rolled).outputs[3]) for _ in range(20)))
     assert rates[0] > 0.05
@@ -44,14 +46,14 @@ def test_effects_come_and_go(simulator: Simulator) -> None:
 
 def test_noise_is_the_files(simulator: Simulator) -> None:
     trim = trim_flight(simulator)
-    flown = fly(simulator, simulator.neutral(), np.tile(trim.command, (400, 1)), live.Air(noise=2.0, seed=3))
+    flown = fly(simulator, simulator.neutral(), np.tile(trim.command, (400, 1)), live.LiveConditions(noise=2.0, seed=3))
     spread = np.std([now.outputs[3] for now in flown])
     assert spread == pytest.approx(2.0 * simulator.aircraft.noise["gyro"], rel=0.15)
 
 
 def test_turbulence_shakes_and_repeats_without_a_jump(simulator: Simulator) -> None:
     trim = trim_flight(simulator)
-    flight = live.start(simulator, trim, live.Air("light", noise=0.0, seed=1), simulator.neutral())
+    flight = live.start(simulator, trim, live.LiveConditions("light", noise=0.0, seed=1), simulator.neutral())
     gusts = flight.turbulence
     steps = np.abs(np.diff(np.vstack([gusts, gusts[:1]]), axis=0))
     assert steps[-1].max() < 1.5 * steps.max()
@@ -67,4 +69,4 @@ def test_effects_that_a_live_flight_lacks_are_refused(simulator: Simulator, effe
 
 def test_unknown_turbulence_is_refused(simulator: Simulator) -> None:
     with pytest.raises(InputError, match="gale"):
-        live.start(simulator, trim_flight(simulator), live.Air("gale"), simulator.neutral())
+        live.start(simulator, trim_flight(simulator), live.LiveConditions("gale"), simulator.neutral())

@@ -8,7 +8,7 @@ from sysid_node.aircraft.model import Control
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import START_NS, Recorder
-from sysid_node.sim.flying.sortie import Conditions, fly_sortie
+from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
 RATE, SECONDS = 200.0, 12.0
 
@@ -25,7 +25,7 @@ def moves(fast):
 
 @pytest.fixture(scope="module")
 def sortie(fast, moves):
-    return fly_sortie(fast, moves, Conditions(turbulence="light", seed=4))
+    return fly_sortie(fast, moves, SortieConditions(turbulence="light", seed=4))
 
 
 def columns(sortie):
@@ -36,7 +36,9 @@ def test_the_autopilot_holds_attitude_and_speed(fast):
     """In turbulence an aircraft left alone wanders off; the autopilot keeps it level and at its speed."""
     still = np.zeros((round(30.0 * RATE) + 1, 4))
     held, free = (
-        columns(fly_sortie(fast, still, Conditions(turbulence="moderate", seed=1, noise=0.0, autopilot=autopilot)))
+        columns(
+            fly_sortie(fast, still, SortieConditions(turbulence="moderate", seed=1, noise=0.0, autopilot=autopilot))
+        )
         for autopilot in (True, False)
     )
     for name in ("phi", "theta"):
@@ -53,20 +55,21 @@ def test_recorded_commands_fly_the_same_flight_again(sortie):
 
 
 def test_delays_reach_the_autopilots_commands_too(fast, moves):
-    sortie = fly_sortie(fast, moves, Conditions(["command_delay:delay=0.0625"], seed=4))
+    sortie = fly_sortie(fast, moves, SortieConditions(["command_delay:delay=0.0625"], seed=4))
     again = fast.rollout(sortie.theta, sortie.trim.initial, sortie.inputs._replace(commands=sortie.flight.commands))
     np.testing.assert_allclose(again.outputs, sortie.flight.outputs, atol=1e-6)
 
 
 def test_truth_of_a_sortie(fast, moves):
-    sortie = fly_sortie(fast, moves, Conditions(["derivative_error:Cm_alpha=-0.1"]))
+    sortie = fly_sortie(fast, moves, SortieConditions(["derivative_error:Cm_alpha=-0.1"]))
     assert sortie.derivatives["Cm_alpha"] == pytest.approx(-0.7)
     assert sortie.effects["sensor_noise"] == {"scale": 1.0}
 
 
 def test_rotary_gusts_may_be_left_out(fast, moves):
     gusts = [
-        fly_sortie(fast, moves, Conditions(turbulence="light", rotary_gusts=on)).inputs.turbulence for on in (0, 1)
+        fly_sortie(fast, moves, SortieConditions(turbulence="light", rotary_gusts=on)).inputs.turbulence
+        for on in (0, 1)
     ]
     np.testing.assert_array_equal(gusts[0][:, :3], gusts[1][:, :3])
     assert not gusts[0][:, 3:].any() and gusts[1][:, 3:].all()
@@ -75,7 +78,7 @@ def test_rotary_gusts_may_be_left_out(fast, moves):
 def test_seeds_decide(fast, moves, sortie):
     again = fly_sortie(fast, moves, sortie.conditions)
     np.testing.assert_array_equal(again.flight.outputs, sortie.flight.outputs)
-    other = fly_sortie(fast, moves, Conditions(turbulence="light", seed=5))
+    other = fly_sortie(fast, moves, SortieConditions(turbulence="light", seed=5))
     assert np.abs(other.flight.outputs - sortie.flight.outputs).max() > 0.1
 
 
@@ -94,7 +97,7 @@ def test_streams_have_their_rates_and_honest_stamps(sortie):
 
 
 def test_readings_are_the_flight_at_the_stamps(fast, moves):
-    quiet = fly_sortie(fast, moves, Conditions(noise=0.0))
+    quiet = fly_sortie(fast, moves, SortieConditions(noise=0.0))
     streams = Recorder(quantise=False).record(quiet)
     time = (streams.imu.arrival.stamp_ns - START_NS) / 1e9
     outputs, grid = np.asarray(quiet.flight.outputs), np.arange(len(moves)) * fast.step
@@ -110,7 +113,9 @@ def test_readings_are_the_flight_at_the_stamps(fast, moves):
 
 def test_noise_and_quantisation(fast, moves, sortie):
     streams = Recorder().record(sortie)
-    clean = Recorder(quantise=False).record(fly_sortie(fast, moves, Conditions(turbulence="light", seed=4, noise=0.0)))
+    clean = Recorder(quantise=False).record(
+        fly_sortie(fast, moves, SortieConditions(turbulence="light", seed=4, noise=0.0))
+    )
     step = 32 * 9.80665 / 2**16
     ratio = streams.imu.values[:, :3] / step
     np.testing.assert_allclose(ratio, np.round(ratio), atol=1e-6)
@@ -121,8 +126,8 @@ def test_noise_and_quantisation(fast, moves, sortie):
 
 def test_stamp_delay_of_the_actuators(fast, moves):
     recorder = Recorder(jitter=0.0)
-    late = recorder.record(fly_sortie(fast, moves, Conditions(["actuator_stamp_delay:delay=0.05"], noise=0.0)))
-    plain = recorder.record(fly_sortie(fast, moves, Conditions(noise=0.0)))
+    late = recorder.record(fly_sortie(fast, moves, SortieConditions(["actuator_stamp_delay:delay=0.05"], noise=0.0)))
+    plain = recorder.record(fly_sortie(fast, moves, SortieConditions(noise=0.0)))
     np.testing.assert_allclose(late.actuators.positions[5:], plain.actuators.positions[:-5], atol=1e-9)
 
 
@@ -132,7 +137,7 @@ def test_measured_surfaces_and_mixed_joints(moves):
     joints = {**mix, "rudder": {"rudder": 1.0}}
     controls = {n: Control(n, symbols[n], joints[n], limit=0.4, offset=0.01) for n in symbols}
     simulator = Simulator(make_aircraft(controls=controls), RATE)
-    sortie = fly_sortie(simulator, moves, Conditions(["actuator_lag:time_constant=0.1"], noise=0.0))
+    sortie = fly_sortie(simulator, moves, SortieConditions(["actuator_lag:time_constant=0.1"], noise=0.0))
     streams = Recorder(surfaces="measured", jitter=0.0).record(sortie)
     assert streams.actuators.names == ("left", "right", "rudder", "throttle")
     left, right = streams.actuators.positions[:, 0], streams.actuators.positions[:, 1]
@@ -144,9 +149,9 @@ def test_measured_surfaces_and_mixed_joints(moves):
 @pytest.mark.parametrize(
     ("conditions", "pattern"),
     [
-        (Conditions(turbulence="heavy"), "'heavy': expected one of none, light, moderate, severe"),
-        (Conditions(airspeed=3.0), "no steady flight at 3 m/s"),
-        (Conditions({"nonsense": {}}), "'nonsense' is not known"),
+        (SortieConditions(turbulence="heavy"), "'heavy': expected one of none, light, moderate, severe"),
+        (SortieConditions(airspeed=3.0), "no steady flight at 3 m/s"),
+        (SortieConditions({"nonsense": {}}), "'nonsense' is not known"),
     ],
 )
 def test_bad_conditions(fast, moves, conditions, pattern):
