@@ -77,11 +77,11 @@ FLIGHTS = {
 
 _README = """# Bundled flights
 
-Simulated flights of the cropped-delta UAVs, small enough to live here: rosbag2 folders (mcap, zstd-compressed chunks),
-with the sensor noise of the aircraft file, the autopilot holding attitude meanwhile. Beside each bag, apart from it,
-`NAME.truth.json` holds the true derivatives, the effects, the trim and the seed.
+These are simulated flights of the cropped-delta UAVs as rosbag2 folders (mcap, zstd-compressed chunks). They have the
+sensor noise of the aircraft file, and an autopilot holds the attitude. `NAME.truth.json` beside each bag holds the true
+derivatives, the effects, the trim and the seed.
 
-`python bags/make.py [NAME...]` makes them again, by these commands; it only compresses what they write.
+`python bags/make.py [NAME...]` makes the flights again with the commands below, and compresses the bags.
 """
 
 
