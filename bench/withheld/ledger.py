@@ -27,7 +27,7 @@ _GAP = ("before", "after", "noise_floor", "shrink_percent", "ci95")
 
 
 #: Packages whose sources decide what a diagnosis says.
-_DECIDING = ("aircraft", "flight", "gap", "sim")
+_DECIDING = ("aircraft", "dynamics", "flight", "gap", "sim")
 
 
 @cache
@@ -54,10 +54,10 @@ def read(path: Path | None, wanted: str | None = None) -> dict[int, Judged]:
     return {int(row["label"]["seed"]): _judged(row) for row in rows}
 
 
-def add(path: Path, judged: Judged, weighed: list[Weighed]) -> None:
-    """Adds a case at the end of a file."""
+def add(path: Path, judged: Judged, weighed: list[Weighed], by: str = "") -> None:
+    """Adds a case at the end of a file, judged ``by`` a version of the sources: these, unless another is named."""
     row = asdict(replace(judged, gap={name: judged.gap[name] for name in _GAP if name in judged.gap}))
-    row["weighed"], row["version"] = weighed, version()
+    row["weighed"], row["version"] = weighed, by or version()
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row, ensure_ascii=False) + "\n")
 

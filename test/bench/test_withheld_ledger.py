@@ -43,13 +43,12 @@ def test_a_diagnosis_that_failed_is_kept_as_wrong(tmp_path: Path) -> None:
     assert json.loads(file.read_text())["weighed"] == []
 
 
-def test_a_ledger_holds_one_version(tmp_path: Path, judged: judging.Judged, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ledger_holds_one_version(tmp_path: Path, judged: judging.Judged) -> None:
     file = tmp_path / "final.jsonl"
     ledger.add(file, judged, [])
     assert list(ledger.read(file, ledger.version())) == [7]
     with pytest.raises(ValueError, match=r"cases of versions \w+, \w+; a set is one's"):
         ledger.read(file, "0" * 12)
-    monkeypatch.setattr(ledger, "version", lambda: "f" * 12)
-    ledger.add(file, replace(judged, label={**LABEL, "seed": 8}), [])
+    ledger.add(file, replace(judged, label={**LABEL, "seed": 8}), [], by="f" * 12)
     with pytest.raises(ValueError, match="take another file"):
         ledger.read(file)

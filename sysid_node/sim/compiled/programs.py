@@ -26,12 +26,16 @@ _Result = TypeVar("_Result")
 export.register_namedtuple_serialization(Vector, serialized_name="sysid.Vector")
 
 
-def kept(fixed: int) -> Callable[[Callable[..., _Result]], Callable[..., _Result]]:
+#: The package, whose sources shape the programs.
+PACKAGE = Path(__file__).parents[2]
+
+
+def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result]], Callable[..., _Result]]:
     """Decorator: a compiled program for each value of the first ``fixed`` arguments, traced once and for all.
 
     These arguments must be hashable and look the same in every process (functions go by their names); the others and
     the result are trees of arrays, the result's of tuples that ``jax.export`` knows. Programs cannot be differentiated
-    further.
+    further. Programs are kept apart by the sources below ``package``.
     """
 
     def decorated(function: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -46,7 +50,7 @@ def kept(fixed: int) -> Callable[[Callable[..., _Result]], Callable[..., _Result
             if find_spec("flatbuffers") is None:
                 return flat(*leaves)
             what = (function.__qualname__, *map(_said, arguments[:fixed]), tree, shapes)
-            found: Any = _program(repr(what), partial(export.export(jax.jit(flat)), *shapes))
+            found: Any = _program(repr(what), _sources(package), partial(export.export(jax.jit(flat)), *shapes))
             result: _Result = found.call(*leaves)
             return result
 
@@ -61,9 +65,9 @@ def _said(value: Any) -> str:
     return str(value.__qualname__) if callable(value) and hasattr(value, "__qualname__") else repr(value)
 
 
-def _program(what: str, traced: Callable[[], export.Exported]) -> export.Exported:
+def _program(what: str, sources: str, traced: Callable[[], export.Exported]) -> export.Exported:
     """The program from the disk; traced, and written there, where it is not or cannot be read."""
-    name = hashlib.sha256(f"{jax.__version__} {_sources()} {what}".encode()).hexdigest()
+    name = hashlib.sha256(f"{jax.__version__} {sources} {what}".encode()).hexdigest()
     path = cache_folder("programs") / name
     try:
         program = export.deserialize(bytearray(path.read_bytes()))
@@ -90,9 +94,9 @@ LARGEST = 200_000_000
 
 
 @cache
-def _sources() -> str:
+def _sources(package: Path) -> str:
     """Digest of the sources that shape the programs."""
-    digest, package = hashlib.sha256(), Path(__file__).parents[2]
+    digest = hashlib.sha256()
     for path in sorted(path for room in _SHAPING for path in (package / room).rglob("*.py")):
         digest.update(str(path.relative_to(package)).encode() + path.read_bytes())
     return digest.hexdigest()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sysid_node.sim.compiled import programs
-from sysid_node.sim.compiled.programs import kept, prune
+from sysid_node.sim.compiled.programs import PACKAGE, kept, prune
 from sysid_node.sim.model.layout import Scalar
 
 X = jnp.linspace(0.0, 1.0, 5)
@@ -24,10 +24,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     return tmp_path / "sysid" / "programs"
 
 
-def traced(times: list[str]) -> object:
+def traced(times: list[str], package: Path = PACKAGE) -> object:
     """A program that notes when it is traced."""
 
-    @kept(1)
+    @kept(1, package)
     def powers(name: str, tree: dict[str, Scalar]) -> tuple[Scalar, Scalar]:
         times.append(name)
         return jnp.sin(tree["x"]), jax.jacfwd(lambda x: x**3)(tree["x"]).diagonal()
@@ -44,16 +44,16 @@ def test_it_gives_what_the_function_gives_and_is_traced_once_for_all_processes(f
     assert len(list(folder.iterdir())) == 1
 
 
-def test_other_fixed_arguments_shapes_or_sources_are_other_programs(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_fixed_arguments_shapes_or_sources_are_other_programs(folder: Path, tmp_path: Path) -> None:
     times: list[str] = []
     program = traced(times)
     program("one", {"x": X})
     program("two", {"x": X})
     program("one", {"x": X[:3]})
-    monkeypatch.setattr(programs, "_sources", lambda: "others")
-    traced(times)("one", {"x": X})
+    other = tmp_path / "other" / "sim"
+    other.mkdir(parents=True)
+    (other / "chain.py").write_text("# another version of the simulator")
+    traced(times, other.parent)("one", {"x": X})
     assert times == ["one", "two", "one", "one"]
     assert len(list(folder.iterdir())) == 4
 
@@ -74,7 +74,7 @@ def test_a_file_that_cannot_be_read_is_written_anew(folder: Path, content: bytes
 def test_without_a_folder_to_write_or_flatbuffers_it_is_traced(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder.parent.write_text("a file where the folder would be")
     np.testing.assert_array_equal(traced([])("once", {"x": X})[0], jnp.sin(X))
-    monkeypatch.setattr(programs, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "flatbuffers", None)  # as where it is not installed
     np.testing.assert_array_equal(traced([])("once", {"x": X})[0], jnp.sin(X))
 
 
