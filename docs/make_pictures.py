@@ -27,13 +27,13 @@ RUNS = {
 }
 #: Name of each picture: the run whose report it shows, the sections, and its size in pixels.
 SHOWN = {
-    "replay_opening": ("replay", ("opening", "derivatives"), (900, 880)),
-    "replay_history": ("replay", ("history",), (900, 640)),
-    "failed_faults": ("failed", ("faults",), (1000, 220)),
-    "gap_opening": ("gap", ("opening",), (900, 302)),
+    "replay_opening": ("replay", ("opening", "derivatives"), (900, 866)),
+    "replay_history": ("replay", ("history",), (900, 668)),
+    "failed_faults": ("failed", ("faults",), (1000, 240)),
+    "gap_opening": ("gap", ("opening",), (900, 330)),
     "gap_channels": ("gap", ("channels",), (900, 640)),
-    "gap_where": ("gap", ("where",), (900, 505)),
-    "gap_flight": ("gap", ("flight",), (900, 465)),
+    "gap_where": ("gap", ("where",), (900, 525)),
+    "gap_flight": ("gap", ("flight",), (900, 480)),
     "gap_candidates": ("gap", ("candidates",), (900, 580)),
 }
 FLAGS = (

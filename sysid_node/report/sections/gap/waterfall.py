@@ -67,7 +67,9 @@ def waterfall(found: Diagnosis) -> Figure:
 def _steps_down(found: Diagnosis) -> list[tuple[str, str, float]]:
     """Station, label and percentage of each step: the largest by axis, the rest of all, then noise."""
     caused = [w for w in found.where if w["station"] != "noise"]
-    steps = [(w["station"], f"{w['station']}<br>{WORDS[w['axis']]}", 100.0 * w["share"]) for w in caused[:_STEPS]]
+    # A word a line: nine labels of two words side by side would overlap.
+    labels = [f"{w['station']} {WORDS[w['axis']]}".replace(" ", "<br>") for w in caused[:_STEPS]]
+    steps = [(w["station"], label, 100.0 * w["share"]) for w, label in zip(caused, labels, strict=False)]
     rest = 100.0 * sum(w["share"] for w in caused[_STEPS:])
     noise = 100.0 * sum(w["share"] for w in found.where if w["station"] == "noise")
     return [*steps, *([("the rest", "the rest", rest)] if rest > 0.0 else []), ("noise", "noise", noise)]
