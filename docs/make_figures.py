@@ -214,17 +214,13 @@ def gap_sizes() -> str:
 def layers() -> str:
     """The layers of the source: imports point downwards only."""
     rows = (
-        (("cli", "commands"), ("api", "the Python interface")),
+        (("cli", "commands"),),
+        (("api", "the Python interface: load, replay, identify, diagnose"),),
         (("report", "pages, figures, tables and files of a run"),),
         (("ros", "nodes: messages in and out, no mathematics"),),
         (("gap", "flight data, residuals, estimation, instruments, selection, validation, verdict"),),
-        (("faults", "which surface, sensor or part of the airframe failed"),),
-        (
-            ("online", "recursive estimator"),
-            ("batch", "whole flights"),
-            ("control", "adaptive gains"),
-            ("excite", "manoeuvres"),
-        ),
+        (("faults", "surfaces, sensors, airframe"), ("control", "adaptive gains"), ("excite", "manoeuvres")),
+        (("online", "recursive estimator"), ("batch", "estimators of whole flights")),
         (("sim", "rigid body and effects, one JAX function; models in and out"),),
         (("flight", "bags, logs, autopilots: time-aligned columns"),),
         (("dynamics", "coefficients, kinematics, equations of motion: written once, for NumPy and JAX"),),
@@ -255,12 +251,12 @@ def datum() -> str:
         ("flight data", ("fitted and held-out", "flights, on one clock")),
         ("residuals", ("flight minus the", "simulator's chain, by", "frequency")),
         ("estimation", ("each effect fitted;", "nuisances within", "their limits")),
-        ("selection", ("Bayes factors, rivals,", "misspecification")),
+        ("selection", ("Bayes factors,", "alternatives,", "misspecification")),
         ("validation", ("short flights on data", "not fitted")),
     ]
     parts = [text(20, 28, "In flight, and in a replay: sample by sample", 14, INK, font_weight="bold")]
     parts += _chain(top, 44, "~/derivatives", "value, interval, status", "#eaf2f9")
-    parts.append(text(20, 196, "At the desk: whole flights", 14, INK, font_weight="bold"))
+    parts.append(text(20, 196, "Diagnosis of the gap: whole flights", 14, INK, font_weight="bold"))
     parts += _chain(bottom, 212, "gap.json", "verdict, causes, sizes", "#fbf0e6")
     return document(960, 330, "From IMU message to published estimate, and from bag to verdict", parts)
 
