@@ -13,11 +13,10 @@ the vector's entries (``derivative_error.Cm_alpha`` is added to the file's Cm_al
 ``initial`` are pure: ``jax.vmap`` and ``jax.jacfwd`` them as you like. Surfaces, thrust and gusts are linear between
 samples.
 
-``prediction`` is the same chain on measured signals: ``predict_coefficients(simulator, theta, signals_of(simulator,
-record))`` and its slopes, without integrating the motion. ``sortie`` flies whole flights (trim, weather, autopilot,
-noise), ``live`` one sample at a time; ``recording`` turns flights into messages, ``dryden`` makes turbulence,
-``export`` writes other simulators' models.
-The page docs/reference/effects.md describes every effect.
+``prediction`` evaluates the same chain on measured signals without integrating the motion:
+``predict_coefficients(simulator, theta, signals_of(simulator, record))`` and its derivatives. ``flying`` simulates whole
+flights (trim, turbulence, autopilot, noise), or one sample at a time, and writes them as messages; ``signals`` makes
+turbulence, and ``export`` writes other simulators' models. The page docs/reference/effects.md describes every effect.
 
 Everything is SI, radians, body axes forward-right-down, float64.
 """

@@ -18,7 +18,7 @@ from sysid_node.gap.residuals.parameter_priors import prior
 from sysid_node.gap.residuals.predictions import CHANNELS, kinematic_parameters
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.sim.model.prediction import COEFFICIENTS
+from sysid_node.sim.prediction.coefficients import COEFFICIENTS
 
 #: Shortest and longest memory of the observer of the air, s.
 _SHORTEST_MEMORY, LONGEST_MEMORY = 0.15, 4.0

@@ -29,7 +29,9 @@ from sysid_node.gap.residuals.sensor_noise import with_added_noise
 from sysid_node.gap.residuals.windowed_spectra import Windows
 from sysid_node.sim import Simulator
 from sysid_node.sim.model.layout import Scalar
-from sysid_node.sim.model.prediction import COEFFICIENTS, Accelerations, coefficients, signals_of
+from sysid_node.sim.prediction.accelerations import Accelerations
+from sysid_node.sim.prediction.coefficients import COEFFICIENTS, coefficients
+from sysid_node.sim.prediction.signals import signals_of
 
 #: Channels of a flight without lateral measurements.
 _LONGITUDINAL = frozenset({*LONGITUDINAL, *LONGITUDINAL_SIGNALS})

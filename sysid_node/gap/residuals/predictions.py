@@ -1,7 +1,7 @@
 """What parameters predict of a flight, as compiled functions: six coefficients, six readings, and their derivatives.
 
 Coefficients of forces and moments are predicted from the measured motion and commands by the simulator's own chain
-(``sim.model.prediction``), air data and attitude from the inertial instruments (``flight_path_reconstruction``).
+(``sim.prediction``), air data and attitude from the inertial instruments (``flight_path_reconstruction``).
 Together they are as many channels as there are measured signals, so that each measurement counts once. All functions
 are pure and generic over parameter vectors; ``residual_model`` calls them for one flight.
 """
@@ -23,7 +23,9 @@ from sysid_node.sim.model import parameters
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import Layout, Model, Scalar
 from sysid_node.sim.model.parameters import Parameters
-from sysid_node.sim.model.prediction import COEFFICIENTS, Signals, coefficients, predict
+from sysid_node.sim.prediction.accelerations import predict_accelerations
+from sysid_node.sim.prediction.coefficients import COEFFICIENTS, coefficients
+from sysid_node.sim.prediction.signals import MeasuredSignals
 
 #: Channels that are compared, in order.
 CHANNELS = (*COEFFICIENTS, *READINGS)
@@ -50,7 +52,7 @@ class ObserverMemory(NamedTuple):
 class PredictionInputs(NamedTuple):
     """What predictions take from a flight of N samples at a constant rate; series are padded at the end."""
 
-    signals: Signals
+    signals: MeasuredSignals
     motion: Motion | None  # None without attitude
     memory: ObserverMemory
     step: Scalar  # s
@@ -77,7 +79,9 @@ def force_coefficients(
     signals = inputs.signals
     if known_flow is not None:
         signals = signals._replace(velocity=known_flow.velocity, alpha_rate=known_flow.alpha_rate)
-    return tuple(coefficients(model, inputs.signals, predict(layout, model, theta, signals, inputs.step, acting)))
+    return tuple(
+        coefficients(model, inputs.signals, predict_accelerations(layout, model, theta, signals, inputs.step, acting))
+    )
 
 
 @partial(jax.jit, static_argnums=0)

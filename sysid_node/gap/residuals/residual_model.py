@@ -37,7 +37,7 @@ from sysid_node.gap.residuals.predictions import (
 )
 from sysid_node.gap.residuals.windowed_spectra import Complex, Windows
 from sysid_node.sim import Simulator
-from sysid_node.sim.model.prediction import COEFFICIENTS
+from sysid_node.sim.prediction.coefficients import COEFFICIENTS
 
 #: Directions along which a prediction is differentiated at once: as many as most effects have parameters, or as many as
 #: there are biases and clocks.

@@ -18,7 +18,7 @@ from sysid_node.report.drawing.thinning import thin_curve
 from sysid_node.report.sections.gap.names import WORDS
 from sysid_node.report.wording.names import symbol
 from sysid_node.sim.model.layout import OUTPUTS
-from sysid_node.sim.model.prediction import COEFFICIENTS
+from sysid_node.sim.prediction.coefficients import COEFFICIENTS
 
 #: Longest part of the flight that is drawn, s: the part with the largest errors of the aircraft file.
 _DRAWN = 24.0

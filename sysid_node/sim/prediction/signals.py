@@ -1,0 +1,82 @@
+"""The measured signals of a flight on the simulator's regular time base."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicSpline
+
+from sysid_node.dynamics.airflow import velocity_of
+from sysid_node.dynamics.attitude import quaternion, to_earth
+from sysid_node.dynamics.vector import Vector
+from sysid_node.errors import InputError
+from sysid_node.flight.record import FlightRecord
+from sysid_node.sim.model.layout import Scalar
+from sysid_node.sim.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+
+class MeasuredSignals(NamedTuple):
+    """A flight as it was measured: N samples at a constant rate, at the times of the messages' stamps."""
+
+    rates: Scalar  # (N, 3) p, q, r, rad/s
+    air: Scalar  # (N, 3) V m/s, alpha, beta rad, at the probe
+    density: Scalar  # (N,) kg/m^3
+    commands: Scalar  # (N, controls + 1) rad, and thrust in N, as recorded
+    climb: Scalar  # (N,) m since the start
+    #: (N,) m/s, of the CG relative to the air, at the true times; replaces what follows from ``air`` where it is given.
+    velocity: Vector | None = None
+    alpha_rate: Scalar | None = None  # (N,) rad/s; replaces the difference quotient of alpha where it is given
+
+
+def signals_of(simulator: Simulator, record: FlightRecord) -> MeasuredSignals:
+    """The signals of a record at the simulator's rate, by cubic interpolation; commands by linear interpolation.
+
+    Raises InputError where rates, airspeed, flow angles, density, a control or the thrust of an aircraft with an
+    engine is missing.
+    """
+    thrust = () if simulator.aircraft.throttle is None else ("thrust",)
+    needed = ("p", "q", "r", "V", "alpha", "beta", "rho", *simulator.layout.symbols, *thrust)
+    missing = [name for name in needed if not np.isfinite(record[name]).all()]
+    if missing:
+        raise InputError(
+            f"flight {record.name!r}: no complete {', '.join(missing)}; forces cannot be predicted without"
+        )
+    time = record.time[0] + np.arange(int(record.duration * simulator.rate + 1e-9) + 1) * simulator.step
+    smooth = {name: CubicSpline(record.time, record[name])(time) for name in needed[:7]}
+    commands = [np.interp(time, record.time, record[name]) for name in (*simulator.layout.symbols, *thrust)]
+    if not thrust:
+        commands.append(np.zeros_like(time))
+    return MeasuredSignals(
+        rates=jnp.asarray(np.column_stack([smooth["p"], smooth["q"], smooth["r"]])),
+        air=jnp.asarray(np.column_stack([smooth["V"], smooth["alpha"], smooth["beta"]])),
+        density=jnp.asarray(smooth["rho"]),
+        commands=jnp.asarray(np.column_stack(commands)),
+        climb=jnp.asarray(_climb(record, time)),
+    )
+
+
+def _climb(record: FlightRecord, time: Array) -> Array:
+    """Height (N,) gained through the air since the start, m, from attitude, airspeed and flow angles.
+
+    Zero where the attitude was not measured.
+    """
+    if not (np.isfinite(record["theta"]).all() and np.isfinite(record["phi"]).all()):
+        return np.zeros_like(time)
+    speed = np.asarray(_speed_of_climb(*(record[name] for name in ("phi", "theta", "V", "alpha", "beta"))))
+    gained: Array = cumulative_trapezoid(speed, np.asarray(record.time), initial=0)
+    return np.asarray(np.interp(time, record.time, gained))
+
+
+@jax.jit
+def _speed_of_climb(roll: Scalar, pitch: Scalar, airspeed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:
+    """Upward speed (N,) through the air, m/s; angles in rad, airspeed in m/s."""
+    attitude = quaternion((roll, pitch, jnp.zeros_like(roll)), jnp)
+    climb: Scalar = -to_earth(attitude, Vector(*velocity_of((airspeed, alpha, beta), jnp))).z
+    return climb
