@@ -7,16 +7,17 @@
     flight = simulator.rollout(theta, trim.initial, inputs)          # .outputs (N, 12), .states, .surfaces, ...
     slopes = simulator.jacobian(theta, trim.initial, inputs)         # (N, 12, P)
 
-``simulator.neutral()`` is the aircraft as its file has it; ``simulator.names``, ``.parameters``, ``.scales`` describe
-the vector's entries (``derivative_error.Cm_alpha`` is added to the file's Cm_alpha, and so is every other derivative).
-``simulator.initial(V, alpha, beta, euler, rates)`` makes a state and can be differentiated through. ``rollout`` and
-``initial`` are pure: ``jax.vmap`` and ``jax.jacfwd`` them as you like. Surfaces, thrust and gusts are linear between
-samples.
+``simulator.neutral()`` is the vector of the aircraft as its file describes it; ``simulator.names``, ``.parameters`` and
+``.scales`` describe the vector's entries (``derivative_error.Cm_alpha`` is added to the file's Cm_alpha, and so is
+every other derivative). ``simulator.initial(V, alpha, beta, euler, rates)`` makes a state and can be differentiated.
+``rollout`` and ``initial`` are pure: ``jax.vmap`` and ``jax.jacfwd`` may transform them. Surfaces, thrust and gusts are
+linear between samples.
 
 ``prediction`` evaluates the same chain on measured signals without integrating the motion:
-``predict_coefficients(simulator, theta, signals_of(simulator, record))`` and its derivatives. ``flying`` simulates whole
-flights (trim, turbulence, autopilot, noise), or one sample at a time, and writes them as messages; ``signals`` makes
-turbulence, and ``export`` writes other simulators' models. The page docs/reference/effects.md describes every effect.
+``predict_coefficients(simulator, theta, signals_of(simulator, record))`` and its derivatives. ``flying`` simulates
+whole flights (trim, turbulence, autopilot, noise), or one sample at a time, and writes them as messages; ``signals``
+makes turbulence, and ``export`` writes other simulators' models. The page docs/reference/effects.md describes every
+effect.
 
 Everything is SI, radians, body axes forward-right-down, float64.
 """

@@ -1,4 +1,4 @@
-"""The simulator of one aircraft: a thin shell that holds what the pure functions need."""
+"""The simulator of one aircraft: its layout, numbers and rate, with the pure functions as methods."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from sysid_node.sim.model.state import STATES
 
 Array = NDArray[np.float64]
 
-#: No reading of a flight that means anything is larger, in SI units.
-_SOUND = 1e4
+#: Largest reading that a flight can reach without having diverged, SI units.
+_LARGEST_READING = 1e4
 
 _rollout = jax.jit(rollout, static_argnums=0)
 
@@ -38,7 +38,10 @@ def _jacobian(layout: Layout, model: Model, theta: Scalar, initial: Scalar, inpu
 
 @dataclass(frozen=True)
 class Simulator:
-    """One aircraft at one sampling rate (Hz), which is also the integration's. Raises InputError on either."""
+    """One aircraft at one sampling rate (Hz), which is also the rate of integration.
+
+    Raises InputError for a rate outside 10 to 10000 Hz.
+    """
 
     aircraft: Aircraft
     rate: float = 100.0
@@ -49,7 +52,7 @@ class Simulator:
 
     @cached_property
     def layout(self) -> Layout:
-        """What shapes the compiled program."""
+        """The names of controls and derivatives, which shape the compiled program."""
         return layout_of(self.aircraft)
 
     @cached_property
@@ -89,13 +92,13 @@ class Simulator:
 
     @cached_property
     def scales(self) -> Array:
-        """A plausible size of each entry; of ``derivative_error`` the aircraft file's tolerances."""
+        """A plausible size (P,) of each entry, 1 sigma; for ``derivative_error`` the aircraft file's tolerances."""
         table = {f"derivative_error.{n}": d.tolerance for n, d in self.aircraft.derivatives.items()}
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([table.get(name) or parameter.scale for name, (_, parameter) in pairs])
 
     def neutral(self) -> Array:
-        """The vector (P,) at which no effect does anything."""
+        """The vector (P,) at which every effect is neutral."""
         return parameters.neutral(self.layout)
 
     def vector(self, effects: Mapping[str, Mapping[str, float]] | Sequence[str]) -> Array:
@@ -107,7 +110,7 @@ class Simulator:
         return parameters.vector(self.layout, known)
 
     def effects(self, effects: Mapping[str, Mapping[str, float]] | Sequence[str]) -> dict[str, dict[str, float]]:
-        """The same effects by every parameter of theirs, as the vector holds them. Raises InputError."""
+        """The same effects with all of their parameters, as the vector holds them. Raises InputError."""
         known = effects if isinstance(effects, Mapping) else parameters.parse(effects)
         values = parameters.unpack(self.layout, jnp.asarray(parameters.vector(self.layout, known)))
         return {name: {key: float(value) for key, value in values[name].items()} for name in known}
@@ -121,9 +124,9 @@ class Simulator:
         rates: Sequence[Scalar | float] = (0.0, 0.0, 0.0),
         altitude: Scalar | float | None = None,
     ) -> Scalar:
-        """The body's state (13,) of airspeed m/s, flow angles, Euler angles and rates (rad, rad/s), altitude m.
+        """The body's state (13,) from airspeed m/s, flow angles, Euler angles and rates (rad, rad/s), altitude m.
 
-        The default altitude has the reference condition's air density. Traceable by JAX.
+        The default altitude has the reference condition's air density. JAX can trace this function.
         """
         height = altitude_of(self.aircraft.reference.air_density) if altitude is None else altitude
         velocity = velocity_of((jnp.asarray(x, float) for x in (airspeed, alpha, beta)), jnp)
@@ -144,7 +147,7 @@ class Simulator:
         turbulence: Scalar | Array | None = None,
         noise: Scalar | Array | None = None,
     ) -> Inputs:
-        """Inputs of N samples from commands (N, controls + 1); what is not given is zero."""
+        """Inputs of N samples from commands (N, controls + 1), rad and N; the other series default to zero."""
 
         def filled(given: Scalar | Array | None, columns: int) -> Scalar:
             return jnp.zeros((commands.shape[0], columns)) if given is None else jnp.asarray(given)
@@ -152,9 +155,9 @@ class Simulator:
         return Inputs(jnp.asarray(commands), filled(gusts, 6), filled(turbulence, 6), filled(noise, len(OUTPUTS)))
 
     def rollout(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> SimulatedFlight:
-        """An open-loop flight: pure, compiled, may be transformed by ``jax.vmap`` and ``jax.jacfwd``.
+        """The open-loop flight of parameters (P,) from a state (13,): pure and compiled.
 
-        theta (P,), initial (13,). A flight that diverges is not finite: ``check`` says so.
+        ``jax.vmap`` and ``jax.jacfwd`` may transform it. A flight that diverges is not finite; ``check`` raises then.
         """
         flight: SimulatedFlight = _rollout(self.layout, self.model, theta, initial, inputs, self.step)
         return flight
@@ -165,10 +168,10 @@ class Simulator:
         return slopes
 
     def check(self, flight: SimulatedFlight) -> SimulatedFlight:
-        """The flight, if it stays within what flies. Raises InputError naming the time at which it diverged."""
-        sound = (np.abs(np.asarray(flight.outputs)) < _SOUND).all(axis=1)  # false for NaN
-        if not sound.all():
-            when = int(np.argmin(sound)) * self.step
+        """The flight itself where its readings stay bounded. Raises InputError naming the time of divergence."""
+        within = (np.abs(np.asarray(flight.outputs)) < _LARGEST_READING).all(axis=1)  # false for NaN
+        if not within.all():
+            when = int(np.argmin(within)) * self.step
             raise InputError(
                 f"aircraft {self.aircraft.name!r}: the flight diverged at {when:.2f} s; "
                 "use smaller deflections or effects, the autopilot, or a stable aircraft"

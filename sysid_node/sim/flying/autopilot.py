@@ -1,8 +1,8 @@
-"""A plain attitude-hold autopilot, so that simulated data look like flown data: surfaces answer to the motion.
+"""An attitude-hold autopilot: in simulated flights, as in real ones, the surfaces then depend on the motion.
 
 It holds trim attitude and airspeed with feedback that is limited to a share of each surface's travel, on top of the
 planned commands. Gains follow from the aircraft's steady responses (Stevens, Lewis & Johnson (2016), ch. 4: attitude
-loops around rate damping); they are plain, not optimal.
+loops around rate damping); they are not optimised.
 """
 
 from __future__ import annotations
@@ -36,30 +36,30 @@ _SHARE = 0.5
 #: Longest command delay that a flight with the autopilot can have, s.
 _LONGEST_DELAY = 0.5
 
-#: Outputs that it looks at, in the order of the gain matrix's columns.
+#: Outputs that are fed back, in the order of the gain matrix's columns.
 _SEEN = ("p", "q", "r", "phi", "theta", "V")
 
 
 class Autopilot(NamedTuple):
-    """Feedback: correction = gains (seen - hold) + integral gains * time integral of it, limited."""
+    """Feedback: correction = gains (outputs - hold) + integral gains * time integral of (outputs - hold), limited."""
 
     gains: Scalar  # (controls + 1, 6) on p q r phi theta V
     integral: Scalar  # (controls + 1, 6)
-    hold: Scalar  # (6,)
+    hold: Scalar  # (6,) values that are held
     limit: Scalar  # (controls + 1,) rad, N
     lowest: Scalar  # (controls + 1,) limits of the command itself
     highest: Scalar
 
 
 class _AutopilotState(NamedTuple):
-    """Of the autopilot."""
+    """What the autopilot carries from sample to sample."""
 
-    integral: Scalar  # (6,)
+    integral: Scalar  # (6,) of outputs - hold
     history: Scalar  # (K, controls + 1) commands given, the newest last
 
 
 def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
-    """An autopilot that holds this trim. Loops whose surface the aircraft does not have stay open."""
+    """The autopilot that holds this trim; a loop whose surface the aircraft lacks stays open."""
     aircraft, commands = simulator.aircraft, simulator.commands
     gains, integral = np.zeros((len(commands), len(_SEEN))), np.zeros((len(commands), len(_SEEN)))
     for control, entries in _loops(aircraft).items():
@@ -82,7 +82,7 @@ def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
 
 
 def fly_held(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, autopilot: Autopilot) -> SimulatedFlight:
-    """A flight from trim with the autopilot on; ``inputs.commands`` are what is planned, trim included."""
+    """The flight from trim with the autopilot on; ``inputs.commands`` are the planned ones, trim included."""
     history = round(_LONGEST_DELAY * simulator.rate) + 2
     flight: SimulatedFlight = _fly_held(
         simulator.layout, history, simulator.model, theta, trim.initial, inputs, simulator.step, autopilot
@@ -106,21 +106,21 @@ def _fly_held(
 
     def pilot(state: _AutopilotState, outputs: Scalar, planned: Scalar) -> tuple[Scalar, Scalar, _AutopilotState]:
         error = outputs[columns] - autopilot.hold
-        # sums, not matrix products: XLA would call a library for these and leave the loop's kernel
+        # XLA would call a library for matrix products, outside of the loop's kernel
         wanted = jnp.sum(autopilot.gains * error + autopilot.integral * state.integral, axis=1)
         correction = jnp.clip(wanted, -autopilot.limit, autopilot.limit)
-        held = jnp.any(jnp.abs(wanted) > autopilot.limit)  # no winding up
+        saturated = jnp.any(jnp.abs(wanted) > autopilot.limit)  # the integral stops while the correction is limited
         given = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)
         past = jnp.concatenate([state.history[1:], given[None]])
         arriving = command.arrive_from_history(chain.effects, past, step)
-        return given, arriving, _AutopilotState(state.integral + jnp.where(held, 0.0, error * step), past)
+        return given, arriving, _AutopilotState(state.integral + jnp.where(saturated, 0.0, error * step), past)
 
     start = _AutopilotState(jnp.zeros(len(_SEEN)), jnp.tile(inputs.commands[0], (history, 1)))
     return fly(chain, initial, inputs, pilot, start)
 
 
 def _loops(aircraft: Aircraft) -> dict[str, dict[str, float]]:
-    """control -> output -> gain, from the aircraft's steady responses."""
+    """Gains by control and output, from the aircraft's steady responses."""
     loops: dict[str, dict[str, float]] = {}
     pitch, roll, yaw = _pitch_response(aircraft), _roll_response(aircraft), _value(aircraft, "Cn_dr")
     if pitch:
@@ -129,7 +129,7 @@ def _loops(aircraft: Aircraft) -> dict[str, dict[str, float]]:
         loops["aileron"] = {"phi": -_BANDWIDTH / roll, "p": -0.05 * _BANDWIDTH / roll}
     if yaw:
         span, speed = aircraft.geometry.b, aircraft.reference.airspeed
-        damping = abs(_value(aircraft, "Cn_r")) * span / (2.0 * speed)  # doubles the natural one
+        damping = abs(_value(aircraft, "Cn_r")) * span / (2.0 * speed)  # doubles the natural damping
         loops["rudder"] = {"r": -damping / yaw}
     if aircraft.throttle is not None:
         loops["thrust"] = {"V": -_SPEED * aircraft.mass}
@@ -137,7 +137,7 @@ def _loops(aircraft: Aircraft) -> dict[str, dict[str, float]]:
 
 
 def _pitch_response(aircraft: Aircraft) -> float:
-    """Steady turning of the flight path, rad/s for each rad of elevator."""
+    """Steady rate of turn of the flight path, rad/s per rad of elevator; 0 without Cm_alpha."""
     if not _value(aircraft, "Cm_alpha"):
         return 0.0
     alpha = _value(aircraft, "Cm_de") / abs(_value(aircraft, "Cm_alpha"))
@@ -147,7 +147,7 @@ def _pitch_response(aircraft: Aircraft) -> float:
 
 
 def _roll_response(aircraft: Aircraft) -> float:
-    """Steady roll rate, rad/s for each rad of aileron."""
+    """Steady roll rate, rad/s per rad of aileron; 0 without Cl_p."""
     damping = _value(aircraft, "Cl_p")
     if not damping:
         return 0.0

@@ -1,10 +1,10 @@
-"""A flight one sample at a time: the same chain as ``rollout``, for a pilot that is another program.
+"""A flight one sample at a time, with the same chain as ``rollout``, for a pilot that is another program.
 
     flight = start(simulator, trim, LiveConditions(seed=1), simulator.neutral())
-    now = step(simulator, flight, command)     # what the instruments read now, and the flight moves on by a sample
+    reading = step(simulator, flight, command)     # the present reading; then the flight advances by one sample
 
-Effects are an argument of every step: they come and go in flight. What the command of one step asks for, the surfaces
-reach at the end of the next sample. Of the station ``clock`` nothing is here: stamps are the sender's business.
+Effects are an argument of every step, so that they can change in flight. The surfaces follow a command by the end of
+the next sample. The station ``clock`` is left out: the sender of the messages sets their stamps.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ Array = NDArray[np.float64]
 #: Longest command delay that a live flight can have, s.
 _LONGEST_DELAY = 0.5
 
-#: Turbulence repeats after this time, and its end is faded into its beginning over the next, s.
+#: Turbulence repeats after the first time; its end is faded into its beginning over the second, s.
 _PERIOD, _FADE = 300.0, 10.0
 
-#: Where a reading's outputs, state and surfaces begin.
+#: Index at which outputs, state and surfaces begin in the row that a step returns.
 _PARTS = (1, 1 + len(OUTPUTS), 1 + len(OUTPUTS) + len(STATES))
 
 
 @dataclass(frozen=True)
 class LiveConditions:
-    """The weather and the instruments' noise (share of the aircraft file's); height above the ground in m."""
+    """Turbulence at a height above the ground (m), and noise as a multiple of the aircraft file's sigmas."""
 
     turbulence: str = "none"  # none, light, moderate, severe
     height: float = 100.0
@@ -55,7 +55,7 @@ class LiveConditions:
 
 
 class LiveReading(NamedTuple):
-    """What one step gives: the instruments, and the truth, at the step's beginning."""
+    """Readings of the instruments and the true motion at the beginning of a step."""
 
     time: float  # s
     outputs: Array  # (12,) layout.OUTPUTS
@@ -65,7 +65,7 @@ class LiveReading(NamedTuple):
 
 
 class _LiveState(NamedTuple):
-    """What a step hands to the next."""
+    """What one step passes to the next."""
 
     carry: Any
     history: Scalar  # (K, controls + 1) commands, the newest last
@@ -74,12 +74,12 @@ class _LiveState(NamedTuple):
 
 @dataclass
 class LiveFlight:
-    """A flight under way."""
+    """A flight under way; ``step`` changes it."""
 
-    theta: Array  # (P,) without weather and noise: may be replaced between steps
+    theta: Array  # (P,) without turbulence and noise; may be replaced between steps
     samples: int
     altitude: float
-    turbulence: Array  # (N, 6) repeats
+    turbulence: Array  # (N, 6) of intensity 1 m/s; it is repeated
     intensity: float  # m/s
     noise: float
     random: np.random.Generator
@@ -87,7 +87,7 @@ class LiveFlight:
 
 
 def start(simulator: Simulator, trim: Trim, air: LiveConditions, theta: Array) -> LiveFlight:
-    """A flight that begins in trim. Raises InputError on unknown turbulence or an effect of the clock."""
+    """A flight that begins in trim with effects (P,). Raises InputError on an unknown name of turbulence."""
     if air.turbulence not in INTENSITIES:
         raise InputError(f"turbulence {air.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
     gusts, noise = np.random.default_rng(air.seed).spawn(2)
@@ -104,7 +104,7 @@ def start(simulator: Simulator, trim: Trim, air: LiveConditions, theta: Array) -
 
 
 def step(simulator: Simulator, live: LiveFlight, commands: Sequence[float]) -> LiveReading:
-    """Read the instruments and fly on for one sample with commands (controls + 1,): rad, thrust in N."""
+    """The present reading, after which the flight advances by one sample with commands (controls + 1,), rad and N."""
     time = live.samples * simulator.step
     gust = live.intensity * live.turbulence[(live.samples + 1) % len(live.turbulence)]
     noise = live.noise * live.random.standard_normal(len(OUTPUTS))
@@ -116,7 +116,8 @@ def step(simulator: Simulator, live: LiveFlight, commands: Sequence[float]) -> L
 
 
 def vector(simulator: Simulator, effects: Sequence[str]) -> Array:
-    """The vector (P,) of effects ``name:key=value``. Raises InputError, also on effects that a live flight lacks."""
+    """The vector (P,) of effects ``name:key=value``. Raises InputError, also on effects that a live flight
+    cannot have."""
     for name in parameters.parse(effects):
         if EFFECTS[name].station == "clock" or name in ("turbulence", "sensor_noise", "actuator_stamp_delay"):
             raise InputError(f"effect {name} cannot be switched on in a live flight; choose another")
@@ -140,12 +141,12 @@ def _advance(
     m = len(layout.commands)
     commands, gust, noise, time, altitude = row[:m], row[m : m + 6], row[m + 6 : -2], row[-2], row[-1]
     chain = Chain.of(layout, model, theta, step, altitude)
-    chain.effects["sensor_noise"] = {"scale": jnp.ones(())}  # the noise comes to scale
+    chain.effects["sensor_noise"] = {"scale": jnp.ones(())}  # the noise is already scaled
     gusts = airflow.gusts(model, chain.effects, gust, jnp.zeros(6), time)
     past = jnp.concatenate([carried.history[1:], commands[None]])
     arriving = command.arrive_from_history(chain.effects, past, step)
     follow: Pilot = lambda state, outputs, planned: (planned, planned, outputs)  # noqa: E731
-    # the pilot's state brings out what the instruments read
+    # the readings are returned through the pilot's state
     carry, (_, state, _, moved) = advance(chain, follow, carried.carry._replace(pilot=()), arriving, gusts, time, noise)
     density = air_density(-state[2], jnp)
     reading = jnp.concatenate([density[None], carry.pilot, state, carried.surfaces])
@@ -153,7 +154,7 @@ def _advance(
 
 
 def _endless(dryden: Dryden, rate: float, speed: float, random: np.random.Generator) -> Array:
-    """A realisation that can be repeated: what follows its end is faded into its beginning, its variance kept."""
+    """Gusts (N, 6) that can be repeated: what follows their end is faded into their beginning at constant variance."""
     count, fade = round(_PERIOD * rate), round(_FADE * rate)
     whole = dryden.realisation(count + fade, rate, speed, random)
     angle = 0.5 * np.pi * np.arange(fade)[:, None] / fade

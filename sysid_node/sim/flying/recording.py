@@ -1,4 +1,4 @@
-"""What the recorder of a real aircraft would hold of a simulated flight: messages at each instrument's own rate."""
+"""A simulated flight as the messages that a real aircraft would record, each instrument at its own rate."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 #: Stamp of the first instant: a fixed date (2026-01-01), so that the same flight gives the same bag.
 START_NS = 1_767_225_600_000_000_000
 
-#: Least steps of the readings: accelerometers of 16 bits over +-16 g, gyroscopes over +-2000 deg/s, airspeed 1 cm/s,
+#: Quantisation steps: accelerometers of 16 bits over +-16 g, gyroscopes over +-2000 deg/s, airspeed 1 cm/s,
 #: vanes of 14 bits over a turn; attitude is a filter's output and has none.
 _STEPS = np.array(
     [32 * GRAVITY / 2**16] * 3 + [np.deg2rad(4000.0) / 2**16] * 3 + [0.0] * 3 + [0.01] + [2 * np.pi / 2**14] * 2
@@ -30,7 +30,10 @@ _STEPS = np.array(
 
 @dataclass(frozen=True)
 class Recorder:
-    """Rates (Hz), jitter (s rms) of when an instrument is read, latency (s) from stamp to log, and what is recorded."""
+    """Rates (Hz), jitter (s rms) of the sampling times, latency (s) from stamp to log, and what is recorded.
+
+    Raises InputError for a rate outside 1 to 5000 Hz or an unknown choice of ``surfaces``.
+    """
 
     imu_rate: float = 200.0
     air_data_rate: float = 100.0
@@ -48,7 +51,7 @@ class Recorder:
             raise InputError(f"surfaces {self.surfaces!r}: expected commanded or measured")
 
     def record(self, sortie: Sortie) -> Streams:
-        """The messages of a flight; stamps say when each instrument was read, but for the effects of the clock."""
+        """The messages of a flight; each stamp is the sampling time, unless an effect of the clock changes it."""
         random = np.random.default_rng(sortie.conditions.seed).spawn(3)[2]
         span = (len(sortie.flight.outputs) - 1) * sortie.simulator.step
         rates = (self.imu_rate, self.air_data_rate, self.actuator_rate)
@@ -66,7 +69,7 @@ class Recorder:
         )
 
     def _readings(self, sortie: Sortie, times: Array) -> Array:
-        """All readings (N, 12) at the times: the motion between samples, the noise of the nearest sample."""
+        """Readings (N, 12) at times (N,), s: the motion by cubic interpolation, the noise of the nearest sample."""
         grid, outputs = _grid(sortie), np.asarray(sortie.flight.outputs)
         noise = _noise(sortie)
         nearest = np.clip(np.round(times * sortie.simulator.rate).astype(int), 0, len(grid) - 1)
@@ -76,36 +79,37 @@ class Recorder:
         return rounded
 
     def _controls(self, sortie: Sortie, times: Array) -> Array:
-        """Controls and thrust (N, controls + 1) as the actuators' messages have them."""
+        """Controls and thrust (N, controls + 1), rad and N, as the actuators' messages contain them."""
         known = sortie.flight.commands if self.surfaces == "commanded" else sortie.flight.surfaces
         late = sortie.effects.get("actuator_stamp_delay", {}).get("delay", 0.0)
         return np.column_stack([np.interp(times - late, _grid(sortie), column) for column in np.asarray(known).T])
 
     def _arrivals(self, times: list[Array], random: np.random.Generator) -> list[Arrival]:
-        """Stamps, when each message was logged, and its place among all."""
+        """For each stream, its stamps, logging times and positions among all messages."""
         stamps = [START_NS + np.round(t * 1e9).astype(np.int64) for t in times]
         delays = [self.latency * (0.5 + random.random(t.size)) for t in times]
         logged = [s + np.round(1e9 * d).astype(np.int64) for s, d in zip(stamps, delays, strict=True)]
         logged = [np.maximum.accumulate(x) for x in logged]  # a topic's messages do not overtake one another
-        every = np.concatenate(logged)
-        place = np.empty(every.size, np.int64)
-        place[np.argsort(every, kind="stable")] = np.arange(every.size)
+        all_times = np.concatenate(logged)
+        place = np.empty(all_times.size, np.int64)
+        place[np.argsort(all_times, kind="stable")] = np.arange(all_times.size)
         places = np.split(place, np.cumsum([x.size for x in logged])[:-1])
         return [Arrival(s, x, p) for s, x, p in zip(stamps, logged, places, strict=True)]
 
 
 def _grid(sortie: Sortie) -> Array:
+    """Times (N,) of the simulator's samples, s."""
     return np.arange(len(sortie.flight.outputs), dtype=float) * np.float64(sortie.simulator.step)
 
 
 def _noise(sortie: Sortie) -> Array:
-    """The white noise (N, 12) in the flight's outputs."""
+    """White noise (N, 12) that is part of the flight's outputs."""
     scale = sortie.effects.get("sensor_noise", {}).get("scale", 0.0)
     return np.asarray(scale * sortie.simulator.model.noise * sortie.inputs.noise)
 
 
 def _instants(rate: float, span: float, jitter: float, random: np.random.Generator) -> Array:
-    """When an instrument of this rate is read, s: regular but for a jitter of at most a fifth of the period."""
+    """Sampling times (N,) of an instrument, s: regular, plus a jitter of at most a fifth of the period."""
     regular = np.arange(int(span * rate + 1e-9) + 1) / rate
     off = np.clip(jitter * random.standard_normal(regular.size), -0.2 / rate, 0.2 / rate)
     instants: Array = np.clip(regular + off, 0.0, span)
@@ -113,7 +117,7 @@ def _instants(rate: float, span: float, jitter: float, random: np.random.Generat
 
 
 def _joints(aircraft: Aircraft, controls: Array) -> tuple[tuple[str, ...], Array]:
-    """Joint names and positions (N, J) from controls and thrust (N, controls + 1): the file's map turned round."""
+    """Joint names and positions (N, J) from controls and thrust (N, controls + 1): the file's mixing inverted."""
     surfaces = list(aircraft.controls.values())
     names = tuple(dict.fromkeys(joint for control in surfaces for joint in control.joints))
     scales = np.array([[control.joints.get(name, 0.0) for name in names] for control in surfaces])

@@ -1,8 +1,8 @@
-"""Flights: the chain carried through time by ``jax.lax.scan``.
+"""Simulated flights: the chain integrated over time by ``jax.lax.scan``.
 
-One step holds surfaces, thrust and gusts linear in time and carries the body, the flow's separation and the structural
-mode by the classical fourth-order Runge-Kutta rule; what lives at samples (actuators, motor, lags) is solved exactly
-from one sample to the next.
+Within a step surfaces, thrust and gusts are linear in time, and the classical fourth-order Runge-Kutta rule integrates
+the body, the flow separation and the structural mode. Actuators, motor and lags are solved exactly from one sample to
+the next.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from sysid_node.sim.stations.actuator import ActuatorState
 
 
 class Inputs(NamedTuple):
-    """What comes from outside; N samples at the simulator's rate."""
+    """Inputs of a flight; N samples at the simulator's rate."""
 
     commands: Scalar  # (N, controls + 1): surfaces rad, thrust N, by their recorded stamps
     gusts: Scalar  # (N, 6): velocity of the air along body axes m/s, its rotation rad/s
@@ -34,12 +34,12 @@ class Inputs(NamedTuple):
 
 
 class SimulatedFlight(NamedTuple):
-    """What a flight gives; N samples."""
+    """A simulated flight; N samples."""
 
     outputs: Scalar  # (N, 12) readings of the sensors, columns layout.OUTPUTS
     states: Scalar  # (N, 13) the body's true state, columns state.STATES
     surfaces: Scalar  # (N, controls + 1): true positions rad, thrust N
-    commands: Scalar  # (N, controls + 1): as given by the pilot
+    commands: Scalar  # (N, controls + 1): as the pilot gives them, rad, N
     coefficients: Scalar  # (N, 6) true CL CD CY Cl Cm Cn about the file's CG
 
 
@@ -49,7 +49,7 @@ Pilot = Callable[[Any, Scalar, Scalar], tuple[Scalar, Scalar, Any]]
 
 
 class StepState(NamedTuple):
-    """What one step hands to the next."""
+    """What one step passes to the next."""
 
     x: Scalar  # (16,) the continuous state
     actuators: ActuatorState
@@ -64,7 +64,7 @@ class StepState(NamedTuple):
 def rollout(
     layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs: Inputs, step: Scalar
 ) -> SimulatedFlight:
-    """An open-loop flight of parameters (P,) from the body's state (13,); pure. ``step`` is 1 / rate, s."""
+    """The open-loop flight of parameters (P,) from the body's state (13,); pure. ``step`` is 1 / rate, s."""
     chain = Chain.of(layout, model, theta, step, -initial[2])
     arriving = command.arrive(chain.effects, inputs.commands, step)
     follow: Pilot = lambda state, outputs, planned: (planned, planned, state)  # noqa: E731
@@ -73,7 +73,7 @@ def rollout(
 
 
 def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state: Any) -> SimulatedFlight:
-    """A flight at a pilot's hands; ``inputs.commands`` are what is planned for each sample."""
+    """The flight that a pilot controls; ``inputs.commands`` are planned, ``pilot_state`` is the pilot's first."""
     time = jnp.arange(inputs.commands.shape[0]) * chain.step
     gusts = airflow.gusts(chain.model, chain.effects, inputs.gusts, inputs.turbulence, time)
     coming = (_next(inputs.commands), _next(gusts), time + chain.step, inputs.noise)
@@ -89,10 +89,10 @@ def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state
 def advance(
     chain: Chain, pilot: Pilot, carry: StepState, planned: Scalar, gusts: Scalar, time: Scalar, noise: Scalar
 ) -> tuple[StepState, tuple[Scalar, ...]]:
-    """Reads the instruments now, then moves on to ``time``, that of the next sample.
+    """The state after one step, to ``time`` (s) of the next sample, and a row of results.
 
-    Returns readings (12,), state (13,) and coefficients (6,) now; surfaces and command of the next sample in one row:
-    kept apart, or handed through the carry, XLA copies the whole series of commands at every step.
+    The row holds readings (12,), state (13,) and coefficients (6,) at present, and surfaces and command of the next
+    sample as one array: as two arrays, or in the state, XLA would copy the whole series of commands at every step.
     """
     h = chain.step
     k1, motion = derivative(chain, carry.x, carry.drive)
@@ -109,14 +109,15 @@ def advance(
     return StepState(x, actuators, motor, motor_command, drive, truth, probe, pilot_state), row
 
 
-#: Stages 2 to 4 of the classical rule: where each is evaluated, as a share of the step, and its weight.
+#: Stages 2 to 4 of the classical rule: the time of each as a share of the step, and its weight.
 _STAGES = ((0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
 
 
 def _runge_kutta(chain: Chain, x: Scalar, k1: Scalar, now: Drive, then: Drive) -> Scalar:
-    """One classical fourth-order step; the drive is linear from ``now`` to ``then``; k1 is the rate at (x, now).
+    """The state (16,) after one classical fourth-order step; k1 is the rate at (x, now).
 
-    A loop, not four calls: the compiled program is a third as large, and no slower.
+    The drive is linear from ``now`` to ``then``. With a loop in place of four calls the compiled program is a third as
+    large and not slower.
     """
     h = chain.step
 
@@ -132,7 +133,7 @@ def _runge_kutta(chain: Chain, x: Scalar, k1: Scalar, now: Drive, then: Drive) -
 
 
 def _read(chain: Chain, carry: StepState, motion: SensedMotion) -> tuple[Scalar, Scalar, Scalar]:
-    """At the probe: the truth (3,) and what the lagged probe holds (3,); and all readings (12,) without noise."""
+    """The true air data (3,) at the probe, the same after its lag (3,), and all readings (12,) without noise."""
     state = body_state(carry.x)
     truth = _at_probe(chain, motion)
     probe = sensors.lagged(chain.effects, carry.probe, carry.truth, truth, chain.step)
@@ -147,7 +148,7 @@ def _read(chain: Chain, carry: StepState, motion: SensedMotion) -> tuple[Scalar,
 
 
 def _inertial(chain: Chain, rates: Vector, motion: SensedMotion, mode_rate: Scalar) -> tuple[Scalar, ...]:
-    """Readings of accelerometers and gyroscopes."""
+    """Readings of accelerometers (m/s^2) and gyroscopes (rad/s)."""
     arm = sensors.imu_arm(chain.model, chain.effects, chain.body)
     force = specific_force_at(motion.specific_force, rates, motion.acceleration, arm)
     shake, nod = structure.felt(chain.effects, motion.mode_acceleration, mode_rate)
@@ -158,13 +159,13 @@ def _inertial(chain: Chain, rates: Vector, motion: SensedMotion, mode_rate: Scal
 
 
 def _at_probe(chain: Chain, motion: SensedMotion) -> Scalar:
-    """Airspeed, alpha, beta at the air-data probe."""
+    """Airspeed (m/s), alpha, beta (rad) at the air-data probe, (3,)."""
     arm = sensors.air_data_arm(chain.model, chain.effects, chain.body)
     return jnp.stack(sensors.at_probe(motion.air.velocity, motion.air.rates, arm))
 
 
 def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[StepState, Scalar]:
-    """Everything settled on the first sample's command and flow, and the surfaces (controls + 1,) there."""
+    """The state settled on the first sample's command and flow, and its surfaces and thrust (controls + 1,)."""
     actuators = actuator.start(chain.model, planned[:-1])
     motor = propulsion.commanded(chain.model, planned[-1])
     drive, surfaces = drive_of(chain, actuators.position, motor, gusts, jnp.zeros_like(chain.step))
@@ -175,7 +176,7 @@ def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_s
 
 
 def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:
-    """The continuous state (16,) with flow and structure at rest on the body's state (13,)."""
+    """The continuous state (16,) of a body's state (13,), with flow separation and structural mode at rest."""
     state = body_state(initial)
     air = airflow.meet(state.velocity, state.rates, drive.gusts, jnp.ones_like(chain.altitude))
     zero = jnp.zeros_like(air.alpha)
@@ -186,17 +187,17 @@ def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:
 
 
 def _next(series: Scalar) -> Scalar:
-    """Each row's successor; the last repeats."""
+    """The series one sample earlier: row k holds row k + 1, and the last row is repeated."""
     return jnp.concatenate([series[1:], series[-1:]])
 
 
 def _previous(first: Scalar, series: Scalar) -> Scalar:
-    """Each row's predecessor, the first one given."""
+    """The series one sample later: row k holds row k - 1, and the first row is given."""
     return jnp.concatenate([first[None], series[:-1]])
 
 
 def _continuous_angles(outputs: Scalar) -> Scalar:
-    """Roll and heading without jumps of 2 pi; the jumps carry no derivative."""
+    """Outputs (N, 12) whose roll angle and heading have no jumps of 2 pi; their derivatives do not change."""
     turning = jnp.array([6, 8])
     angles = jax.lax.stop_gradient(outputs[:, turning])
     jumps = jnp.unwrap(angles, axis=0) - angles

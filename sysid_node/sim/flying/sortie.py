@@ -1,4 +1,4 @@
-"""A whole simulated flight: trim, weather, autopilot, noise; from planned deflections to what was flown."""
+"""A whole simulated flight from planned deflections: trim, turbulence, autopilot and noise."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ Effects = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class SortieConditions:
-    """In what the flight is flown."""
+    """The conditions of a simulated flight."""
 
-    effects: Effects | Sequence[str] = field(default_factory=dict)  # by which the aircraft differs from its file
-    airspeed: float | None = None  # m/s, of the trim; None: the reference one
+    effects: Effects | Sequence[str] = field(default_factory=dict)  # differences between the aircraft and its file
+    airspeed: float | None = None  # m/s, of the trim; None: that of the reference condition
     turbulence: str = "none"  # none, light, moderate, severe
-    height: float = 100.0  # m above the ground: scale length of the turbulence
+    height: float = 100.0  # m above the ground, for the turbulence's scale lengths
     autopilot: bool = True
-    noise: float = 1.0  # of the aircraft file's sigmas
+    noise: float = 1.0  # multiple of the aircraft file's sigmas
     seed: int = 0
-    rotary_gusts: bool = True  # whether the air of the turbulence turns, too
+    rotary_gusts: bool = True  # whether the turbulence has angular velocities, too
 
 
 @dataclass(frozen=True)
 class Sortie:
-    """A flight and everything that made it."""
+    """A simulated flight with its inputs and conditions."""
 
     simulator: Simulator
     conditions: SortieConditions
-    effects: dict[str, dict[str, float]]  # all of them: those asked for, turbulence and noise
+    effects: dict[str, dict[str, float]]  # those asked for, turbulence and noise
     theta: Array  # (P,)
     trim: Trim
     inputs: Inputs
@@ -57,9 +57,10 @@ class Sortie:
 
 
 def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieConditions | None = None) -> Sortie:
-    """Fly deflections (N, controls + 1) from trim (rad, N), sampled at the simulator's rate.
+    """The flight with deflections (N, controls + 1) from trim (rad, N), sampled at the simulator's rate.
 
-    The flight begins in trim with its effects. Raises InputError: no trim, a surface beyond its limit, divergence.
+    It begins in the trim with its effects. Raises InputError where there is no trim, a surface would pass its limit, or
+    the flight diverges.
     """
     conditions = conditions or SortieConditions()
     effects = _all_effects(conditions)
@@ -76,7 +77,7 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieCondi
 
 
 def _all_effects(conditions: SortieConditions) -> dict[str, dict[str, float]]:
-    """The effects asked for, with turbulence and noise as the conditions have them."""
+    """The effects asked for, and turbulence and noise of the conditions where these effects are not given."""
     asked = conditions.effects if isinstance(conditions.effects, Mapping) else parse(conditions.effects)
     effects = {name: dict(values) for name, values in asked.items()}
     if conditions.turbulence not in INTENSITIES:
@@ -89,7 +90,7 @@ def _all_effects(conditions: SortieConditions) -> dict[str, dict[str, float]]:
 
 
 def _check_travel(simulator: Simulator, commands: Array) -> None:
-    """Raise where trim and manoeuvre together pass a control's limit."""
+    """Raise InputError where trim and manoeuvre together pass a control's limit."""
     limits = np.asarray(simulator.model.limits)
     beyond = np.abs(commands[:, :-1]) > limits * (1.0 + 1e-9)
     if beyond.any():
@@ -101,7 +102,7 @@ def _check_travel(simulator: Simulator, commands: Array) -> None:
 
 
 def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: SortieConditions) -> Inputs:
-    """Commands, with realisations of turbulence and noise from the seed."""
+    """Inputs with the commands and with realisations of turbulence and noise from the seed."""
     turbulence, noise = np.random.default_rng(conditions.seed).spawn(2)
     samples = len(commands)
     speed = float(np.linalg.norm(trim.initial[3:6]))

@@ -1,4 +1,4 @@
-"""Trim: the state and the command at which a flight goes on unchanged."""
+"""Trim: the state and the command of a steady, straight flight."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from sysid_node.sim.stations import actuator, propulsion
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-#: Largest acceleration that a trim may leave over, m/s^2 and rad/s^2.
+#: Largest residual acceleration of a trim, m/s^2 and rad/s^2.
 _TOLERANCE = 1e-8
 
-#: What a trim looks for besides the command, rad.
+#: Unknowns of a trim besides the command, rad.
 _ANGLES = ("alpha", "beta", "phi", "theta", "gamma")
 
 
 class TrimPoint(NamedTuple):
-    """Where a trim is sought."""
+    """The flight condition for which a trim is sought."""
 
     airspeed: Scalar  # m/s
     altitude: Scalar  # m
@@ -61,9 +61,10 @@ def trim_flight(
 ) -> Trim:
     """Steady, straight flight without sideslip, wings as level as the aircraft allows.
 
-    ``airspeed`` m/s (default: the reference one), ``theta`` the effects (default: neutral), ``climb_angle`` rad (an
-    aircraft without an engine glides: it is found), ``altitude`` m (default: of the reference density). With fewer
-    than three controls the sideslip is free. Raises InputError where the aircraft cannot fly so, naming what stops it.
+    ``airspeed`` m/s (default: that of the reference condition), ``theta`` (P,) the effects (default: neutral),
+    ``climb_angle`` rad (for an aircraft without an engine it is an unknown of the trim), ``altitude`` m (default: that
+    of the reference density), ``heading`` rad. With fewer than three controls the sideslip is free. Raises InputError
+    where there is no such trim, naming the unknowns at their limits.
     """
     reference = simulator.aircraft.reference
     speed = reference.airspeed if airspeed is None else airspeed
@@ -83,7 +84,7 @@ def trim_flight(
 def _solve(
     simulator: Simulator, theta: Array, point: TrimPoint, start: Array, bounds: tuple[Array, Array], free: Index
 ) -> tuple[Array, Array]:
-    """Everything (angles, command) at the trim, and the residual there."""
+    """All unknowns (angles, command) at the trim, and the residual (7,) there."""
     fixed = (simulator.layout, simulator.model, theta, point)
 
     def whole(z: Array) -> Scalar:
@@ -109,7 +110,7 @@ def _solve(
 
 
 def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Array, Array, Index]:
-    """Start, lower and upper bound of everything, and which of it is free."""
+    """Start, lower and upper bounds of all unknowns, and the indices of those that are free."""
     model, powered = simulator.model, simulator.aircraft.throttle is not None
     weight = float(model.mass) * GRAVITY
     thrust = min(0.1 * weight, 0.5 * float(model.max_thrust)) if powered else 0.0
@@ -125,7 +126,7 @@ def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Arra
 
 @partial(jax.jit, static_argnums=0)
 def _residual(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
-    """Accelerations (6,) and what is wrong with the climb angle."""
+    """Residual (7,): accelerations (6,) and the error of the sine of the climb angle."""
     chain = Chain.of(layout, model, theta, jnp.asarray(0.01), point.altitude)
     command = z[len(_ANGLES) :]
     zero = jnp.zeros(())
@@ -140,13 +141,13 @@ def _residual(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: 
 
 @partial(jax.jit, static_argnums=0)
 def _slope(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
-    """Of the residual, to everything."""
+    """d residual / d unknowns, (7, unknowns)."""
     slope: Scalar = jax.jacfwd(lambda y: _residual(layout, model, theta, point, y))(z)
     return slope
 
 
 def _state(point: TrimPoint, z: Scalar) -> Scalar:
-    """The body's state (13,)."""
+    """The body's state (13,) of the unknowns."""
     alpha, beta, phi, theta = z[0], z[1], z[2], z[3]
     zero = jnp.zeros(())
     velocity = velocity_of((point.airspeed, alpha, beta), jnp)
@@ -155,7 +156,7 @@ def _state(point: TrimPoint, z: Scalar) -> Scalar:
 
 
 def _why_not(simulator: Simulator, speed: float, found: Array, lower: Array, upper: Array) -> str:
-    """One line: what is at its limit, and what to try."""
+    """The message of a missing trim: which unknowns are at their limits, and what to try."""
     names = (*_ANGLES, *simulator.commands)
     margin = 1e-3 * (upper - lower)
     at_limit = [n for n, x, a, b, m in zip(names, found, lower, upper, margin, strict=True) if x < a + m or x > b - m]
