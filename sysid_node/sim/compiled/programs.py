@@ -1,7 +1,8 @@
-"""Programs kept as JAX traced them: a process would trace anew, for seconds, what it then finds compiled.
+"""Traced programs kept on disk.
 
-A program is kept under a digest of the sources that shape it, JAX's release, and what it was traced for; where any of
-these differs it is another program. Without the ``flatbuffers`` package, by which JAX writes programs, all are traced.
+XLA's own cache holds compiled programs, but every process would still trace them, which takes seconds. A program is
+kept under a digest of the sources that shape it, JAX's release, its fixed arguments and the shapes of the others.
+Without the ``flatbuffers`` package, with which JAX writes programs, every process traces them.
 """
 
 from __future__ import annotations
@@ -25,17 +26,16 @@ _Result = TypeVar("_Result")
 
 export.register_namedtuple_serialization(Vector, serialized_name="sysid.Vector")
 
-
-#: The package, whose sources shape the programs.
+#: The package whose sources shape the programs.
 PACKAGE = Path(__file__).parents[2]
 
 
 def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result]], Callable[..., _Result]]:
-    """Decorator: a compiled program for each value of the first ``fixed`` arguments, traced once and for all.
+    """A decorator that keeps a compiled program for each value of the first ``fixed`` arguments.
 
-    These arguments must be hashable and look the same in every process (functions go by their names); the others and
-    the result are trees of arrays, the result's of tuples that ``jax.export`` knows. Programs cannot be differentiated
-    further. Programs are kept apart by the sources below ``package``.
+    These arguments must be hashable and have the same text in every process (functions count by their names). The other
+    arguments and the result are trees of arrays; the result's tuples must be known to ``jax.export``. Programs cannot
+    be differentiated further. The digest is of the sources below ``package``.
     """
 
     def decorated(function: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -49,8 +49,8 @@ def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result
 
             if find_spec("flatbuffers") is None:
                 return flat(*leaves)
-            what = (function.__qualname__, *map(_said, arguments[:fixed]), tree, shapes)
-            found: Any = _program(repr(what), _sources(package), partial(export.export(jax.jit(flat)), *shapes))
+            key = (function.__qualname__, *map(_text_of, arguments[:fixed]), tree, shapes)
+            found: Any = _program(repr(key), _sources(package), partial(export.export(jax.jit(flat)), *shapes))
             result: _Result = found.call(*leaves)
             return result
 
@@ -60,33 +60,33 @@ def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result
     return decorated
 
 
-def _said(value: Any) -> str:
-    """A fixed argument as it looks in every process."""
+def _text_of(value: Any) -> str:
+    """The text of a fixed argument, the same in every process."""
     return str(value.__qualname__) if callable(value) and hasattr(value, "__qualname__") else repr(value)
 
 
-def _program(what: str, sources: str, traced: Callable[[], export.Exported]) -> export.Exported:
-    """The program from the disk; traced, and written there, where it is not or cannot be read."""
-    name = hashlib.sha256(f"{jax.__version__} {sources} {what}".encode()).hexdigest()
+def _program(key: str, sources: str, trace: Callable[[], export.Exported]) -> export.Exported:
+    """The program of a key from the disk; where it cannot be read, it is traced and written there."""
+    name = hashlib.sha256(f"{jax.__version__} {sources} {key}".encode()).hexdigest()
     path = cache_folder("programs") / name
     try:
         program = export.deserialize(bytearray(path.read_bytes()))
-        path.touch()  # used now: ``prune`` deletes others first
+        path.touch()  # marks it as used, so that ``prune`` deletes others first
         return program
-    except Exception:  # whatever is there: another release's, half of one, none
-        found = traced()
+    except Exception:  # no file, an incomplete one, or one of another release
+        traced = trace()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        own = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
-        own.write_bytes(found.serialize())
-        own.replace(path)
+        temporary = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+        temporary.write_bytes(traced.serialize())
+        temporary.replace(path)
         prune(path.parent)
     except OSError:
-        pass  # a cache that cannot be written is none
-    return found
+        pass  # without a writable cache every process traces
+    return traced
 
 
-#: Layers whose sources shape the programs: the diagnosis with its thresholds, and what it computes with.
+#: Layers whose sources shape the programs: the diagnosis, whose thresholds may be constants in them, and those below.
 _SHAPING = ("aircraft", "dynamics", "flight", "sim", "gap")
 
 #: Largest size of all programs that stay on the disk, bytes.
@@ -105,7 +105,7 @@ def _sources(package: Path) -> str:
 def prune(folder: Path, largest: int = LARGEST) -> None:
     """Delete the programs that were used longest ago until all are no larger than ``largest`` bytes together.
 
-    Programs of older sources are never used again, and so go first.
+    Programs of older sources are never used again, and are therefore deleted first.
     """
     found = []
     for path in folder.glob("*"):

@@ -1,9 +1,9 @@
 """How XLA compiles the simulator: float64, one kernel per time loop, compiled programs kept on disk.
 
 A flight is a long loop over a short step of scalar arithmetic. By default XLA:CPU dispatches each of the loop's
-hundred-odd fused operations by itself; told that the loop is "small", it compiles the whole loop into one kernel,
-which runs about twenty times faster. The options must be in the environment before JAX compiles anything: a program
-that has used JAX before it imports this package keeps its own, and only the speed differs.
+hundred-odd fused operations separately. With a threshold below which the loop counts as "small", it compiles the whole
+loop into one kernel, which runs about twenty times faster. The options must be in the environment before JAX compiles
+anything: a program that has used JAX before it imports this package keeps its own options, and only the speed differs.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _OPTIONS = {
     ),
 }
 
-#: Releases that have these options: one that has not would end the process at the first compilation.
+#: Releases that have these options: any other would end the process at the first compilation.
 _KNOWS = "0.10."
 
-#: Environment variable that leaves the options out with the value 1, so that a bench can measure what they gain.
+#: Environment variable that leaves the options out where it is 1, so that a bench can measure their effect.
 PLAIN_VARIABLE = "SYSID_XLA_PLAIN"
 
 
@@ -46,7 +46,7 @@ def configure() -> None:
     _set("jax_enable_x64", True)
     if jax.config.jax_compilation_cache_dir is None:  # type: ignore[attr-defined]
         _set("jax_compilation_cache_dir", str(cache_folder("xla")))
-        _set("jax_persistent_cache_min_compile_time_secs", 0.0)  # dozens of small programs take half a second
+        _set("jax_persistent_cache_min_compile_time_secs", 0.0)  # dozens of small programs together take half a second
 
 
 def _set(option: str, value: object) -> None:
@@ -54,6 +54,6 @@ def _set(option: str, value: object) -> None:
 
 
 def cache_folder(name: str) -> Path:
-    """``$XDG_CACHE_HOME/sysid/<name>``, by default under ``~/.cache``."""
+    """The folder ``$XDG_CACHE_HOME/sysid/<name>``, by default under ``~/.cache``."""
     root = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(root) if root else Path.home() / ".cache") / "sysid" / name

@@ -1,4 +1,4 @@
-"""The chain at one instant: from the state and what drives it to the rates of the state and the motion behind them."""
+"""The chain at one instant: the rates of the state, from the state, the surfaces, the thrust and the gusts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sysid_node.sim.stations.airflow import Air
 )
 @dataclass(frozen=True)
 class Chain:
-    """An aircraft with its effects, ready to fly: what does not change during a flight."""
+    """An aircraft with its effects: all that is constant during a flight."""
 
     layout: Layout
     model: Model
@@ -40,21 +40,21 @@ class Chain:
 
     @classmethod
     def of(cls, layout: Layout, model: Model, theta: Parameters, step: Scalar, altitude: Scalar) -> Chain:
-        """From the parameter vector (P,)."""
+        """The chain of a parameter vector (P,)."""
         effects = unpack(layout, theta)
         return cls(layout, model, effects, mass.properties(model, effects), step, altitude)
 
 
 class Drive(NamedTuple):
-    """What moves the body at one instant."""
+    """What drives the body at one instant."""
 
-    surfaces: Scalar  # (controls,) deflections that count, rad
+    surfaces: Scalar  # (controls,) effective deflections, rad
     thrust: Scalar  # N
-    gusts: Scalar  # (6,)
+    gusts: Scalar  # (6,) velocity of the air m/s, its rotation rad/s, body axes
 
 
 class Load(NamedTuple):
-    """Everything that acts on the aircraft but gravity, about the file's CG, body axes."""
+    """Aerodynamic and propulsive loads about the file's CG, body axes."""
 
     coefficients: Coefficients
     force: Vector  # N
@@ -62,7 +62,7 @@ class Load(NamedTuple):
 
 
 class SensedMotion(NamedTuple):
-    """What the instruments feel of an instant."""
+    """The motion that the instruments measure at one instant."""
 
     air: Air
     coefficients: Coefficients
@@ -73,7 +73,7 @@ class SensedMotion(NamedTuple):
 
 @jax.jit
 def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, SensedMotion]:
-    """d/dt of the continuous state (16,), and the motion behind it."""
+    """d/dt of the continuous state (16,), and the motion that the instruments measure."""
     effects, state = chain.effects, body_state(x)
     altitude = -state.position.z
     air = airflow.meet(state.velocity, state.rates, drive.gusts, air_density(altitude, jnp))
@@ -97,7 +97,7 @@ def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, SensedMot
 
 
 def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb: Scalar) -> Load:
-    """Aerodynamics and propulsion without what the rate of alpha adds; climb (m) since the start."""
+    """Loads of aerodynamics and propulsion without the terms in the rate of alpha; climb (m) since the start."""
     layout, model, effects = chain.layout, chain.model, chain.effects
     surfaces = [drive.surfaces[..., i] for i in range(len(layout.controls))]
     bent = aerodynamics.deflections(layout, model, effects, surfaces, air, drive.thrust)
@@ -109,7 +109,7 @@ def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb:
 
 
 def unsteady_load(chain: Chain, air: Air, steady: Load, alpha_rate: Scalar) -> Load:
-    """With what the rate of alpha (rad/s) adds."""
+    """The steady loads plus the terms in the rate of alpha (rad/s)."""
     extra = aerodynamics.of_alpha_rate(chain.model, chain.effects, air, alpha_rate)
     force, moment = aerodynamics.load(chain.model, air, extra)
     total = Coefficients(*(a + b for a, b in zip(steady.coefficients, extra, strict=True)))
@@ -117,7 +117,7 @@ def unsteady_load(chain: Chain, air: Air, steady: Load, alpha_rate: Scalar) -> L
 
 
 def rate_of_alpha(chain: Chain, air: Air, velocity_rate: Vector) -> Scalar:
-    """dalpha/dt (rad/s) in quasi-steady gusts from dv/dt (m/s^2, body axes), the lift that it makes itself included."""
+    """dalpha/dt (rad/s) in quasi-steady gusts from dv/dt (m/s^2, body axes), with the lift that dalpha/dt causes."""
     u, _, w = air.velocity
     forward = u * u + w * w
     without = (u * velocity_rate.z - w * velocity_rate.x) / forward
@@ -135,8 +135,10 @@ def separation_rate(chain: Chain, air: Air, separation: Scalar, alpha_rate: Scal
 
 
 def drive_of(chain: Chain, actuators: Scalar, motor: Scalar, gusts: Scalar, time: Scalar) -> tuple[Drive, Scalar]:
-    """What moves the body, and the true surfaces and thrust (controls + 1,), at a time (s), by where the actuators
-    (controls,) stand (rad) and the motor (N)."""
+    """The drive at a time (s), and the true surfaces (rad) and thrust (N) (controls + 1,).
+
+    ``actuators`` (controls,) are the actuators' positions, rad, and ``motor`` is the motor's thrust, N.
+    """
     surfaces = actuator.positions(chain.layout, chain.effects, actuators, time)
     effective = actuator.effective(chain.layout, chain.effects, surfaces, time)
     thrust = propulsion.thrust(chain.effects, motor)

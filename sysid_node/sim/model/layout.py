@@ -1,4 +1,4 @@
-"""An aircraft as the simulator sees it: what shapes the program (Layout) and what are numbers in it (Model).
+"""An aircraft as the simulator needs it: the names that shape the program (Layout) and its numbers (Model).
 
 Two aircraft of the same Layout share one compiled program.
 """
@@ -29,7 +29,7 @@ Values = Mapping[str, Scalar]
 
 @dataclass(frozen=True)
 class Layout:
-    """What shapes the compiled program: the names of an aircraft's controls and derivatives."""
+    """The names of an aircraft's controls and derivatives, which shape the compiled program."""
 
     controls: tuple[str, ...]  # aerodynamic controls: "elevator", ...
     symbols: tuple[str, ...]  # their symbols: "de", ...
@@ -54,15 +54,15 @@ class Model(NamedTuple):
     area: Scalar
     span: Scalar
     chord: Scalar
-    airspeed: Scalar  # reference condition
-    density: Scalar  # reference condition
+    airspeed: Scalar  # of the reference condition
+    density: Scalar  # of the reference condition
     lift: Scalar  # CL of level flight at the reference condition
-    alpha: Scalar  # angle of attack there
+    alpha: Scalar  # angle of attack of that flight
     derivatives: Scalar  # in the layout's order
     limits: Scalar  # of the controls, rad; inf = none
     max_thrust: Scalar  # N; inf where the file gives none
-    thrust_inclination: Scalar
-    thrust_arm: Scalar
+    thrust_inclination: Scalar  # rad, upwards
+    thrust_arm: Scalar  # nose-up moment per newton, m
     imu: Scalar  # (3,) m from the CG, FRD
     air_data: Scalar  # (3,)
     noise: Scalar  # (12,) 1 sigma of each output
@@ -75,12 +75,12 @@ _NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "a
 
 
 def layout_of(aircraft: Aircraft) -> Layout:
-    """The program's shape for this aircraft."""
+    """The layout of this aircraft."""
     return Layout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives))
 
 
 def model_of(aircraft: Aircraft) -> Model:
-    """The numbers of this aircraft. Raises InputError where the file leaves out what motion needs."""
+    """The numbers of this aircraft. Raises InputError where the file lacks a moment of inertia."""
     inertia = aircraft.inertia
     moments = np.array([inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz])
     if not np.isfinite(moments).all():
@@ -112,7 +112,7 @@ def model_of(aircraft: Aircraft) -> Model:
 
 
 def reference_flight(aircraft: Aircraft) -> tuple[float, float]:
-    """CL and alpha (rad) of level flight at the reference condition, thrust along the path."""
+    """CL and alpha (rad) of level flight at the reference condition, with thrust along the flight path."""
     pressure = dynamic_pressure(aircraft.reference.air_density, aircraft.reference.airspeed)
     lift = aircraft.mass * GRAVITY / (pressure * aircraft.geometry.S)
     values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}

@@ -1,4 +1,4 @@
-"""All parameters of all effects as one vector, and the ways in and out of it."""
+"""All parameters of all effects as one vector: its names, and conversions from texts and to values by name."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def names(layout: Layout) -> tuple[str, ...]:
     return tuple(f"{effect}.{p.name}" for effect, p in table(layout))
 
 
-#: The vector (P,), or its entries one by one: only those that move are differentiated then.
+#: The vector (P,), or a sequence of its entries, of which then only the varied ones are differentiated.
 Parameters = Scalar | Sequence[Scalar]
 
 
 def unpack(layout: Layout, theta: Parameters) -> dict[str, Values]:
-    """The vector (P,) as effect -> parameter -> value."""
+    """Values by effect and parameter of the vector (P,)."""
     values: dict[str, dict[str, Scalar]] = {}
     entries = jnp.unstack(theta) if isinstance(theta, jax.Array) else theta
     for (effect, parameter), value in zip(table(layout), entries, strict=True):
@@ -42,12 +42,12 @@ def unpack(layout: Layout, theta: Parameters) -> dict[str, Values]:
 
 
 def neutral(layout: Layout) -> NDArray[np.float64]:
-    """The vector at which no effect does anything."""
+    """The vector (P,) at which every effect is neutral."""
     return np.array([p.neutral for _, p in table(layout)])
 
 
 def vector(layout: Layout, effects: Mapping[str, Mapping[str, float]]) -> NDArray[np.float64]:
-    """The vector with these effects and all others neutral.
+    """The vector (P,) with these effects and all others neutral.
 
     Raises InputError on an unknown effect or parameter, an impossible value, or an effect that is named but stays
     neutral.
@@ -66,7 +66,7 @@ def vector(layout: Layout, effects: Mapping[str, Mapping[str, float]]) -> NDArra
 
 
 def parse(specs: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Effects of texts ``name:key=value:key=value``. Raises InputError on any other form."""
+    """Values by effect and key, of texts ``name:key=value:key=value``. Raises InputError on any other form."""
     effects: dict[str, dict[str, float]] = {}
     for spec in specs:
         name, *pairs = spec.split(":")
@@ -94,7 +94,7 @@ def _parameters(layout: Layout, effect: str) -> tuple[Parameter, ...]:
 
 
 def _resolve(effect: str, known: Mapping[str, Parameter], key: str, value: float) -> tuple[Parameter, float]:
-    """The parameter meant by a key, and its value in the vector; checks the value."""
+    """The parameter that a key names, and its value in the vector. Raises InputError on an impossible value."""
     by_everyday_name = {p.reciprocal: p for p in known.values() if p.reciprocal}
     parameter = known.get(key) or by_everyday_name.get(key)
     if parameter is None:
@@ -106,7 +106,7 @@ def _resolve(effect: str, known: Mapping[str, Parameter], key: str, value: float
 
 
 def _range(parameter: Parameter, key: str) -> str:
-    """What values a key may have, in words."""
+    """The range of a key's values, in words."""
     lower, upper, unit = parameter.lower, parameter.upper, parameter.unit
     if key == parameter.reciprocal:
         lower, upper = 1.0 / upper, (1.0 / lower if lower else math.inf)
@@ -115,7 +115,7 @@ def _range(parameter: Parameter, key: str) -> str:
 
 
 def _does_nothing(effect: str, switches: Sequence[Parameter]) -> str:
-    """What to say of an effect that is named but stays neutral."""
+    """The message for an effect that is named but stays neutral."""
     first = switches[0]
     key, value = (
         (first.reciprocal, 1.0 / first.scale) if first.reciprocal else (first.name, first.neutral + first.scale)

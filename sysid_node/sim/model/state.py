@@ -1,4 +1,4 @@
-"""The simulator's state vector: which entry is what."""
+"""The entries of the simulator's state vector."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sysid_node.sim.model.layout import Scalar
 #: attitude quaternion body to earth (scalar first), angular rates (rad/s, body axes).
 STATES = ("north", "east", "down", "u", "v", "w", "q0", "q1", "q2", "q3", "p", "q", "r")
 
-#: Places of what follows it in the continuous state (16,): attached fraction of the flow, displacement and speed of the
-#: structural mode.
+#: Indices of the other entries of the continuous state (16,): attached fraction of the flow, displacement (m) and speed
+#: (m/s) of the structural mode.
 SEPARATION, MODE, MODE_RATE = 13, 14, 15
 
 
 class BodyState(NamedTuple):
-    """The rigid body's state, by part."""
+    """The rigid body's state by name."""
 
     position: Vector
     velocity: Vector
@@ -27,7 +27,7 @@ class BodyState(NamedTuple):
 
 
 def body_state(x: Scalar) -> BodyState:
-    """The first entries of a state vector (13 or more,), by part."""
+    """The rigid body's state of the first 13 entries of a state vector."""
     return BodyState(
         position=Vector(x[0], x[1], x[2]),
         velocity=Vector(x[3], x[4], x[5]),

@@ -1,4 +1,4 @@
-"""Writes the page of effects: equation, parameters, source, and a picture of what each does to doublets.
+"""The page of effects: equation, parameters, source, and a picture of the response to doublets with each.
 
 python -m sysid_node.sim.pages.effects_page [--out docs/reference]
 """
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 AIRCRAFT, RATE, SECONDS = "kestrel", 100.0, 9.0
 
-#: What the pictures show of each effect.
+#: Parameters of each effect in its picture.
 EXAMPLES = {
     "command_delay": "delay=0.15",
     "actuator_lag": "time_constant=0.15",
@@ -169,14 +169,14 @@ def _doublets(simulator: Simulator, time: Array) -> Array:
 
 
 def _panels(simulator: Simulator, time: Array, before: Array, after: Array) -> list[Panel]:
-    """The one or two readings (or parts of the ground track) that change most, by their own range."""
+    """Charts of the one or two readings, or coordinates of the ground track, that change most for their range."""
     names = (*OUTPUTS, *STATES[:3])
     sigma = np.concatenate([np.asarray(simulator.model.noise), [1.0] * 3])
     change = np.abs(after - before).max(axis=0)
     seen = change / np.ptp(np.vstack([before, after]), axis=0).clip(10.0 * sigma)
     seen[len(OUTPUTS) :] *= (
         0.1 if change[: len(OUTPUTS)].any() else 1.0
-    )  # the ground track only where nothing else moves
+    )  # the ground track is shown only where no reading changes
     best = [i for i in np.argsort(seen)[-1:-3:-1] if change[i] > sigma[i]]
     return [Panel(f"{names[i]}, {_unit(names[i])}", time, before[:, i], after[:, i]) for i in best]
 

@@ -1,4 +1,4 @@
-"""Small line charts as SVG text: what a flight shows without and with an effect."""
+"""Small line charts as SVG text: a signal without and with an effect."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Panel:
 
 
 def draw(panels: list[Panel], label: str) -> str:
-    """The panels side by side; ``label`` is what a screen reader says."""
+    """SVG of the panels side by side; ``label`` is for screen readers."""
     width = len(panels) * _WIDTH + (len(panels) - 1) * _GAP
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {_HEIGHT:g}" width="{width:g}" '
@@ -66,7 +66,7 @@ def _level(value: float | Array, low: float, high: float) -> float | Array:
 
 
 def _points(time: Array, values: Array, low: float, high: float) -> str:
-    """Every third sample: finer than the chart's width shows."""
+    """The points of a curve, of every third sample, which is finer than the chart's resolution."""
     x = _LEFT + (_WIDTH - _RIGHT - _LEFT) * time[::3] / time[-1]
     y = np.asarray(_level(values[::3], low, high))
     return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))

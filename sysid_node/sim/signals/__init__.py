@@ -1,4 +1,5 @@
 """Time series and scalar functions that the stations need.
 
-``dryden`` makes turbulence, ``atmosphere`` air density, ``time_shift`` delays, and ``smooth`` differentiable limits.
+``dryden`` makes turbulence, ``time_shift`` delays signals and differentiates them, and ``smooth`` has differentiable
+limits, dead zones and steps.
 """

@@ -1,4 +1,4 @@
-"""Continuous turbulence of the Dryden form, as time series along body axes.
+"""Continuous turbulence with Dryden spectra, as time series along body axes.
 
 Spectra, intensities and scale lengths: MIL-F-8785C (1980), sec. 3.7.1.2 (Dryden form), 3.7.2 (medium and high altitude)
 and 3.7.3 (low altitude). The spectra are realised by white noise through the exact discrete form of their
@@ -34,11 +34,11 @@ class Dryden:
 
     @classmethod
     def at(cls, height: float, span: float) -> Dryden:
-        """At a height above the ground (m); below 3 m (10 ft) as at 3 m."""
+        """Turbulence at a height above the ground (m), for a wing span (m); below 3 m (10 ft) as at 3 m."""
         feet = max(height / _FOOT, 10.0)
         if feet >= 2000.0:
             return cls((1.0, 1.0, 1.0), (1750.0 * _FOOT,) * 3, span)
-        if feet > 1000.0:  # between the two models: linear, as usual
+        if feet > 1000.0:  # linear between the two models
             share = (feet - 1000.0) / 1000.0
             length = _FOOT * (1000.0 + 750.0 * share)
             return cls((1.0, 1.0, 1.0), (length, length, length), span)
@@ -94,7 +94,7 @@ def _longitudinal(sigma: float, time: float) -> _Filter:
 def _transverse(sigma: float, time: float, angular_time: float) -> _Filter:
     """sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2, and its derivative through 1 / (1 + angular_time s)."""
     a = 1.0 / time
-    # y = x1 + x2: a double lag, and the part of it that leads; x3: y through the angular lag
+    # x1, x2: the two lags in series; y is their combination with the zero; x3: y through the angular lag
     A = np.array([[-a, 0.0, 0.0], [a, -a, 0.0], [0.0, 0.0, -1.0 / angular_time]])
     y = np.array([np.sqrt(3.0), 1.0 - np.sqrt(3.0), 0.0])
     A[2] += y / angular_time
@@ -104,6 +104,6 @@ def _transverse(sigma: float, time: float, angular_time: float) -> _Filter:
 
 
 def _root(covariance: Array) -> Array:
-    """A square root of a covariance that rounding may have made slightly indefinite."""
+    """A square root of a covariance; negative eigenvalues, which come from rounding, count as zero."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

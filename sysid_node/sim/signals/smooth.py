@@ -1,4 +1,4 @@
-"""Smooth stand-ins for corners and jumps, so that an optimiser can use their derivatives.
+"""Smooth approximations of corners and jumps, so that an optimiser can use their derivatives.
 
 Each tends to the exact function away from its corner and has finite derivatives everywhere, zero width included.
 """
@@ -25,13 +25,13 @@ def soft_clip(x: jax.Array, inverse_limit: jax.Array | float = 1.0, doublings: i
 def soft_dead_zone(x: jax.Array, half_width: jax.Array) -> jax.Array:
     """``x - clip(x, -half_width, half_width)`` with rounded corners (n = 64); exactly ``x`` where half_width is 0.
 
-    Its derivative to ``half_width`` at 0 is -sign(x), rounded over 1e-5 of x's unit. The sharp corner matters: within
-    the zone the result must be next to nothing, since what is left of it adds up over samples.
+    Its derivative with respect to ``half_width`` at 0 is -sign(x), rounded over 1e-5 of x's unit. The corner is sharp
+    because the values within the zone add up over samples and must be nearly zero.
     """
     ratio = jnp.clip(x / jnp.maximum(half_width, 1e-5), -1e3, 1e3)
     return x - half_width * soft_clip(ratio, doublings=6)
 
 
 def soft_onset(time: jax.Array, onset: jax.Array, width: float = 0.05) -> jax.Array:
-    """From 0 before ``onset`` to 1 after it (s), logistic: 10 to 90 % in 4.4 ``width``."""
+    """A logistic step from 0 to 1 at ``onset`` (s): it rises from 10 to 90 % in 4.4 ``width`` (s)."""
     return 0.5 * (1.0 + jnp.tanh((time - onset) / (2.0 * width)))

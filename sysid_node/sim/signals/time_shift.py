@@ -1,4 +1,4 @@
-"""Signals shifted in time by a part of a sample."""
+"""Signals shifted in time by fractions of a sample, and their rates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sysid_node.sim.model.layout import Scalar
 
 
 def shift_linear(series: Scalar, samples: Scalar) -> Scalar:
-    """``series`` (N, ...) at k - samples, linear between samples, held at both ends; for commands.
+    """``series`` (N, ...) at k - samples, linear between samples and constant beyond both ends; for commands.
 
     Exact for a signal that is linear between samples. Its derivative jumps where ``samples`` is whole.
     """
@@ -18,7 +18,7 @@ def shift_linear(series: Scalar, samples: Scalar) -> Scalar:
 
 
 def shift_cubic(series: Scalar, samples: Scalar) -> Scalar:
-    """``series`` (N, ...) at k - samples, Catmull-Rom cubic between samples, held at both ends; for motion.
+    """``series`` (N, ...) at k - samples, Catmull-Rom cubic between samples, constant beyond the ends; for motion.
 
     Once differentiable in ``samples``: at a whole number of samples the derivative is the central difference.
     """
@@ -27,22 +27,22 @@ def shift_cubic(series: Scalar, samples: Scalar) -> Scalar:
 
 
 def shift_near_zero(series: Scalar, samples: Scalar) -> Scalar:
-    """Value and slope of ``shift_cubic`` at a shift of 0, without moving the series; ``samples`` may be per column."""
+    """``shift_cubic`` linearised at a shift of 0, where it is exact; ``samples`` may differ between columns."""
     before = jnp.concatenate([series[:1], series[:-1]])
     after = jnp.concatenate([series[1:], series[-1:]])
     return series - 0.5 * samples * (after - before)
 
 
 def slope(series: Scalar, step: Scalar) -> Scalar:
-    """d/dt of a series (N, ...) by fourth-order central differences; the ends repeat the second inner values."""
+    """d/dt of a series (N, ...) by fourth-order central differences; two samples at each end repeat the nearest."""
     inner = (8.0 * (series[3:-1] - series[1:-3]) - (series[4:] - series[:-4])) / (12.0 * step)
     return jnp.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
 
 
 def _neighbours(series: Scalar, samples: Scalar, first: int, count: int) -> tuple[Scalar, list[Scalar]]:
-    """Where each k - samples lies between two samples, 0 to 1, and ``count`` rows around it from ``first`` on.
+    """The fraction, 0 to 1, of k - samples between two samples, and ``count`` neighbouring series from ``first`` on.
 
-    The shift is the same for every row, so that the rows are slices of the series with its ends held.
+    The shift is the same for every row, so that the neighbours are slices of the series with its end values repeated.
     """
     n = series.shape[0]
     whole = jnp.floor(-samples)

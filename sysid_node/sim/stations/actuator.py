@@ -1,7 +1,7 @@
-"""Station ``actuator``: from commands to surface positions, and to the deflections that count.
+"""Station ``actuator``: surface positions and effective deflections from commands.
 
-lag -> backlash -> rate limit -> bias -> jam gives the position; the loss of effectiveness comes after it.
-The state is advanced once a sample; between samples a surface moves linearly.
+Lag, backlash, rate limit, bias and jam follow one another and give the position; the loss of effectiveness acts on
+that. The state is advanced once a sample; between samples a surface moves linearly.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 
 
 class ActuatorState(NamedTuple):
-    """What the actuators remember, rad; each (controls,)."""
+    """The state of the actuators, rad; each (controls,)."""
 
-    command: Scalar  # the last one
+    command: Scalar  # of the last sample
     lagged: Scalar
-    linked: Scalar  # behind the free play
-    position: Scalar  # behind the rate limit
+    linked: Scalar  # after the free play
+    position: Scalar  # after the rate limit
 
 
 def start(model: Model, command: Scalar) -> ActuatorState:
-    """At rest on a command (controls,)."""
+    """The state at rest on a command (controls,), rad."""
     limited = jnp.clip(command, -model.limits, model.limits)
     return ActuatorState(limited, limited, limited, limited)
 
@@ -39,7 +39,7 @@ def start(model: Model, command: Scalar) -> ActuatorState:
 def advance(
     layout: Layout, model: Model, effects: dict[str, Values], state: ActuatorState, command: Scalar, step: Scalar
 ) -> ActuatorState:
-    """One sample on; ``command`` (controls,) is that of the new sample."""
+    """The state one sample (``step`` s) later; ``command`` (controls,) is that of the new sample, rad."""
     limited = jnp.clip(command, -model.limits, model.limits)
     lagged, linked, position = [], [], []
     for i, control in enumerate(layout.controls):
@@ -53,7 +53,7 @@ def advance(
 
 
 def positions(layout: Layout, effects: dict[str, Values], actuators: Scalar, time: Scalar) -> list[Scalar]:
-    """Where each surface stands, rad, by where the actuators (..., controls) do."""
+    """Position of each surface, rad, from the positions of the actuators (..., controls), at a time (s)."""
     surfaces = []
     for i, control in enumerate(layout.controls):
         x = actuator_bias.apply(effects["actuator_bias"], control, actuators[..., i])
@@ -62,7 +62,7 @@ def positions(layout: Layout, effects: dict[str, Values], actuators: Scalar, tim
 
 
 def effective(layout: Layout, effects: dict[str, Values], surfaces: list[Scalar], time: Scalar) -> list[Scalar]:
-    """The deflections that count, rad."""
+    """Effective deflections, rad: those of a faultless aircraft with the same forces, at a time (s)."""
     loss = effects["control_effectiveness_loss"]
     return [
         control_effectiveness_loss.apply(loss, control, x, time)

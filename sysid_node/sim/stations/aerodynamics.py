@@ -1,4 +1,4 @@
-"""Station ``aerodynamics``: coefficients, and the forces and moments they make."""
+"""Station ``aerodynamics``: coefficients, and forces and moments from them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from sysid_node.sim.stations.airflow import Air
 def deflections(
     layout: Layout, model: Model, effects: dict[str, Values], surfaces: list[Scalar], air: Air, thrust: Scalar
 ) -> list[Scalar]:
-    """What the linear derivatives see of each surface, rad."""
+    """Deflection of each surface by which its derivatives are multiplied, rad."""
     bent = []
     for control, x in zip(layout.controls, surfaces, strict=True):
         washed = propwash.factor(effects["propwash"], control, thrust, air.pressure * model.area)
@@ -35,7 +35,7 @@ def deflections(
 
 
 def regressors_of(layout: Layout, model: Model, air: Air, deflections: list[Scalar]) -> dict[str, Scalar]:
-    """Every regressor by name but CL^2; rates non-dimensional."""
+    """Every regressor by name except CL^2; rates are non-dimensional."""
     flow, one = (air.speed, air.alpha, air.beta), jnp.ones_like(air.speed)
     state = regressors(flow, air.rates, model.span, model.chord, model.airspeed, one)
     return state | dict(zip(layout.symbols, deflections, strict=True))
@@ -44,9 +44,9 @@ def regressors_of(layout: Layout, model: Model, air: Air, deflections: list[Scal
 def coefficients(
     layout: Layout, model: Model, effects: dict[str, Values], x: dict[str, Scalar], separation: Scalar, climb: Scalar
 ) -> Coefficients:
-    """All six, without what comes with the rate of alpha.
+    """All six coefficients without the terms in the rate of alpha.
 
-    ``x`` regressors; ``separation`` the attached fraction of the flow; ``climb`` (m) since the start.
+    ``x`` are the regressors, ``separation`` is the attached fraction of the flow, ``climb`` (m) counts from the start.
     """
     derivative = dict(zip(layout.derivatives, model.derivatives, strict=True))
     error = effects["derivative_error"]
@@ -81,7 +81,7 @@ def coefficients(
 
 
 def of_alpha_rate(model: Model, effects: dict[str, Values], air: Air, rate: Scalar) -> Coefficients:
-    """What the rate of alpha (rad/s) adds."""
+    """The terms in the rate of alpha (rad/s)."""
     values, reduced = effects["unsteady_aerodynamics"], rate * model.chord * 0.5 / air.speed
     zero = jnp.zeros_like(reduced)
     lift, pitching_moment = (

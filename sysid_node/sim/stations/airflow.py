@@ -1,4 +1,4 @@
-"""Station ``airflow``: the air as the aircraft meets it."""
+"""Station ``airflow``: the flow at the CG, gusts included."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sysid_node.sim.model.layout import Model, Scalar, Values
 
 
 class Air(NamedTuple):
-    """Flow at the CG: velocity relative to the air (body axes) and what derives from it."""
+    """Flow at the CG: velocity relative to the air in body axes, airspeed, flow angles and density."""
 
     velocity: Vector  # m/s
     rates: Vector  # rad/s, relative to the rotating air
@@ -37,7 +37,7 @@ def gusts(model: Model, effects: dict[str, Values], given: Scalar, realisation: 
 
 
 def meet(velocity: Vector, rates: Vector, gusts: Scalar, density: Scalar) -> Air:
-    """The flow, from the motion relative to the steadily moving air and the gusts (6,)."""
+    """The flow, from velocity (m/s) and rates (rad/s) relative to the steadily moving air, and gusts (6,)."""
     relative = velocity.minus(Vector(gusts[0], gusts[1], gusts[2]))
     turning = rates.minus(Vector(gusts[3], gusts[4], gusts[5]))
     speed, alpha, beta = flow_angles(relative, jnp)

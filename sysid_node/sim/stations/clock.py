@@ -1,4 +1,4 @@
-"""Station ``clock``: when the messages say that it happened."""
+"""Station ``clock``: the stamps of the messages."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _IMU, _AIR = 9, 3  # columns of the outputs that the IMU's and the air data's me
 
 
 def stamp(effects: dict[str, Values], outputs: Scalar, step: Scalar) -> Scalar:
-    """Outputs (N, 12) by their stamps, from outputs by the time of measurement; step in s."""
+    """Outputs (N, 12) at the times of their stamps, from outputs at the times of measurement; step in s."""
     imu, air = (effects[name]["delay"] / step for name in ("imu_delay", "air_data_delay"))
     late = jnp.concatenate([jnp.full(_IMU, imu), jnp.full(_AIR, air)])
-    # most flights have no such delay: their slopes need not be moved about
+    # most flights have no such delay, and then the derivatives along the delays need no shifted copies
     stamped: Scalar = jax.lax.cond(jnp.all(late == 0.0), shift_near_zero, _shift_each, outputs, late)
     return stamped
 

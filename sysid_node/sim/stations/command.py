@@ -1,4 +1,4 @@
-"""Station ``command``: what the actuators are told, from what was commanded (or recorded)."""
+"""Station ``command``: the commands that reach the actuators, from those given or recorded."""
 
 from __future__ import annotations
 
@@ -18,5 +18,5 @@ def arrive_from_history(effects: dict[str, Values], history: Scalar, step: Scala
     """The command (m,) that reaches the actuators now; ``history`` (K, m) of commands, the newest last."""
     position = jnp.arange(history.shape[0])[::-1]
     weight = jnp.maximum(1.0 - jnp.abs(position - effects["command_delay"]["delay"] / step), 0.0)
-    # a sum, not a matrix product: XLA would call a library for it and leave the loop's kernel
+    # XLA would call a library for a matrix product, outside of the loop's kernel
     return jnp.sum(weight[:, None] * history, axis=0)

@@ -11,7 +11,7 @@ from sysid_node.sim.model.layout import Model, Values
 
 
 def properties(model: Model, effects: dict[str, Values]) -> MassProperties:
-    """Mass, CG and inertia as they are."""
+    """Mass (kg), CG (m) and inertia (kg m^2) with their effects."""
     return MassProperties(
         mass_error.apply(effects["mass_error"], model.mass),
         cg_shift.shift(effects["cg_shift"]),
@@ -20,6 +20,6 @@ def properties(model: Model, effects: dict[str, Values]) -> MassProperties:
 
 
 def nominal(model: Model) -> MassProperties:
-    """Mass, CG and inertia as the file has them."""
+    """Mass (kg), CG (m) and inertia (kg m^2) of the aircraft file."""
     zero = jnp.zeros_like(model.mass)
     return MassProperties(model.mass, Vector(zero, zero, zero), *model.inertia)

@@ -11,17 +11,17 @@ from sysid_node.sim.model.layout import Model, Scalar, Values
 
 
 def commanded(model: Model, thrust: Scalar) -> Scalar:
-    """The thrust (N) that the motor can give of that commanded."""
+    """The commanded thrust (N) within the motor's limits."""
     return jnp.clip(thrust, 0.0, model.max_thrust)
 
 
 def advance(effects: dict[str, Values], state: Scalar, command0: Scalar, command1: Scalar, step: Scalar) -> Scalar:
-    """The motor's thrust (N) one sample on."""
+    """The motor's thrust (N) one sample (``step`` s) later."""
     return motor_lag.advance(effects["motor_lag"], state, command0, command1, step)
 
 
 def thrust(effects: dict[str, Values], state: Scalar) -> Scalar:
-    """Thrust, N."""
+    """Thrust (N) with its scale error, from the motor's."""
     return thrust_scale.apply(effects["thrust_scale"], state)
 
 

@@ -1,4 +1,4 @@
-"""Station ``sensors``: what the instruments read of the motion."""
+"""Station ``sensors``: the readings of the instruments, and the motion behind them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def gyroscopes(effects: dict[str, Values], rates: Vector) -> Vector:
 
 
 def turned_by(effects: dict[str, Values], acceleration: Vector) -> Vector:
-    """How fast the gyroscopes' readings change (rad/s^2) as the body's angular acceleration has it."""
+    """Rate of change of the gyroscopes' readings (rad/s^2) at an angular acceleration of the body (rad/s^2)."""
     turned = imu_misalignment.apply(effects["imu_misalignment"], acceleration)
     return imu_scale.gyroscopes(effects["imu_scale"], turned)
 
@@ -59,12 +59,12 @@ def rates_from(effects: dict[str, Values], reading: Vector) -> Vector:
 
 
 def at_probe(velocity: Vector, rates: Vector, arm: Vector) -> tuple[Scalar, Scalar, Scalar]:
-    """Airspeed (m/s), alpha, beta (rad) where the probe sits."""
+    """Airspeed (m/s), alpha, beta (rad) at the air-data probe."""
     return flow_angles(velocity_at(velocity, rates, arm), jnp)
 
 
 def lagged(effects: dict[str, Values], state: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:
-    """The probe's reading one sample on, before its calibration errors."""
+    """The lagged flow (3,) at the probe one sample (``step`` s) later, before its calibration errors."""
     return air_data_lag.advance(effects["air_data_lag"], state, truth0, truth1, step)
 
 
@@ -79,15 +79,16 @@ def air_data(
 def flow_from(
     effects: dict[str, Values], airspeed: Scalar, alpha: Scalar, beta: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """What the lagged probe holds behind its readings."""
+    """The lagged flow (m/s, rad) at the probe, from its readings."""
     angles = vane_scale.undo(effects["vane_scale"], *vane_bias.undo(effects["vane_bias"], alpha, beta))
     return airspeed_scale.undo(effects["airspeed_scale"], airspeed), *angles
 
 
 def before_lag(effects: dict[str, Values], reading: Scalar, flow_rate: Scalar | None, step: Scalar) -> Scalar:
-    """What the lagged probe lags behind (N, 3), from its readings and the flow's own rate (N, 3).
+    """The flow (N, 3) before the probe's lag, from the lagged flow and the rate of the true flow (N, 3).
 
-    That is what inertial instruments tell. Without it, by differences of the readings, whose noise comes along.
+    The rate follows from the inertial instruments. Where it is None, differences of the readings replace it, which
+    amplify the noise.
     """
     if flow_rate is None:
         return air_data_lag.undo(effects["air_data_lag"], reading, slope(reading, step))

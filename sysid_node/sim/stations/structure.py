@@ -1,4 +1,4 @@
-"""Station ``structure``: the airframe's own vibration."""
+"""Station ``structure``: the vibration of the airframe in one mode."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def start(effects: dict[str, Values], load: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def rate(effects: dict[str, Values], x: Scalar, v: Scalar, load: Scalar) -> tuple[Scalar, Scalar]:
-    """Rates of displacement and speed."""
+    """Rates of displacement (m/s) and speed (m/s^2)."""
     return v, structural_mode.acceleration(effects["structural_mode"], x, v, load)
 
 
