@@ -32,7 +32,9 @@ def _display(translator: HTML5Translator, node: nodes.math_block) -> None:
 def _typeset(node: nodes.Element, as_block: bool) -> str:
     """The equation as MathML; one that cannot be typeset is a warning at its place, and shown as it is written."""
     try:
-        return str(tex2mathml(node.astext(), as_block=as_block))
+        mathml = str(tex2mathml(node.astext(), as_block=as_block))
     except MathError as error:
         logging.getLogger(__name__).warning("equation %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"
+    # Browsers draw a dot or a bar that is marked as an accent onto the letter where the font is not one for equations.
+    return mathml.replace(' accent="true"', "")
