@@ -1,4 +1,9 @@
-"""Every effect the simulator knows, one module each."""
+"""Every effect of the simulator, one module each.
+
+A module holds an ``Effect`` (name, station, equation, source, parameters) and the functions that apply it, which its
+station calls with the values of the parameter vector. ``EFFECTS`` lists them in the order in which the chain applies
+them; that is also the order of the vector's entries.
+"""
 
 from __future__ import annotations
 

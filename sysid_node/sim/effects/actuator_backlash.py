@@ -17,5 +17,5 @@ EFFECT = Effect(
 
 
 def advance(values: Values, control: str, x: Scalar, u: Scalar) -> Scalar:
-    """The surface's position (rad), from x, as its actuator goes to u."""
+    """The surface's new position (rad), from its position x as the actuator moves to u (rad)."""
     return x + soft_dead_zone(u - x, 0.5 * values[control])

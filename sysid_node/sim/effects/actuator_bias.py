@@ -1,4 +1,4 @@
-"""A surface rigged off its zero."""
+"""A constant offset of a surface."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ EFFECT = Effect(
 
 
 def apply(values: Values, control: str, x: Scalar) -> Scalar:
-    """The surface's position, rad."""
+    """The surface's position (rad) with its offset."""
     return x + values[control]

@@ -18,12 +18,15 @@ EFFECT = Effect(
 
 
 def advance(values: Values, x: Scalar, u0: Scalar, u1: Scalar, step: Scalar) -> Scalar:
-    """The lagged position (rad) one step (s) on, as the command goes from u0 to u1."""
+    """The lagged position (rad) one step (s) later, as the command goes from u0 to u1 (rad)."""
     return first_order(values["time_constant"], x, u0, u1, step)
 
 
 def first_order(tau: Scalar, x: Scalar, u0: Scalar, u1: Scalar, step: Scalar) -> Scalar:
-    """Exact step of tau dx/dt + x = u, u linear; at tau = 0 it is u1, and its derivative there that of a delay."""
+    """x one step later by tau dx/dt + x = u, exact for u linear in time.
+
+    At tau = 0 it is u1, and its derivative with respect to tau is that of a delay.
+    """
     decay = jnp.exp(-step / jnp.maximum(tau, step / 50.0))
     ramp = tau / step * (1.0 - decay)
     return decay * x + (ramp - decay) * u0 + (1.0 - ramp) * u1

@@ -1,4 +1,4 @@
-"""Largest rate of every actuator."""
+"""A limit to the rate of every actuator."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ EFFECT = Effect(
 
 
 def advance(values: Values, x: Scalar, u: Scalar, step: Scalar) -> Scalar:
-    """The position (rad) one step (s) on, on its way from x towards u."""
+    """The position (rad) one step (s) later, from x towards u (rad)."""
     return x + soft_clip(u - x, values["inverse_rate"] / step)

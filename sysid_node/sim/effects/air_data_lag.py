@@ -20,12 +20,12 @@ EFFECT = Effect(
 
 
 def advance(values: Values, y: Scalar, truth0: Scalar, truth1: Scalar, step: Scalar) -> Scalar:
-    """The reading one step (s) on."""
+    """The lagged flow (3,) one step (s) later, as the truth goes from truth0 to truth1."""
     return first_order(values["time_constant"], y, truth0, truth1, step)
 
 
 def behind(values: Values, rate: Scalar, step: Scalar) -> Scalar:
-    """How far readings (N, 3) lag behind the truth, from the truth's rate (N, 3): settled on the first sample."""
+    """Truth minus lagged flow (N, 3), from the truth's rate (N, 3) in units per s; settled on the first sample."""
 
     def advance_one(lag: Scalar, pair: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
         lag = first_order(values["time_constant"], lag, *pair, step)
@@ -37,5 +37,5 @@ def behind(values: Values, rate: Scalar, step: Scalar) -> Scalar:
 
 
 def undo(values: Values, y: Scalar, rate: Scalar) -> Scalar:
-    """The truth behind a reading, from it and its rate."""
+    """The truth (N, 3) before the lag, from the lagged flow and its rate."""
     return y + values["time_constant"] * rate

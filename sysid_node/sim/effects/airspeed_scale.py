@@ -16,10 +16,10 @@ EFFECT = Effect(
 
 
 def apply(values: Values, airspeed: Scalar) -> Scalar:
-    """Airspeed, m/s."""
+    """The airspeed (m/s) that is read."""
     return airspeed * (1.0 + values["error"])
 
 
 def undo(values: Values, airspeed: Scalar) -> Scalar:
-    """The airspeed (m/s) behind the reading."""
+    """The true airspeed (m/s) of a reading."""
     return airspeed / (1.0 + values["error"])

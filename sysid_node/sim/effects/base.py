@@ -1,4 +1,4 @@
-"""What an effect is: a name, a station, parameters, a source; its module holds the function that applies it."""
+"""The description of an effect: its name, station, equation, source and parameters."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ STATIONS = (
 class Parameter:
     """One number of an effect.
 
-    ``switch``: the effect does nothing while all its switches are neutral; other parameters only shape it.
-    ``reciprocal``: the everyday quantity whose reciprocal this is, where that one's neutral value is infinite.
+    An effect is neutral while all of its parameters with ``switch`` are neutral; the others only shape it.
+    ``reciprocal`` names the usual quantity of which this is the reciprocal, where its neutral value is infinite.
     """
 
     name: str
@@ -70,5 +70,5 @@ def per_control(
     return parameters
 
 
-#: For effects that set in during a flight.
+#: The parameter of effects that begin during a flight.
 ONSET = Parameter("onset", "s", "time at which it sets in", 10.0, neutral=-10.0, switch=False)

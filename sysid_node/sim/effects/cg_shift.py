@@ -1,4 +1,4 @@
-"""A centre of gravity that is not where the file has it."""
+"""A centre of gravity at another place than in the file."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ EFFECT = Effect(
 
 
 def shift(values: Values) -> Vector:
-    """The CG from the file's, m."""
+    """Position of the CG relative to the file's, m."""
     return Vector(values["x"], values["y"], values["z"])

@@ -1,4 +1,4 @@
-"""Transport delay between a command and the actuator that obeys it."""
+"""Transport delay between a command and its actuator."""
 
 from __future__ import annotations
 

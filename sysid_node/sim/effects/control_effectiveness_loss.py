@@ -1,4 +1,4 @@
-"""A surface that has lost part of its effect."""
+"""Loss of a part of a surface's effectiveness."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ EFFECT = Effect(
 
 
 def apply(values: Values, control: str, x: Scalar, time: Scalar) -> Scalar:
-    """The deflection (rad) that would do in a sound aircraft what this one does at a time (s)."""
+    """The deflection (rad) that would have the same effect without the loss, at a time (s)."""
     return x * (1.0 - values[control] * soft_onset(time, values["onset"]))

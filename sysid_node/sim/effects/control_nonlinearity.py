@@ -16,5 +16,5 @@ EFFECT = Effect(
 
 
 def apply(values: Values, control: str, deflection: Scalar) -> Scalar:
-    """The deflection (rad) that the linear derivatives should see."""
+    """The deflection (rad) by which the linear derivatives are multiplied."""
     return deflection * (1.0 - values[control] * deflection * deflection)

@@ -16,5 +16,5 @@ EFFECT = Effect(
 
 
 def drag(values: Values, lift: Scalar) -> Scalar:
-    """Added CD; lift is CL from that of the reference condition."""
+    """Added CD; ``lift`` is CL minus that of the reference condition."""
     return values["parabola"] * lift * lift

@@ -24,7 +24,7 @@ EFFECT = Effect(
 
 
 def apply(values: Values, gusts: Scalar, time: Scalar, airspeed: Scalar) -> Scalar:
-    """Gusts (6,) with the discrete one at a time (s); airspeed (m/s) is the reference one."""
+    """Gusts (..., 6) plus the discrete one at a time (s); ``airspeed`` (m/s) is that of the reference condition."""
     phase = jnp.clip(airspeed * (time - values["start"]) / values["length"], 0.0, 1.0)
     shape = 0.5 * (1.0 - jnp.cos(2.0 * jnp.pi * phase))
     zero = jnp.zeros_like(shape)

@@ -20,15 +20,15 @@ EFFECT = Effect(
 
 
 def accelerometers(values: Values, reading: Vector) -> Vector:
-    """Specific force, m/s^2."""
+    """The specific force (m/s^2) that is read."""
     return reading.plus(Vector(values["ax"], values["ay"], values["az"]))
 
 
 def gyroscopes(values: Values, reading: Vector) -> Vector:
-    """Angular rates, rad/s."""
+    """The angular rates (rad/s) that are read."""
     return reading.plus(Vector(values["p"], values["q"], values["r"]))
 
 
 def true_rates(values: Values, reading: Vector) -> Vector:
-    """The rates (rad/s) behind the gyroscopes' readings."""
+    """The true angular rates (rad/s) of the gyroscopes' readings."""
     return reading.minus(Vector(values["p"], values["q"], values["r"]))

@@ -1,4 +1,4 @@
-"""An IMU that sits elsewhere than the file says."""
+"""An IMU at another place than in the file."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ EFFECT = Effect(
 
 
 def arm(values: Values) -> Vector:
-    """The error of the arm, m."""
+    """The error of the lever arm, m."""
     return Vector(values["x"], values["y"], values["z"])

@@ -1,4 +1,4 @@
-"""An IMU not mounted along the body axes."""
+"""An IMU that is not aligned with the body axes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ EFFECT = Effect(
 
 
 def apply(values: Values, reading: Vector) -> Vector:
-    """What the turned instrument reads of a body-axes vector."""
+    """The components of a body-axes vector along the rotated instrument's axes."""
     rotation = Vector(values["roll"], values["pitch"], values["yaw"])
     return reading.minus(rotation.cross(reading))
 
 
 def undo(values: Values, reading: Vector) -> Vector:
-    """The body-axes vector behind the reading: (I - e x)^-1 in closed form."""
+    """The body-axes vector of a reading, by (I - e x)^-1 in closed form."""
     rotation = Vector(values["roll"], values["pitch"], values["yaw"])
     x, y, z = rotation
     along = x * reading.x + y * reading.y + z * reading.z

@@ -20,15 +20,15 @@ EFFECT = Effect(
 
 
 def accelerometers(values: Values, reading: Vector) -> Vector:
-    """Specific force, m/s^2."""
+    """The specific force (m/s^2) that is read."""
     return Vector(*(reading[i] * (1.0 + values[n]) for i, n in enumerate(("ax", "ay", "az"))))
 
 
 def gyroscopes(values: Values, reading: Vector) -> Vector:
-    """Angular rates, rad/s."""
+    """The angular rates (rad/s) that are read."""
     return Vector(*(reading[i] * (1.0 + values[n]) for i, n in enumerate(("p", "q", "r"))))
 
 
 def true_rates(values: Values, reading: Vector) -> Vector:
-    """The rates (rad/s) behind the gyroscopes' readings."""
+    """The true angular rates (rad/s) of the gyroscopes' readings."""
     return Vector(*(reading[i] / (1.0 + values[n]) for i, n in enumerate(("p", "q", "r"))))

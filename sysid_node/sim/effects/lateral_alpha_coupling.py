@@ -20,10 +20,10 @@ EFFECT = Effect(
 
 
 def rolling_moment(values: Values, alpha: Scalar, beta: Scalar, r: Scalar) -> Scalar:
-    """Added Cl; alpha (rad) from the reference condition's, r the non-dimensional yaw rate."""
+    """Added Cl; ``alpha`` (rad) counts from the reference condition, ``r`` is the non-dimensional yaw rate."""
     return (values["Cl_beta_alpha"] * beta + values["Cl_r_alpha"] * r) * alpha
 
 
 def yawing_moment(values: Values, alpha: Scalar, beta: Scalar) -> Scalar:
-    """Added Cn."""
+    """Added Cn; ``alpha`` (rad) counts from the reference condition."""
     return values["Cn_beta_alpha"] * beta * alpha

@@ -1,4 +1,4 @@
-"""An aircraft heavier or lighter than its file."""
+"""A mass that differs from the file's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A motor that takes its time."""
+"""First-order lag of the motor."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ EFFECT = Effect(
 
 
 def advance(values: Values, thrust: Scalar, command0: Scalar, command1: Scalar, step: Scalar) -> Scalar:
-    """Thrust (N) one step (s) on."""
+    """Thrust (N) one step (s) later, as the command goes from command0 to command1 (N)."""
     return first_order(values["time_constant"], thrust, command0, command1, step)

@@ -19,5 +19,5 @@ EFFECT = Effect(
 
 
 def pitching_moment(values: Values, alpha: Scalar) -> Scalar:
-    """Added Cm; alpha (rad) from that of the reference condition."""
+    """Added Cm; ``alpha`` (rad) counts from the reference condition."""
     return alpha * alpha * (values["quadratic"] + values["cubic"] * alpha)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sysid_node.sim.effects.base import Effect, Parameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
-#: Controls that sit behind the propeller.
+#: Controls in the propeller's slipstream.
 IN_SLIPSTREAM = ("elevator", "rudder")
 
 EFFECT = Effect(
@@ -21,7 +21,7 @@ EFFECT = Effect(
 
 
 def factor(values: Values, control: str, thrust: Scalar, pressure_area: Scalar) -> Scalar | float:
-    """What the control's effect is multiplied by; pressure_area is qbar S, N."""
+    """The factor of the control's effect; ``pressure_area`` is qbar S, N."""
     if control not in IN_SLIPSTREAM:
         return 1.0
     return 1.0 + values["gain"] * thrust / pressure_area

@@ -29,7 +29,7 @@ EFFECT = Effect(
 
 
 def attached(values: Values, alpha: Scalar, alpha_rate: Scalar, time_scale: Scalar) -> Scalar:
-    """Steady attached fraction X0 of the flow, 0 to 1, of alpha (rad), its rate (rad/s) and cbar / V (s)."""
+    """Steady attached fraction X0 of the flow, 0 to 1, at alpha (rad), its rate (rad/s) and cbar / V (s)."""
     lagged = alpha - values["tau2"] * time_scale * alpha_rate
     return 0.5 * (1.0 - jnp.tanh(values["a1"] * (lagged - values["alpha_star"])))
 
@@ -40,7 +40,7 @@ def rate(values: Values, x: Scalar, steady: Scalar, time_scale: Scalar) -> Scala
 
 
 def lift_factor(values: Values, x: Scalar) -> Scalar:
-    """What is left of the attached lift; the root is rounded below X = 1e-4."""
+    """Lift as a fraction of the attached flow's; the square root is rounded below X = 1e-4."""
     half = 0.5 * (1.0 + jnp.sqrt(jnp.maximum(x, 0.0) + 1e-8) / jnp.sqrt(1.0 + 1e-8))
     return 1.0 - values["depth"] * (1.0 - half * half)
 

@@ -1,4 +1,4 @@
-"""Wind, the same everywhere and always."""
+"""Wind that is constant in space and time."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ EFFECT = Effect(
 
 
 def apply(values: Values, velocity: Vector) -> Vector:
-    """Velocity over the ground (m/s, north-east-down) from that through the air."""
+    """Velocity over the ground from velocity through the air, both m/s, north-east-down."""
     return velocity.plus(Vector(values["north"], values["east"], values["down"]))

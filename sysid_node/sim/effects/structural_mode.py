@@ -1,4 +1,4 @@
-"""One elastic mode of the airframe, felt by the inertial sensors."""
+"""One elastic mode of the airframe, measured by the inertial sensors."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ EFFECT = Effect(
 
 
 def acceleration(values: Values, x: Scalar, v: Scalar, load: Scalar) -> Scalar:
-    """The modal acceleration (m/s^2) of its displacement (m), speed (m/s), and the specific force along z."""
+    """The modal acceleration (m/s^2) at a displacement (m), a speed (m/s) and a specific force along z (m/s^2)."""
     w = 2.0 * jnp.pi * values["frequency"]
     return load - 2.0 * values["damping"] * w * v - w * w * x
 
 
 def steady(values: Values, load: Scalar) -> Scalar:
-    """The modal displacement (m) at rest."""
+    """The modal displacement (m) at rest under a specific force along z (m/s^2)."""
     w = 2.0 * jnp.pi * values["frequency"]
     return load / (w * w)
 

@@ -1,4 +1,4 @@
-"""A surface that jams."""
+"""A surface that jams at a fixed position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A thrust line that misses the centre of gravity."""
+"""A thrust line at another height than in the file."""
 
 from __future__ import annotations
 

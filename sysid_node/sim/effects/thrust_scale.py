@@ -1,4 +1,4 @@
-"""A propulsion that gives more or less than the file says."""
+"""Scale error of the thrust."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ EFFECT = Effect(
 
 
 def apply(values: Values, thrust: Scalar) -> Scalar:
-    """Thrust, N."""
+    """Thrust (N) with its scale error."""
     return thrust * (1.0 + values["error"])

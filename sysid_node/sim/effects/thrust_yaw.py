@@ -1,4 +1,4 @@
-"""Thrust that yaws and rolls the aircraft."""
+"""Yawing and rolling moments of the thrust."""
 
 from __future__ import annotations
 

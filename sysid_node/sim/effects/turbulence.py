@@ -16,5 +16,5 @@ EFFECT = Effect(
 
 
 def apply(values: Values, gusts: Scalar, realisation: Scalar) -> Scalar:
-    """Gusts (6,): velocity of the air along body axes (m/s), its rotation (rad/s)."""
+    """Gusts (..., 6) plus turbulence: velocity of the air along body axes (m/s), its rotation (rad/s)."""
     return gusts + values["intensity"] * realisation

@@ -1,4 +1,4 @@
-"""Lift and pitching moment that come with the rate of the angle of attack."""
+"""Lift and pitching moment due to the rate of the angle of attack."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def pitching_moment(values: Values, rate: Scalar) -> Scalar:
 
 
 def solve_rate(values: Values, rate: Scalar, relief: Scalar) -> Scalar:
-    """dalpha/dt (rad/s) from what it would be without this lift.
+    """dalpha/dt (rad/s) with this lift, from ``rate`` (rad/s), its value without the lift.
 
-    The lift is normal to the flow, so it takes relief * CL_alphadot * dalpha/dt off the rate:
-    relief = qbar S cbar / (2 V m) / (speed in the x-z plane). Linear, hence solved here and not iterated.
+    The lift is normal to the flow and therefore reduces the rate by relief * CL_alphadot * dalpha/dt, where
+    relief = qbar S cbar / (2 V m) / (speed in the x-z plane). The equation is linear and is solved in closed form.
     """
     return rate / (1.0 + relief * values["CL_alphadot"])

@@ -1,4 +1,4 @@
-"""Air-data probe elsewhere than the file says."""
+"""An air-data probe at another place than in the file."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ EFFECT = Effect(
 
 
 def arm(values: Values) -> Vector:
-    """The error of the arm, m."""
+    """The error of the lever arm, m."""
     return Vector(values["x"], values["y"], values["z"])

@@ -19,10 +19,10 @@ EFFECT = Effect(
 
 
 def apply(values: Values, alpha: Scalar, beta: Scalar) -> tuple[Scalar, Scalar]:
-    """Flow angles, rad."""
+    """The flow angles (rad) that are read."""
     return alpha * (1.0 + values["alpha"]), beta * (1.0 + values["beta"])
 
 
 def undo(values: Values, alpha: Scalar, beta: Scalar) -> tuple[Scalar, Scalar]:
-    """The flow angles (rad) behind the readings."""
+    """The true flow angles (rad) of the readings."""
     return alpha / (1.0 + values["alpha"]), beta / (1.0 + values["beta"])

@@ -1,1 +1,5 @@
-"""The aircraft as a model for other simulators: one module a format, each an ``Aircraft`` to text."""
+"""The aircraft as a model for other simulators.
+
+There is one module for each format (``jsbsim``, ``gazebo``, ``rosflight``); each turns an ``Aircraft`` and the effects
+that the format can express into text. ``polar`` gives them the drag as a parabola of lift.
+"""

@@ -78,7 +78,7 @@ def _airframe(aircraft: Aircraft) -> dict[str, str | float]:
 
 
 def _stability(aircraft: Aircraft) -> dict[str, float]:
-    """What the plugin's own names mean; drag with alpha is in the parabola."""
+    """Stability derivatives by the plugin's names; the drag due to alpha is in the parabola."""
     value = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
     entries = {"CL0": value.get("CL_0", 0.0), "Cem0": value.get("Cm_0", 0.0)}
     for coefficient, name in _NAMES.items():
@@ -90,7 +90,7 @@ def _stability(aircraft: Aircraft) -> dict[str, float]:
 
 
 def _surfaces(aircraft: Aircraft) -> dict[str, dict[str, float]]:
-    """joint -> derivatives per degree of the joint."""
+    """Control derivatives by joint and plugin's name, per degree of the joint."""
     surfaces: dict[str, dict[str, float]] = {}
     for control in aircraft.controls.values():
         for joint, scale in control.joints.items():

@@ -1,8 +1,8 @@
 """The aircraft as a JSBSim model (JSBSim-ML 2.0).
 
-Coefficients are functions of JSBSim's own properties; forces are summed along body axes, so that no convention of wind
-axes comes between. Commands are ``fcs/<control>-cmd-rad`` (rad) and ``fcs/throttle-cmd-norm``. JSBSim's structural
-axes run aft, right, up, and its product of inertia is minus the usual Ixz.
+Coefficients are functions of JSBSim's own properties; forces are summed along body axes, and therefore do not depend on
+a convention of wind axes. Commands are ``fcs/<control>-cmd-rad`` (rad) and ``fcs/throttle-cmd-norm``. JSBSim's
+structural axes run aft, right, up, and its product of inertia is minus the usual Ixz.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS, split_derivative
 from sysid_node.errors import InputError
 
-#: Effects that JSBSim's own blocks express.
+#: Effects that JSBSim's own blocks can express.
 EFFECTS = (
     "actuator_lag",
     "actuator_rate_limit",
@@ -40,11 +40,13 @@ _REGRESSORS = {
 
 
 def jsbsim_model(aircraft: Aircraft, effects: Effects | None = None) -> str:
-    """The model's XML. Raises InputError for an effect that JSBSim does not know as such."""
+    """The model's XML. Raises InputError for an effect that is not in ``EFFECTS``, or an unknown moment of inertia."""
     effects = effects or {}
-    strange = [name for name in effects if name not in EFFECTS]
-    if strange:
-        raise InputError(f"effect {strange[0]!r} cannot be exported to jsbsim; those that can: {', '.join(EFFECTS)}")
+    unsupported = [name for name in effects if name not in EFFECTS]
+    if unsupported:
+        raise InputError(
+            f"effect {unsupported[0]!r} cannot be exported to jsbsim; those that can: {', '.join(EFFECTS)}"
+        )
     root = Element("fdm_config", name=aircraft.name, version="2.0", release="BETA")
     header = SubElement(root, "fileheader")
     _text(header, "author", "sysid export")

@@ -1,4 +1,4 @@
-"""The aircraft file's drag as the parabola that other simulators want."""
+"""The aircraft file's drag as the parabola of lift that other simulators use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Polar(NamedTuple):
     zero: float
     factor: float
     lift: float  # CL at the reference condition
-    alpha: float  # rad, there
+    alpha: float  # rad, of that flight
 
 
 def polar_of(aircraft: Aircraft) -> Polar:

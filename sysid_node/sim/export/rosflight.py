@@ -31,9 +31,9 @@ def rosflight_parameters(aircraft: Aircraft, effects: Mapping[str, Mapping[str, 
     """The YAML. Raises InputError for any effect, and for controls that ROSflight does not have."""
     if effects:
         raise InputError(f"effect {next(iter(effects))!r} cannot be exported to rosflight: it has derivatives only")
-    strange = [name for name, control in aircraft.controls.items() if control.symbol not in _CONTROLS]
-    if strange:
-        raise InputError(f"control {strange[0]!r}: rosflight_sim knows elevator, aileron and rudder only")
+    unsupported = [name for name, control in aircraft.controls.items() if control.symbol not in _CONTROLS]
+    if unsupported:
+        raise InputError(f"control {unsupported[0]!r}: rosflight_sim knows elevator, aileron and rudder only")
     travel = {control.symbol: control.limit or 1.0 for control in aircraft.controls.values()}
     limits = ", ".join(f"{control.symbol} {travel[control.symbol]:g} rad" for control in aircraft.controls.values())
     lines = [_HEADER.format(name=aircraft.name, limits=limits, mass=aircraft.mass, inertia=aircraft.inertia)]
@@ -67,7 +67,7 @@ def _parameters(aircraft: Aircraft, travel: Mapping[str, float]) -> dict[str, fl
 
 
 def _parasitic(aircraft: Aircraft, value: Mapping[str, float]) -> float:
-    """ROSflight's C_D_p: what the file's drag at the reference condition leaves beside its induced drag."""
+    """ROSflight's C_D_p: the file's drag at the reference condition minus ROSflight's induced drag."""
     polar, geometry = polar_of(aircraft), aircraft.geometry
     wing = value.get("CL_0", 0.0) + value.get("CL_alpha", 0.0) * polar.alpha
     induced = wing**2 / (math.pi * 0.9 * geometry.b**2 / geometry.S)
@@ -75,6 +75,6 @@ def _parasitic(aircraft: Aircraft, value: Mapping[str, float]) -> float:
 
 
 def _number(value: float) -> str:
-    """A YAML float: ROS takes 1 for an integer and refuses it."""
+    """A YAML float; ROS would take 1 for an integer and refuse it."""
     text = f"{value:.9g}"
     return text if any(mark in text for mark in ".en") else f"{text}.0"
