@@ -1,4 +1,4 @@
-"""Each effect does what its equation says, by numbers worked out apart from the simulator."""
+"""Each effect follows its equation, by numbers computed independently of the simulator."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -1,4 +1,4 @@
-"""Exported models: JSBSim flies its own as ours flies; the others hold the numbers that their simulators mean."""
+"""Exported models: JSBSim flies its model as our simulator does; the others hold their simulators' numbers."""
 
 import math
 from xml.etree.ElementTree import fromstring

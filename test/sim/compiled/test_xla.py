@@ -1,4 +1,4 @@
-"""The compiler's options, in fresh processes: they are set, left out on request, and missed aloud."""
+"""The compiler's options, in fresh processes: set, left out on request, and left out with a warning."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""The live flight against the rollout of the same chain, and what can be switched in flight."""
+"""The live flight against the rollout of the same chain, and effects that change in flight."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_step_by_step_is_the_rollout(simulator: Simulator) -> None:
     np.testing.assert_allclose([now.surfaces for now in flown], whole.surfaces, rtol=1e-9, atol=1e-9)
 
 
-def test_effects_come_and_go(simulator: Simulator) -> None:
+def test_effects_can_change_in_flight(simulator: Simulator) -> None:
     trim, sound = trim_flight(simulator), simulator.neutral()
     rolled = trim.command + np.array([0.0, 0.05, 0.0, 0.0])
     rates = []

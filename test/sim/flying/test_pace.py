@@ -1,4 +1,4 @@
-"""How many samples are due, by clocks that the test sets."""
+"""The number of samples that are due, by clocks that the test sets."""
 
 import pytest
 
@@ -34,8 +34,8 @@ def test_a_short_pause_is_made_up_for_in_small_pieces() -> None:
     assert pace.skipped == 0.0
 
 
-def test_of_a_long_pause_the_rest_is_not_flown() -> None:
-    """Never more than some samples blindly, however long it was away."""
+def test_the_rest_of_a_long_pause_is_skipped() -> None:
+    """One call never asks for more than a few samples, however long the pause was."""
     pace = Pace(0.0, STEP)
     samples, _ = flown(pace, 0, 0.0, 1.0)
     later, most = flown(pace, samples, 4.0, 5.0)
@@ -45,7 +45,7 @@ def test_of_a_long_pause_the_rest_is_not_flown() -> None:
 
 
 def test_a_machine_that_is_always_too_slow_flies_slower() -> None:
-    """It gets to look ten times a second: five times as long is needed, and nothing is late for ever."""
+    """With ten calls a second the flight takes five times as long, and the delay stays bounded."""
     pace = Pace(0.0, STEP)
     samples, most = flown(pace, 0, 0.0, 10.0, every=0.1)
     assert most == round(AT_ONCE / STEP)
@@ -53,8 +53,8 @@ def test_a_machine_that_is_always_too_slow_flies_slower() -> None:
     assert pace.skipped == pytest.approx(8.0, abs=0.3)
 
 
-def test_how_far_it_was_behind_is_told_once() -> None:
-    """The most since it was last asked, by the clock on the wall, whatever the speed."""
+def test_the_largest_delay_is_reported_once() -> None:
+    """The largest delay since the last call, by the real clock, at any speed."""
     pace = Pace(0.0, STEP, 2.0)
     samples, _ = flown(pace, 0, 0.0, 1.0)
     assert pace.tell() <= STEP

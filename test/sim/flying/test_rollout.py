@@ -1,4 +1,4 @@
-"""The simulator against physics: conservation, order of convergence, and a second simulator written apart."""
+"""The simulator against physics: conservation, order of convergence, and an independent second simulator."""
 
 import dataclasses
 
@@ -76,7 +76,7 @@ def test_runge_kutta_is_of_fourth_order(aircraft):
     assert 3.8 < slope < 4.3
 
 
-def test_neutral_flight_equals_a_simulator_written_apart(simulator, flown):
+def test_neutral_flight_equals_an_independent_simulator(simulator, flown):
     """Euler angles, dimensional equations, scipy's DOP853: Stevens, Lewis & Johnson (2016), ch. 1."""
     trim, inputs, flight = flown
     commands = np.asarray(inputs.commands)
@@ -136,7 +136,7 @@ def test_an_effect_does_nothing_while_its_switches_are_neutral(simulator, flown,
 
 
 def test_slopes_agree_with_finite_differences(simulator, flown):
-    """At a point where every effect is at work, so that no derivative is zero for want of its switch."""
+    """At a point where every effect acts, so that no derivative is zero because its switch is neutral."""
     trim, inputs, _ = flown
     random = np.random.default_rng(0)
     inputs = inputs._replace(
@@ -186,7 +186,7 @@ def test_rollouts_may_be_batched(simulator, flown):
 
 @pytest.mark.parametrize(("elevator", "when"), [(np.nan, r"0\.00"), (0.2, r"0\.\d\d")])
 def test_divergence_is_one_clear_line(elevator, when):
-    """Bad numbers, and an aircraft whose flight model gives energy instead of taking it."""
+    """Impossible numbers, and an aircraft whose model adds energy to the motion."""
     simulator = Simulator(make_aircraft({**DERIVATIVES, "Cm_q": 2000.0, "CD_0": -5.0}), 100.0)
     initial = simulator.initial(18.0, 0.1, 0.0, (0.0, 0.1, 0.0))
     commands = np.tile([elevator, 0, 0, 4.0], (SAMPLES, 1))

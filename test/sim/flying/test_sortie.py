@@ -1,4 +1,4 @@
-"""Flights with the autopilot, weather and noise; and what the recorder makes of them."""
+"""Flights with autopilot, turbulence and noise, and their recorded messages."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def columns(sortie):
 
 
 def test_the_autopilot_holds_attitude_and_speed(fast):
-    """In turbulence an aircraft left alone wanders off; the autopilot keeps it level and at its speed."""
+    """In turbulence the autopilot keeps attitude and airspeed closer to the trim than the aircraft alone does."""
     still = np.zeros((round(30.0 * RATE) + 1, 4))
     held, free = (
         columns(
@@ -47,7 +47,7 @@ def test_the_autopilot_holds_attitude_and_speed(fast):
 
 
 def test_recorded_commands_fly_the_same_flight_again(sortie):
-    """What the autopilot commanded, flown open loop through the same air, is the same flight."""
+    """The commands of the autopilot, flown open loop in the same gusts, give the same flight."""
     again = sortie.simulator.rollout(
         sortie.theta, sortie.trim.initial, sortie.inputs._replace(commands=sortie.flight.commands)
     )
@@ -75,14 +75,14 @@ def test_rotary_gusts_may_be_left_out(fast, moves):
     assert not gusts[0][:, 3:].any() and gusts[1][:, 3:].all()
 
 
-def test_seeds_decide(fast, moves, sortie):
+def test_the_seed_determines_the_flight(fast, moves, sortie):
     again = fly_sortie(fast, moves, sortie.conditions)
     np.testing.assert_array_equal(again.flight.outputs, sortie.flight.outputs)
     other = fly_sortie(fast, moves, SortieConditions(turbulence="light", seed=5))
     assert np.abs(other.flight.outputs - sortie.flight.outputs).max() > 0.1
 
 
-def test_streams_have_their_rates_and_honest_stamps(sortie):
+def test_streams_have_their_rates_and_stamps(sortie):
     streams = Recorder().record(sortie)
     span = SECONDS
     assert [len(s.arrival) for s in streams.by_topic.values()] == [200 * span + 1, 100 * span + 1, 100 * span + 1]

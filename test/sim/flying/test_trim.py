@@ -1,4 +1,4 @@
-"""Trim: nothing accelerates, and what stands in the way is named."""
+"""Trim: no accelerations, and messages that name the unknowns at their limits."""
 
 import dataclasses
 
@@ -67,6 +67,6 @@ def test_two_controls_slip_instead(aircraft):
         (0.0, "expected more than"),
     ],
 )
-def test_what_cannot_fly_is_said(simulator, airspeed, pattern):
+def test_a_missing_trim_is_explained(simulator, airspeed, pattern):
     with pytest.raises(InputError, match=pattern):
         trim_flight(simulator, airspeed)

@@ -1,4 +1,4 @@
-"""The vector of all parameters: in, out, and what is refused with one line that names the known."""
+"""The vector of all parameters: conversions both ways, and errors that name the known parameters."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def test_names_and_scales(simulator):
     assert (simulator.scales > 0).all()
 
 
-def test_there_and_back(simulator):
+def test_values_survive_a_round_trip(simulator):
     theta = simulator.vector(["actuator_lag:time_constant=0.05", "cg_shift:x=0.01:z=-0.02"])
     values = parameters.unpack(simulator.layout, theta)
     assert values["actuator_lag"]["time_constant"] == 0.05

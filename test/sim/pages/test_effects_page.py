@@ -1,4 +1,4 @@
-"""The page of effects is what the code writes, and leaves nothing out."""
+"""The page of effects is the one that the code writes, and it is complete."""
 
 from pathlib import Path
 from xml.etree.ElementTree import parse

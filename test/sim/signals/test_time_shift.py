@@ -1,4 +1,4 @@
-"""Shifts by parts of a sample, and smooth stand-ins for corners."""
+"""Shifts by fractions of a sample, and smooth approximations of corners."""
 
 import jax
 import jax.numpy as jnp
