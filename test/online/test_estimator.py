@@ -181,7 +181,7 @@ def test_what_was_flown_long_ago_is_forgotten(settings: OnlineSettings) -> None:
     for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, t, sample)
     assert estimate(state).derivatives["Cm_de"].value == pytest.approx(0.6 * TRUTH["Cm_de"], rel=0.02)
-    assert len(state.inside) <= 6
+    assert len(state.window_segments) <= 6
 
 
 def test_memory_does_not_grow() -> None:
@@ -193,6 +193,13 @@ def test_memory_does_not_grow() -> None:
     for i, (t, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
         estimator.update(state, t, sample)
         if i in (1199, 2399):
-            watch = state.watch
-            sizes.append([len(state.inside), len(watch.pieces), len(watch.references), len(watch.usual)])
+            change_monitor = state.change_monitor
+            sizes.append(
+                [
+                    len(state.window_segments),
+                    len(change_monitor.pieces),
+                    len(change_monitor.references),
+                    len(change_monitor.typical_statistic),
+                ]
+            )
     assert sizes[0] == sizes[1]

@@ -42,9 +42,9 @@ def test_every_number_has_its_word() -> None:
 @pytest.mark.parametrize("seconds", [3.0, 8.0, 25.0])
 def test_what_is_decided_at_a_sample_is_what_is_published_of_it(method: str, seconds: float) -> None:
     state = flown(seconds, method)
-    current, renewed = current_solution(state), state.renewed
-    assert current is not None and renewed is not None
-    codes = judge(state, renewed, current, state.transform.last)
+    current, latest = current_solution(state), state.latest
+    assert current is not None and latest is not None
+    codes = judge(state, latest, current, state.transform.last)
     told = estimate(state).derivatives
     assert state.model.vocabulary.texts(codes) == tuple(d.status for d in told.values())
     assert [code == status.OK for code in codes.tolist()] == [d.valid for d in told.values()]
@@ -54,23 +54,23 @@ def test_what_is_decided_at_a_sample_is_what_is_published_of_it(method: str, sec
 
 def test_what_holds_of_a_moment_holds_of_all_estimates() -> None:
     state = flown(12.0)
-    current, renewed, last = current_solution(state), state.renewed, state.transform.last
-    assert current is not None and renewed is not None
-    assert set(judge(state, renewed, current, last + 1.01 * STALE)) == {status.STALE}
+    current, latest, last = current_solution(state), state.latest, state.transform.last
+    assert current is not None and latest is not None
+    assert set(judge(state, latest, current, last + 1.01 * STALE)) == {status.STALE}
     state.changed_at = last - 0.99 * SETTLING
-    assert set(judge(state, renewed, current, last)) == {status.CHANGED}
+    assert set(judge(state, latest, current, last)) == {status.CHANGED}
 
 
 def test_intervals_without_an_end_are_not_valid() -> None:
     """However small the standard error is said to be that is allowed."""
     state = flown(25.0)
-    current, renewed = current_solution(state), state.renewed
-    assert current is not None and renewed is not None
-    good = judge(state, renewed, current, state.transform.last) == status.OK
+    current, latest = current_solution(state), state.latest
+    assert current is not None and latest is not None
+    good = judge(state, latest, current, state.transform.last) == status.OK
     assert good.any()
-    renewed.bend = renewed.bend._replace(curve=np.full(good.shape, 1e12))
-    renewed.grounds = None
-    assert not (judge(state, renewed, current, state.transform.last) == status.OK).any()
+    latest.anderson_rubin = latest.anderson_rubin._replace(curve=np.full(good.shape, 1e12))
+    latest.basis = None
+    assert not (judge(state, latest, current, state.transform.last) == status.OK).any()
     assert all(np.isinf(d.upper) for d in estimate_of(state, current).derivatives.values())
 
 
@@ -81,7 +81,7 @@ def test_where_equations_cannot_be_solved_nothing_is_excited() -> None:
     state = estimator.init(AIRCRAFT, OnlineSettings(method="sls_rft"))
     for t, sample in zip(time.tolist(), still.tolist(), strict=True):
         estimator.update(state, t, sample)
-    current, renewed = current_solution(state), state.renewed
-    assert current is not None and renewed is not None
+    current, latest = current_solution(state), state.latest
+    assert current is not None and latest is not None
     current.solution.usable = np.array(False)
-    assert set(judge(state, renewed, current, state.transform.last)) == {status.NOT_EXCITED}
+    assert set(judge(state, latest, current, state.transform.last)) == {status.NOT_EXCITED}

@@ -172,7 +172,7 @@ def doubt(
     aircraft: Aircraft,
     layout: Layout,
     lines: Spectrum,
-    plan: NormalEquations,
+    equations: NormalEquations,
     solution: Solution,
     info: Information,
 ) -> Array:
@@ -181,18 +181,18 @@ def doubt(
     An error e of a regressor moves the solution by theta (Z'A)^-1 Z'e. Of e only the energy is known: the most that it
     can do, by Cauchy and Schwarz, is counted.
     """
-    covariance = np.zeros((len(plan.coefficients), plan.columns.size, plan.columns.size))
+    covariance = np.zeros((len(equations.coefficients), equations.columns.size, equations.columns.size))
     if filter_.missing is None or not filter_.active or not solution.usable:
         return covariance
     gram = info.grams.sum(axis=0)
-    outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
+    outer = gram[equations.instruments[:, None], equations.instruments] * equations.same_block
     reach = solution.inverse @ outer @ solution.inverse.T
     energies = _error_energies(filter_, at, aircraft, layout, lines, info)
     for name, missing, energy in zip(("alpha", "beta"), filter_.missing, energies, strict=True):
         if missing:
-            theta = np.array([regressor == name for regressor in plan.regressors]) @ solution.theta
+            theta = np.array([regressor == name for regressor in equations.regressors]) @ solution.theta
             covariance += (energy * theta**2)[:, None, None] * reach
-    return covariance * plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
+    return covariance * equations.belongs.T[:, :, None] * equations.belongs.T[:, None, :]
 
 
 def _error_energies(

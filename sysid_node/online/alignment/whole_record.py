@@ -1,9 +1,8 @@
 """Aligned samples of a recording: all at once where that gives the same bits, else message by message.
 
 ``flight.align`` aligns all messages of a recording at once, for the batch methods. A replay uses it, too: where no
-clock leapt and topics came together, it gives the bits of ``streaming``, and saves about a quarter of a replay's time.
-Measured on 60 s of 500 messages a second: read 0.05 s, align message by message 0.33 s (at once 0.01 s), update 0.48 s,
-estimates at 20 Hz 0.58 s; with functions that did all this for the whole record at once, it took 0.6 s together.
+clock leapt and no topic lagged behind by more than the buffer, it gives the bits of ``streaming``. Aligning a bag of
+60 s takes 0.01 s as a whole and 0.33 s message by message, which is why this one twin is kept.
 """
 
 from __future__ import annotations

@@ -52,19 +52,21 @@ class ChangeMonitor:
 
     pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, W)
     references: deque[Reference] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))
-    usual: deque[Array] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))  # (C,) F where nothing changes
-    doubted: dict[int, Flags] = field(default_factory=dict)  # (C,) by span
-    lost: Flags | None = None  # (C,)
-    disowned: Flags | None = None  # (C,) by what was learned in well-excited flight
-    looks: int = 0
+    typical_statistic: deque[Array] = field(
+        default_factory=lambda: deque(maxlen=SPANS[-1] + 1)
+    )  # (C,) F where nothing changes
+    contradicted: dict[int, Flags] = field(default_factory=dict)  # (C,) by span
+    outside_model: Flags | None = None  # (C,)
+    contradicted_by_excited: Flags | None = None  # (C,) by what was learned in well-excited flight
+    examinations: int = 0
 
 
 @dataclass(frozen=True)
 class ChangeDecision:
     """What the last seconds say of each coefficient (C,), and since when (s) all must be learned anew, if it must."""
 
-    doubted: Flags
-    lost: Flags
+    contradicted: Flags
+    outside_model: Flags
     since: float | None = None
     changed: bool = False  # whether it is the aircraft that has changed
 
@@ -76,17 +78,17 @@ class ChangeTests:
     full: NormalEquations
     model: InstrumentModel | None
     spectrum: Spectrum
-    watch: ChangeMonitor
+    change_monitor: ChangeMonitor
     now: float
     memory: float  # s, inf = nothing is forgotten
 
     def lines(self, span: int) -> tuple[float, Array]:
         """Start (s) and clean lines of the last ``span`` pieces."""
-        return self.watch.pieces[-span][0], clean_lines(_summed(self.watch.pieces, span), self.model)
+        return self.change_monitor.pieces[-span][0], clean_lines(_summed(self.change_monitor.pieces, span), self.model)
 
     def contradictions(self, spans: Iterable[int]) -> Iterator[tuple[int, ScoreTest]]:
         """How the last pieces contradict the estimates from before them: of the ``spans`` (rising) that have such."""
-        known = list(_stretches(self.watch, self.watch.pieces, self.now, spans))
+        known = list(_stretches(self.change_monitor, self.change_monitor.pieces, self.now, spans))
         return zip(spans, _tested(known, self.model, self.spectrum), strict=False)
 
 
@@ -105,12 +107,12 @@ def _summed(pieces: Sequence[tuple[float, Array]], span: int) -> Array:
 
 
 def _stretches(
-    watch: ChangeMonitor, pieces: Sequence[tuple[float, Array]], end: float, spans: Iterable[int]
+    change_monitor: ChangeMonitor, pieces: Sequence[tuple[float, Array]], end: float, spans: Iterable[int]
 ) -> Iterator[_Stretch]:
     """The last of the ``pieces``, up to ``end`` (s): of the ``spans`` up to the first without estimates before it."""
     for span in spans:
         start = pieces[-span][0] if span <= len(pieces) else -math.inf
-        reference = next((r for r in reversed(watch.references) if r.time <= start + 1e-6), None)
+        reference = next((r for r in reversed(change_monitor.references) if r.time <= start + 1e-6), None)
         if reference is None:
             return
         yield _Stretch(start, end, _summed(pieces, span), reference)
@@ -118,7 +120,7 @@ def _stretches(
 
 def _tested(stretches: Sequence[_Stretch], model: InstrumentModel | None, spectrum: Spectrum) -> Iterator[ScoreTest]:
     """How each contradicts the estimates from before it; those by the same equations at once."""
-    for _, some in groupby(stretches, key=lambda stretch: id(stretch.before.plan)):
+    for _, some in groupby(stretches, key=lambda stretch: id(stretch.before.equations)):
         starts, ends, parts, references = zip(*some, strict=True)
         lines, duration = clean_lines(np.array(parts), model), np.array(ends) - np.array(starts)
         yield from score_test(Reference.stacked(references), lines, spectrum, duration).each()
@@ -129,65 +131,75 @@ def _due(look: int) -> list[int]:
     return [span for span in SPANS if not look % max(span // EVERY, 1)]
 
 
-def examine(looking: ChangeTests, experiences: list[ExcitedSegments]) -> ChangeDecision:
+def examine(tests: ChangeTests, excited_segments: list[ExcitedSegments]) -> ChangeDecision:
     """Test the spans that are due; see the module's text."""
-    watch, C = looking.watch, len(looking.full.coefficients)
-    watch.looks += 1
+    change_monitor, C = tests.change_monitor, len(tests.full.coefficients)
+    change_monitor.examinations += 1
     surest = 1.0
-    for span, found in looking.contradictions(_due(watch.looks)):
+    for span, found in tests.contradictions(_due(change_monitor.examinations)):
         known = found.freedom >= KNOWN
-        usual = _usual(watch, span, C)
-        watch.doubted[span] = known & (found.chance(usual) < DOUBT)
-        surest = min(surest, float(np.where(known, found.chance(MARGIN * usual), 1.0).min()))
+        typical_statistic = _typical_statistic(change_monitor, span, C)
+        change_monitor.contradicted[span] = known & (found.chance(typical_statistic) < DOUBT)
+        surest = min(surest, float(np.where(known, found.chance(MARGIN * typical_statistic), 1.0).min()))
         if span == USUAL:
-            watch.lost = known & (found.share > LOST) & (found.unexplained > NOISE_RATIO)
-            _get_used_to(watch, found, C)
+            change_monitor.outside_model = known & (found.share > LOST) & (found.unexplained > NOISE_RATIO)
+            _update_typical_statistic(change_monitor, found, C)
     none = np.zeros(C, dtype=bool)
-    doubted = np.any([none if watch.disowned is None else watch.disowned, *watch.doubted.values()], axis=0)
-    lost = none if watch.lost is None else watch.lost
+    contradicted = np.any(
+        [
+            none if change_monitor.contradicted_by_excited is None else change_monitor.contradicted_by_excited,
+            *change_monitor.contradicted.values(),
+        ],
+        axis=0,
+    )
+    outside_model = none if change_monitor.outside_model is None else change_monitor.outside_model
     if surest >= FALSE_ALARM:
-        return ChangeDecision(doubted, lost)
-    span = _onset(looking)
-    changed = any(_contradicted(looking, span, experience, block) for block, experience in enumerate(experiences))
+        return ChangeDecision(contradicted, outside_model)
+    span = _onset(tests)
+    changed = any(_contradicted(tests, span, excited, block) for block, excited in enumerate(excited_segments))
     # the change fell somewhere in the oldest piece: what came after it is all new
-    return ChangeDecision(doubted, lost, watch.pieces[1 - span][0], changed)
+    return ChangeDecision(contradicted, outside_model, change_monitor.pieces[1 - span][0], changed)
 
 
-def _usual(watch: ChangeMonitor, span: int, C: int) -> Array:
+def _typical_statistic(change_monitor: ChangeMonitor, span: int, C: int) -> Array:
     """(C,) the usual F before the last ``span`` pieces, at least 1."""
-    return watch.usual[-span] if span <= len(watch.usual) else np.ones(C)
+    return change_monitor.typical_statistic[-span] if span <= len(change_monitor.typical_statistic) else np.ones(C)
 
 
-def _get_used_to(watch: ChangeMonitor, found: ScoreTest, C: int) -> None:
+def _update_typical_statistic(change_monitor: ChangeMonitor, found: ScoreTest, C: int) -> None:
     """Where models are not exact F is usually more than chance makes it."""
-    last = watch.usual[-1] if watch.usual else np.ones(C)
-    watch.usual.append(np.maximum(last + LEARNING * (np.minimum(found.statistic, OUTLIER) - last), 1.0))
+    last = change_monitor.typical_statistic[-1] if change_monitor.typical_statistic else np.ones(C)
+    change_monitor.typical_statistic.append(
+        np.maximum(last + LEARNING * (np.minimum(found.statistic, OUTLIER) - last), 1.0)
+    )
 
 
-def _onset(looking: ChangeTests) -> int:
+def _onset(tests: ChangeTests) -> int:
     """Pieces since the change: the shortest span that contradicts about as much as any."""
-    every = looking.contradictions(range(SPANS[0], len(looking.watch.pieces) + 1))
+    every = tests.contradictions(range(SPANS[0], len(tests.change_monitor.pieces) + 1))
     quadratics = [float((found.statistic * found.count)[found.freedom >= KNOWN].max(initial=0.0)) for _, found in every]
     return SPANS[0] + int(np.argmax(np.array(quadratics) >= AS_MUCH * max(quadratics)))
 
 
-def _contradicted(looking: ChangeTests, span: int, experience: ExcitedSegments, block: int) -> bool:
+def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block: int) -> bool:
     """Whether the last ``span`` pieces contradict earlier manoeuvres that moved the controls as much."""
-    start, lines = looking.lines(span)
-    reference = estimates_of(experience, looking.full, looking.now - looking.memory, start)
-    if reference is None or experience.beyond((lines[:, experience.controls] ** 2).sum(axis=0)):
+    start, lines = tests.lines(span)
+    reference = estimates_of(excited, tests.full, tests.now - tests.memory, start)
+    if reference is None or excited.exceeds_all((lines[:, excited.controls] ** 2).sum(axis=0)):
         return False
-    found = score_test(reference, lines, looking.spectrum, looking.now - start)
-    mine = (looking.full.block == block) & (found.freedom >= KNOWN)
-    return bool((found.chance(MARGIN)[mine] < FALSE_ALARM).any())
+    found = score_test(reference, lines, tests.spectrum, tests.now - start)
+    tested = (tests.full.block == block) & (found.freedom >= KNOWN)
+    return bool((found.chance(MARGIN)[tested] < FALSE_ALARM).any())
 
 
-def compare(full: NormalEquations, watch: ChangeMonitor, experiences: list[ExcitedSegments], memory: float) -> None:
+def compare(
+    full: NormalEquations, change_monitor: ChangeMonitor, excited_segments: list[ExcitedSegments], memory: float
+) -> None:
     """Doubt the estimates of a long time that those from well-excited flight contradict."""
-    published = watch.references[-1]
-    watch.disowned = np.zeros(len(full.coefficients), dtype=bool)
-    for block, experience in enumerate(experiences):
-        reference = estimates_of(experience, full, published.time - memory, published.time)
+    published = change_monitor.references[-1]
+    change_monitor.contradicted_by_excited = np.zeros(len(full.coefficients), dtype=bool)
+    for block, excited in enumerate(excited_segments):
+        reference = estimates_of(excited, full, published.time - memory, published.time)
         if reference is not None:
             firm = (full.block == block) & (reference.uncertainty.freedom >= KNOWN)
-            watch.disowned |= firm & (disagreement(reference, published) < DOUBT)
+            change_monitor.contradicted_by_excited |= firm & (disagreement(reference, published) < DOUBT)

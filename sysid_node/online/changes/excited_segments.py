@@ -47,18 +47,18 @@ class ExcitedSegments:
         """(m,) the largest energy of each control in a segment."""
         return np.asarray(np.max([np.zeros(self.controls.size), *(s.energy for s in self.segments)], axis=0))
 
-    def within_reach(self, energy: Array) -> bool:
+    def is_comparable(self, energy: Array) -> bool:
         """Whether a control moved much, beside how much it ever did."""
         return bool((energy > COMPARABLE * self.peaks()).any())
 
-    def beyond(self, energy: Array) -> bool:
+    def exceeds_all(self, energy: Array) -> bool:
         """Whether a control moved much more than it ever did."""
         return bool((COMPARABLE * energy > self.peaks()).any())
 
 
-def no_excited_segments(plan: NormalEquations, layout: Layout) -> list[ExcitedSegments]:
+def no_excited_segments(equations: NormalEquations, layout: Layout) -> list[ExcitedSegments]:
     """None as yet, for each block of the plan."""
-    blocks = (plan.columns[plan.group == block] for block in range(int(plan.group.max()) + 1))
+    blocks = (equations.columns[equations.group == block] for block in range(int(equations.group.max()) + 1))
     moved = np.arange(layout.width)[layout.deflections]
     return [ExcitedSegments(columns[np.isin(columns, moved)]) for columns in blocks]
 
@@ -66,22 +66,22 @@ def no_excited_segments(plan: NormalEquations, layout: Layout) -> list[ExcitedSe
 def remember(known: Sequence[ExcitedSegments], said: Information, end: float) -> None:
     """Remember a segment that ended at ``end`` (s) where its controls moved much."""
     energies = said.grams.sum(axis=0).diagonal()
-    for experience in known:
-        energy = energies[experience.controls]
-        if experience.within_reach(energy):
-            experience.segments.append(Segment(end, energy, said))
+    for excited in known:
+        energy = energies[excited.controls]
+        if excited.is_comparable(energy):
+            excited.segments.append(Segment(end, energy, said))
 
 
-def estimates_of(experience: ExcitedSegments, full: NormalEquations, since: float, before: float) -> Reference | None:
+def estimates_of(excited: ExcitedSegments, full: NormalEquations, since: float, before: float) -> Reference | None:
     """The estimates by the well-excited segments that ended in ``since``..``before`` (s); None where there are none."""
-    chosen = [s for s in experience.segments if since < s.end <= before + 1e-6 and experience.within_reach(s.energy)]
+    chosen = [s for s in excited.segments if since < s.end <= before + 1e-6 and excited.is_comparable(s.energy)]
     if not chosen:
         return None
     said = chosen[0].said
     for segment in chosen[1:]:
         said = said + segment.said
     gram = said.grams.sum(axis=0)
-    hold = least_squares.instrument_strength(full, least_squares.solve(full, gram), said)
-    plan = normal_equations.with_strong_instruments(full, hold.strength)
-    solution = least_squares.solve(plan, gram)
-    return Reference(chosen[-1].end, plan, solution, least_squares.uncertainty(plan, solution, said))
+    instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), said)
+    equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
+    solution = least_squares.solve(equations, gram)
+    return Reference(chosen[-1].end, equations, solution, least_squares.uncertainty(equations, solution, said))

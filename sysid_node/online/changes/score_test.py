@@ -42,7 +42,7 @@ class Reference:
     """The estimates as they stood at one time (s), and by which equations."""
 
     time: float
-    plan: NormalEquations
+    equations: NormalEquations
     solution: Solution
     uncertainty: Uncertainty
 
@@ -50,7 +50,7 @@ class Reference:
     def stacked(cls, some: Sequence[Reference]) -> Reference:
         """Estimates by the same equations with an axis in front."""
         solution = Solution(*_columns([one.solution for one in some]))
-        return cls(some[0].time, some[0].plan, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
+        return cls(some[0].time, some[0].equations, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
 
 
 def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
@@ -81,33 +81,33 @@ class ScoreTest:
 
 def score_test(reference: Reference, lines: Array, spectrum: Spectrum, duration: Any) -> ScoreTest:
     """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
-    plan, known = reference.plan, reference.uncertainty
+    equations, known = reference.equations, reference.uncertainty
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
     gram = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
-    regressed = gram.take(plan.columns, axis=-1)
-    left_over = gram.take(plan.outputs, axis=-1) - regressed @ reference.solution.theta
-    count = plan.mine.sum(axis=0)
-    rest = _unexplained(plan, reference, regressed, left_over)
+    regressed = gram.take(equations.columns, axis=-1)
+    left_over = gram.take(equations.outputs, axis=-1) - regressed @ reference.solution.theta
+    count = equations.belongs.sum(axis=0)
+    rest = _unexplained(equations, reference, regressed, left_over)
     energy = 0.5 * lines.shape[-2] * np.asarray(duration)[..., None]
     density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
     excess = density / np.maximum(known.density, TINY)
-    Z = lines.take(plan.instruments, axis=-1)[..., None, :, :]
+    Z = lines.take(equations.instruments, axis=-1)[..., None, :, :]
     of_each = _band_of_each(tuple(band.stop for band in spectrum.bands))
     noise = (Z.swapaxes(-1, -2) * known.bands.take(of_each, axis=-1)[..., None, :]) @ Z
     noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
-    G = (regressed.take(plan.instruments, axis=-2) * plan.same)[..., None, :, :]
+    G = (regressed.take(equations.instruments, axis=-2) * equations.same_block)[..., None, :, :]
     spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
-    score = (left_over.take(plan.instruments, axis=-2) * plan.mine).swapaxes(-1, -2)
-    motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(plan.outputs, axis=-1), TINY)
-    return ScoreTest(_normalised(plan, spread, score) / count, count, known.freedom, excess, rest / motion)
+    score = (left_over.take(equations.instruments, axis=-2) * equations.belongs).swapaxes(-1, -2)
+    motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(equations.outputs, axis=-1), TINY)
+    return ScoreTest(_normalised(equations, spread, score) / count, count, known.freedom, excess, rest / motion)
 
 
-def _unexplained(plan: NormalEquations, reference: Reference, regressed: Array, left_over: Array) -> Array:
+def _unexplained(equations: NormalEquations, reference: Reference, regressed: Array, left_over: Array) -> Array:
     """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
-    misfit: Array = left_over.take(plan.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
-    score = left_over.take(plan.columns, axis=-2) * plan.mine
-    normal = regressed.take(plan.columns, axis=-2) * plan.same
-    normal += plan.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
+    misfit: Array = left_over.take(equations.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
+    score = left_over.take(equations.columns, axis=-2) * equations.belongs
+    normal = regressed.take(equations.columns, axis=-2) * equations.same_block
+    normal += equations.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
     solved = np.empty_like(score)
     for one, right, found in zip(_each(normal), _each(score), _each(solved), strict=True):
         found[:] = dposv(one, right)[1]
@@ -126,22 +126,22 @@ def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
     return np.tile(np.searchsorted(ends, np.arange(ends[-1]), side="right"), 2)
 
 
-def _normalised(plan: NormalEquations, spread: Array, score: Array) -> Array:
+def _normalised(equations: NormalEquations, spread: Array, score: Array) -> Array:
     """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong."""
-    mine = plan.mine.T
-    variance = spread.diagonal(axis1=-2, axis2=-1) * mine
+    belongs = equations.belongs.T
+    variance = spread.diagonal(axis1=-2, axis2=-1) * belongs
     weight = np.where(variance > 0.0, 1.0 / np.sqrt(np.maximum(variance, TINY**2)), 0.0)
     correlation = spread * weight[..., None] * weight[..., None, :]
-    correlation += plan.unit * (RIDGE + (weight == 0.0))[..., None]
+    correlation += equations.unit * (RIDGE + (weight == 0.0))[..., None]
     scaled = score * weight
     return np.asarray((scaled * np.linalg.solve(correlation, scaled[..., None])[..., 0]).sum(axis=-1))
 
 
 def disagreement(one: Reference, other: Reference) -> Array:
     """(C,) the chance that the estimates of two stretches differ as much, were they independent and both unbiased."""
-    plan = one.plan
-    difference = ((one.solution.theta - other.solution.theta) * plan.mine).T
-    count = plan.mine.sum(axis=0)
+    equations = one.equations
+    difference = ((one.solution.theta - other.solution.theta) * equations.belongs).T
+    count = equations.belongs.sum(axis=0)
     spread = one.uncertainty.covariance + other.uncertainty.covariance
     freedom = np.minimum(one.uncertainty.freedom, other.uncertainty.freedom)
-    return np.asarray(fdtrc(count, np.maximum(freedom, 1.0), _normalised(plan, spread, difference) / count))
+    return np.asarray(fdtrc(count, np.maximum(freedom, 1.0), _normalised(equations, spread, difference) / count))

@@ -33,64 +33,66 @@ class CurrentSolution:
 
 def current_solution(state: EstimatorState) -> CurrentSolution | None:
     """Values and variances of all derivatives with every sample so far; None before the first half second of data."""
-    renewed, plan = state.renewed, state.plan
-    if renewed is None:
+    latest, equations = state.latest, state.equations
+    if latest is None:
         return None
     lines, time = sampled_transform.current(state.transform), state.transform.last
-    integrals = renewed.integrals + lines[-1]
-    gram = products(lines, state.model.auxiliary)
-    gram += renewed.base
-    growth, noise = growth_since(renewed, time), renewed.compensation
-    solution = least_squares.solve(plan, gram, None if noise is None else noise * growth)
+    integrals = latest.integrals + lines[-1]
+    gram = products(lines, state.model.instrument_model)
+    gram += latest.base
+    growth, noise = growth_since(latest, time), latest.compensation
+    solution = least_squares.solve(equations, gram, None if noise is None else noise * growth)
     size = np.abs(solution.inverse.diagonal())
     slopes = solution.theta.T
     if state.model.settings.use_prior:
-        slopes, variances = _with_beliefs(state, renewed, slopes)
+        slopes, variances = _with_prior(state, latest, slopes)
     else:
-        variances = slope_variances(renewed, solution.residual, size, growth)
+        variances = slope_variances(latest, solution.residual, size, growth)
     C, P = slopes.shape
     numbers = np.empty((2, C, P + 1))  # values and variances of the slopes and, behind them, of the offsets
     numbers[0, :, :P], numbers[1, :, :P] = slopes, variances
-    numbers[0, :, P], numbers[1, :, P] = _offsets(plan, renewed, integrals, slopes)
+    numbers[0, :, P], numbers[1, :, P] = _offsets(equations, latest, integrals, slopes)
     values, squares = numbers.reshape(2, C * (P + 1)).take(state.model.table.place, axis=-1)
     return CurrentSolution(time, values, np.maximum(squares, 0.0), solution, gram, size)
 
 
-def slope_variances(renewed: SegmentSolution, residual: Array, size: Array, growth: float) -> Array:
+def slope_variances(latest: SegmentSolution, residual: Array, size: Array, growth: float) -> Array:
     """(C, P) squared standard errors of the slopes, before the aircraft file's values are counted in.
 
     ``residual`` (C,) and ``size`` (P,): of the present solution; ``growth``: see ``growth_since``.
     """
     variances: Array = residual[:, None].dot(size[None] / growth)
-    variances *= renewed.factors
+    variances *= latest.factors
     return variances
 
 
-def growth_since(renewed: SegmentSolution, time: float) -> float:
+def growth_since(latest: SegmentSolution, time: float) -> float:
     """How many times as much time is counted at ``time`` (s) as at the last renewal.
 
     The noise's part in the equations has grown by so much since, and the variances have shrunk by it.
     """
-    energy = renewed.total.energy
-    return (energy + (time - renewed.time)) / max(energy, 1e-9)
+    energy = latest.total.energy
+    return (energy + (time - latest.time)) / max(energy, 1e-9)
 
 
-def _with_beliefs(state: EstimatorState, renewed: SegmentSolution, slopes: Array) -> tuple[Array, Array]:
+def _with_prior(state: EstimatorState, latest: SegmentSolution, slopes: Array) -> tuple[Array, Array]:
     """(C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their variances."""
-    covariance = renewed.uncertainty.covariance
-    values, spread = weighed(state.plan, slopes.T, covariance, *state.model.believed)
+    covariance = latest.uncertainty.covariance
+    values, spread = weighed(state.equations, slopes.T, covariance, *state.model.prior)
     return values.T, spread.diagonal(axis1=1, axis2=2)
 
 
-def _offsets(plan: NormalEquations, renewed: SegmentSolution, integrals: Array, slopes: Array) -> tuple[Array, Array]:
+def _offsets(
+    equations: NormalEquations, latest: SegmentSolution, integrals: Array, slopes: Array
+) -> tuple[Array, Array]:
     """(C,) offsets and their variances, from the ``integrals`` (W,) of all signals.
 
     At zero frequency k C_0 = y - sum k C_j x_j, with the ``slopes`` (C, P).
     """
-    P, C = plan.mine.shape
-    weight, sums = integrals[OFFSET], integrals.take(plan.sides)
+    P, C = equations.belongs.shape
+    weight, sums = integrals[OFFSET], integrals.take(equations.sides)
     x, y = sums[:P, None], sums[P:]
     left = y - slopes.dot(x)[:, 0]
     # x' covariance x
-    spread = renewed.uncertainty.covariance.reshape(C * P, P).dot(x).reshape(C, P).dot(x)[:, 0]
-    return left / weight, (spread + renewed.trim_noise) / weight / weight
+    spread = latest.uncertainty.covariance.reshape(C * P, P).dot(x).reshape(C, P).dot(x)[:, 0]
+    return left / weight, (spread + latest.trim_noise) / weight / weight

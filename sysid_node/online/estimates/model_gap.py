@@ -27,26 +27,26 @@ class CoefficientGap(NamedTuple):
 
 def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[CoefficientGap]:
     """Gap of every coefficient whose equation can be formed, at the moment ``current``; empty before there is one."""
-    renewed = state.renewed
-    if current is None or renewed is None or not current.solution.usable:
+    latest = state.latest
+    if current is None or latest is None or not current.solution.usable:
         return []
-    plan, (values, precisions) = state.plan, state.model.believed
+    equations, (values, precisions) = state.equations, state.model.prior
     start, _, stop = state.model.settings.frequencies
-    per_energy = 2.0 * (stop - start) / max(float(renewed.total.traces.sum()), 1e-12)
+    per_energy = 2.0 * (stop - start) / max(float(latest.total.traces.sum()), 1e-12)
     gram, theta = current.gram, current.solution.theta
-    v = least_squares.misfits(plan, values)
+    v = least_squares.misfits(equations, values)
     energy = np.maximum(((gram @ v) * v).sum(axis=0), 0.0)
     motion = current.solution.motion
     relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))
-    growth = growth_since(renewed, current.time)
-    variances = slope_variances(renewed, current.solution.residual, current.size, growth)
+    growth = growth_since(latest, current.time)
+    variances = slope_variances(latest, current.solution.residual, current.size, growth)
     spread = np.sqrt(np.maximum(variances.T, 0.0) + _tolerances(precisions))
-    deviations = np.where(plan.mine > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
+    deviations = np.where(equations.belongs > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()
-    names = [f"{c}_{plan.regressors[i]}" for c, i in zip(plan.coefficients, worst, strict=True)]
-    noise = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density)
+    names = [f"{c}_{equations.regressors[i]}" for c, i in zip(equations.coefficients, worst, strict=True)]
+    noise = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density)
     stds = (column.tolist() for column in (np.sqrt(per_energy * energy), noise, relative))
-    return list(map(CoefficientGap, plan.coefficients, *stds, names, deviations.max(axis=0).tolist()))
+    return list(map(CoefficientGap, equations.coefficients, *stds, names, deviations.max(axis=0).tolist()))
 
 
 def _tolerances(precisions: Array) -> Array:

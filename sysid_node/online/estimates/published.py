@@ -26,33 +26,35 @@ def estimate(state: EstimatorState, now: float | None = None) -> Estimates:
 
 def estimate_of(state: EstimatorState, current: CurrentSolution | None, now: float | None = None) -> Estimates:
     """The same from what was just solved for."""
-    time, renewed = state.transform.last, state.renewed
-    if current is None or renewed is None:
+    time, latest = state.transform.last, state.latest
+    if current is None or latest is None:
         return Estimates(time, _nothing_known(state), {})
-    codes = judge(state, renewed, current, time if now is None else now)
+    codes = judge(state, latest, current, time if now is None else now)
     model = state.model
-    numbers = _intervals(state, renewed, current)
+    numbers = _intervals(state, latest, current)
     missing = len(model.table.unformed)
     if missing:
         numbers = np.concatenate([numbers, np.tile([math.nan, math.inf, -math.inf, math.inf], (missing, 1))])
         codes = np.concatenate([codes, np.full(missing, status.INERTIA, codes.dtype)])
     derivatives = DerivativeRows(model.table.all_names, numbers, codes, model.vocabulary)
-    return Estimates(time, derivatives, FitRows(model.plan.coefficients, _fits(state, renewed, current)))
+    return Estimates(time, derivatives, FitRows(model.equations.coefficients, _fits(state, latest, current)))
 
 
-def _intervals(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolution) -> Array:
+def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:
     """(D, 4) value, standard error, lower and upper end of the interval of each derivative."""
     values, variances = current.values, current.variances
-    below, above = weak_instruments.interval_arms(validity_basis(state, renewed).squares * variances, renewed.bend)
+    below, above = weak_instruments.interval_arms(
+        validity_basis(state, latest).squares * variances, latest.anderson_rubin
+    )
     return np.stack([values, np.sqrt(variances), values - below, values + above], axis=-1)
 
 
-def _fits(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolution) -> Array:
+def _fits(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:
     """(C, 4) numbers of the fits, see ``rows``."""
     solution = current.solution
     fits = np.empty((solution.motion.size, 4))
     explained = 1.0 - solution.residual / np.maximum(solution.motion, 1e-300)
-    fits[:, 0], fits[:, 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), validity_basis(state, renewed).fits
+    fits[:, 0], fits[:, 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), validity_basis(state, latest).fits
     return fits
 
 

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 ENOUGH_FREEDOM = 5.0  # degrees of freedom under which an interval is not trusted
-HOPELESS = 1e4  # variance inflation beyond which regressors cannot be told apart at all
+INDISTINGUISHABLE = 1e4  # variance inflation beyond which regressors cannot be told apart at all
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
 STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
@@ -30,71 +30,73 @@ NARROWEST = 1e-12  # share of an estimate under which its standard error is roun
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
-def validity_basis(state: EstimatorState, renewed: SegmentSolution) -> ValidityBasis:
+def validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityBasis:
     """What the judgement of all estimates rests on until the next renewal; weighed once."""
-    renewed.grounds = renewed.grounds or _weigh(state, renewed)
-    return renewed.grounds
+    latest.basis = latest.basis or _validity_basis(state, latest)
+    return latest.basis
 
 
-def _weigh(state: EstimatorState, renewed: SegmentSolution) -> ValidityBasis:
+def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityBasis:
     """See ``grounds_of``."""
-    table, plan, freedom = state.model.table, state.plan, renewed.uncertainty.freedom
+    table, equations, freedom = state.model.table, state.equations, latest.uncertainty.freedom
     c = table.coefficient
     start, _, stop = state.model.settings.frequencies
     # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
-    held = np.where(plan.mine > 0.0, renewed.hold.strength[:, None], np.inf).min(axis=0)
-    against, squares = _against(state, renewed), student_95(freedom)[c] ** 2
-    cautions = np.where(table.offset, renewed.prudence.max(axis=0)[c], renewed.prudence[table.unknown, c])
-    caution, longest = np.maximum(cautions, 1.0), renewed.bend.longest(squares)
-    stds, samples = np.sqrt(2.0 * (stop - start) * renewed.uncertainty.density), round(renewed.total.samples)
+    held = np.where(equations.belongs > 0.0, latest.instrument_strength.strength[:, None], np.inf).min(axis=0)
+    objections, squares = _objections(state, latest), student_95(freedom)[c] ** 2
+    cautions = np.where(
+        table.offset, latest.selection_bias_factors.max(axis=0)[c], latest.selection_bias_factors[table.unknown, c]
+    )
+    caution, longest = np.maximum(cautions, 1.0), latest.anderson_rubin.longest(squares)
+    stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
     return ValidityBasis(
-        sound=(held >= normal_equations.STRONG)[c] & (against == status.OK),
-        against=against,
+        unobjected=(held >= normal_equations.STRONG)[c] & (objections == status.OK),
+        objections=objections,
         squares=squares,
         longest=longest,
         allowed=np.minimum(table.allowed**2 / caution, longest),
         relative=table.relative**2 / caution if table.relative.any() else None,
-        floor=np.maximum(BURIED * renewed.total.bias.take(plan.energy), least_squares.TINY),
+        floor=np.maximum(BURIED * latest.total.bias.take(equations.energy), least_squares.TINY),
         fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
     )
 
 
-def _against(state: EstimatorState, renewed: SegmentSolution) -> Codes:
+def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     """(D,) what speaks against each whatever the present says; what is found later counts more."""
     table, words = state.model.table, state.model.vocabulary
     c = table.coefficient
-    against = np.zeros(c.size, np.uint8)
-    spoilt = renewed.timing.spoilt[table.unknown, c] & ~table.offset
-    against[spoilt] = [words.code(f"{renewed.timing.blamed[i]} not on time") for i in c[spoilt].tolist()]
-    against[(renewed.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
+    objections = np.zeros(c.size, np.uint8)
+    biased = latest.lag_test.biased[table.unknown, c] & ~table.offset
+    objections[biased] = [words.code(f"{latest.lag_test.blamed_control[i]} not on time") for i in c[biased].tolist()]
+    objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
     if not state.thrust_known:
-        against[table.needs_thrust] = status.THRUST
+        objections[table.needs_thrust] = status.THRUST
     if state.flow.active:
         structure, at = state.model.aircraft.model_structure, state.piece_start
         for i, name in enumerate(table.names):
             flaw = flow_angle_filter.flaw(state.flow, at, name, structure[name.partition("_")[0]])
-            against[i] = words.code(flaw) if flaw else against[i]
-    against[renewed.doubted[c]] = status.CONTRADICTED
-    against[renewed.lost[c]] = status.OUTSIDE
-    return against
+            objections[i] = words.code(flaw) if flaw else objections[i]
+    objections[latest.contradicted[c]] = status.CONTRADICTED
+    objections[latest.outside_model[c]] = status.OUTSIDE
+    return objections
 
 
-def judge(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolution, now: float) -> Codes:
+def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution, now: float) -> Codes:
     """(D,) statuses of the estimates ``current``, at ``now`` (s)."""
-    table, plan, grounds = state.model.table, state.plan, validity_basis(state, renewed)
-    motion = current.gram.reshape(-1).take(plan.energy)
+    table, equations, basis = state.model.table, state.equations, validity_basis(state, latest)
+    motion = current.gram.reshape(-1).take(equations.energy)
     inflation = current.size * motion
-    buried = motion < grounds.floor
-    hidden = buried | (inflation > HOPELESS)
+    buried = motion < basis.floor
+    hidden = buried | (inflation > INDISTINGUISHABLE)
     poor = _poor(current)
-    good = _narrow(grounds, current) & grounds.sound
+    good = _narrow(basis, current) & basis.unobjected
     if np.count_nonzero(hidden):
-        good &= ~(hidden.take(table.unknown) & ~table.offset) & ~_lost_with(state, hidden)
+        good &= ~(hidden.take(table.unknown) & ~table.offset) & ~_with_hidden_slope(state, hidden)
     if np.count_nonzero(poor):
         good &= ~poor.take(table.coefficient)
     codes = np.zeros(good.shape, np.uint8)
     if np.count_nonzero(good) < good.size:
-        np.copyto(codes, _reasons(state, grounds, current, inflation, buried, poor), where=~good)
+        np.copyto(codes, _reasons(state, basis, current, inflation, buried, poor), where=~good)
     if current.time - state.changed_at < SETTLING:
         codes[:] = status.CHANGED
     if now - current.time > STALE:
@@ -102,11 +104,11 @@ def judge(state: EstimatorState, renewed: SegmentSolution, current: CurrentSolut
     return codes
 
 
-def _narrow(grounds: ValidityBasis, current: CurrentSolution) -> Flags:
+def _narrow(basis: ValidityBasis, current: CurrentSolution) -> Flags:
     """(D,) whether standard errors are small enough, and no rounding; and intervals have an end."""
-    squares, allowed = current.values * current.values, grounds.allowed
-    if grounds.relative is not None:
-        allowed = np.maximum(allowed, np.minimum(grounds.relative * squares, grounds.longest))
+    squares, allowed = current.values * current.values, basis.allowed
+    if basis.relative is not None:
+        allowed = np.maximum(allowed, np.minimum(basis.relative * squares, basis.longest))
     narrow: Flags = current.variances <= allowed
     squares *= NARROWEST**2
     narrow &= current.variances > squares
@@ -120,15 +122,15 @@ def _poor(current: CurrentSolution) -> Flags:
     return poor
 
 
-def _lost_with(state: EstimatorState, hidden: Flags) -> Flags:
+def _with_hidden_slope(state: EstimatorState, hidden: Flags) -> Flags:
     """(D,) offsets that hold what a hidden slope (P,) of their coefficient does."""
     table = state.model.table
-    return np.asarray(((hidden @ state.plan.mine) > 0.0).take(table.coefficient) & table.offset)
+    return np.asarray(((hidden @ state.equations.belongs) > 0.0).take(table.coefficient) & table.offset)
 
 
 def _reasons(
     state: EstimatorState,
-    grounds: ValidityBasis,
+    basis: ValidityBasis,
     current: CurrentSolution,
     inflation: Array,
     buried: Flags,
@@ -143,10 +145,10 @@ def _reasons(
     reasons = np.where(poor.take(table.coefficient), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
     collinear = (inflation.take(table.unknown) > COLLINEAR) & slope
     if collinear.any():
-        rivals = least_squares.most_correlated(state.plan, current.solution).take(table.unknown)
+        rivals = least_squares.most_correlated(state.equations, current.solution).take(table.unknown)
         reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
     reasons[buried.take(table.unknown) & slope] = status.NOT_EXCITED
-    np.copyto(reasons, grounds.against, where=grounds.against != status.OK)
+    np.copyto(reasons, basis.objections, where=basis.objections != status.OK)
     if not current.solution.usable:
         reasons[:] = status.NOT_EXCITED
     return reasons

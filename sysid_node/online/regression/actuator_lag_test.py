@@ -21,9 +21,9 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-SURE = 4.0  # standard errors by which a lag must differ from none
-MOVED = 1.5  # standard errors that an estimate may move when the lag is allowed for
-TRIFLE = 0.02  # share of its size that an estimate may move in any case
+SIGNIFICANT = 4.0  # standard errors by which a lag must differ from none
+SHIFT_STANDARD_ERRORS = 1.5  # standard errors that an estimate may move when the lag is allowed for
+NEGLIGIBLE_SHARE = 0.02  # share of its size that an estimate may move in any case
 
 
 class Lag(NamedTuple):
@@ -38,37 +38,39 @@ class LagTest(NamedTuple):
     """The surest lag of each control, and the estimates that it spoils."""
 
     lags: tuple[Lag, ...]
-    spoilt: NDArray[np.bool_]  # (P, C)
-    blamed: dict[int, str]  # coefficient -> control
+    biased: NDArray[np.bool_]  # (P, C)
+    blamed_control: dict[int, str]  # coefficient -> control
 
 
-def examine(plan: NormalEquations, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array) -> LagTest:
+def examine(
+    equations: NormalEquations, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array
+) -> LagTest:
     """Solve every equation again with the rate of each of its controls; ``gram`` (W, W) is that of ``solution``."""
-    spoilt = np.zeros(plan.mine.shape, dtype=bool)
-    blamed: dict[int, str] = {}
+    biased = np.zeros(equations.belongs.shape, dtype=bool)
+    blamed_control: dict[int, str] = {}
     best: dict[str, Lag] = {}
     for c in np.flatnonzero(spread.density > 0.0).tolist():
-        mine = plan.unknowns(c)
-        errors = np.sqrt(np.maximum(spread.covariance[c].diagonal()[mine], 0.0))
+        unknowns = equations.unknowns(c)
+        errors = np.sqrt(np.maximum(spread.covariance[c].diagonal()[unknowns], 0.0))
         for symbol in layout.timed:
-            places = [k for k, i in enumerate(mine.tolist()) if plan.regressors[i] == symbol]
+            places = [k for k, i in enumerate(unknowns.tolist()) if equations.regressors[i] == symbol]
             if not places:
                 continue
-            lag, moved = _with_rate(plan, layout, solution, spread, gram, c, symbol, places[0])
+            lag, moved = _with_rate(equations, layout, solution, spread, gram, c, symbol, places[0])
             if lag is None:
                 continue
             if symbol not in best or lag.standard_error < best[symbol].standard_error:
                 best[symbol] = lag
-            size = np.abs(solution.theta[mine, c])
-            bad = (moved > MOVED * errors) & (moved > TRIFLE * size)
-            if abs(lag.delay) > SURE * lag.standard_error and bad.any():
-                spoilt[mine[bad], c] = True
-                blamed[c] = symbol
-    return LagTest(tuple(best.values()), spoilt, blamed)
+            size = np.abs(solution.theta[unknowns, c])
+            bad = (moved > SHIFT_STANDARD_ERRORS * errors) & (moved > NEGLIGIBLE_SHARE * size)
+            if abs(lag.delay) > SIGNIFICANT * lag.standard_error and bad.any():
+                biased[unknowns[bad], c] = True
+                blamed_control[c] = symbol
+    return LagTest(tuple(best.values()), biased, blamed_control)
 
 
 def _with_rate(
-    plan: NormalEquations,
+    equations: NormalEquations,
     layout: Layout,
     solution: Solution,
     spread: Uncertainty,
@@ -78,18 +80,18 @@ def _with_rate(
     place: int,
 ) -> tuple[Lag | None, Array]:
     """The control's lag by one coefficient's equation, and how far (p,) its estimates move when it is allowed for."""
-    mine = plan.unknowns(c)
-    J, rate = plan.columns[mine], layout.column(f"{symbol} rate")
-    block = solution.inverse[np.ix_(mine, mine)]
-    v = np.zeros(plan.width)
-    v[plan.outputs[c]], v[J] = 1.0, -solution.theta[mine, c]
+    unknowns = equations.unknowns(c)
+    J, rate = equations.columns[unknowns], layout.column(f"{symbol} rate")
+    block = solution.inverse[np.ix_(unknowns, unknowns)]
+    v = np.zeros(equations.width)
+    v[equations.outputs[c]], v[J] = 1.0, -solution.theta[unknowns, c]
     # one regressor more, by the partitioned inverse
-    share = block @ gram[plan.instruments[mine], rate]
+    share = block @ gram[equations.instruments[unknowns], rate]
     left = float(gram[rate, rate] - gram[rate, J] @ share)
-    effect = float(solution.theta[mine[place], c])
+    effect = float(solution.theta[unknowns[place], c])
     if left <= 1e-6 * float(gram[rate, rate]) or effect == 0.0:
-        return None, np.zeros(mine.size)
+        return None, np.zeros(unknowns.size)
     slope = float(gram[rate] @ v) / left
-    variance = np.maximum(spread.covariance[c].diagonal()[mine], 0.0)
+    variance = np.maximum(spread.covariance[c].diagonal()[unknowns], 0.0)
     colour = float(np.max(variance / np.maximum(np.abs(block.diagonal()), 1e-300)))
     return Lag(symbol, -slope / effect, math.sqrt(colour / left) / abs(effect)), np.abs(share * slope)

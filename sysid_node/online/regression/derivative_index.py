@@ -34,7 +34,7 @@ class DerivativeIndex:
         return self.names + self.unformed
 
 
-def derivative_index(aircraft: Aircraft, plan: NormalEquations, valid_fraction: float) -> DerivativeIndex:
+def derivative_index(aircraft: Aircraft, equations: NormalEquations, valid_fraction: float) -> DerivativeIndex:
     """The aircraft's derivatives in the solution of its ``plan``.
 
     A standard error is measured against the believed size of a derivative, or twice its tolerance where that is more:
@@ -44,17 +44,17 @@ def derivative_index(aircraft: Aircraft, plan: NormalEquations, valid_fraction: 
     names, coefficients, unknowns, offsets, sizes, unformed = [], [], [], [], [], []
     for name, belief in aircraft.derivatives.items():
         of, _, regressor = name.partition("_")
-        if of not in plan.coefficients:
+        if of not in equations.coefficients:
             unformed.append(name)
             continue
-        c = plan.coefficients.index(of)
+        c = equations.coefficients.index(of)
         names.append(name)
         coefficients.append(c)
         offsets.append(regressor == "0")
-        unknowns.append(next((int(i) for i in plan.unknowns(c) if plan.regressors[i] == regressor), 0))
+        unknowns.append(next((int(i) for i in equations.unknowns(c) if equations.regressors[i] == regressor), 0))
         sizes.append(max(abs(belief.value), 2.0 * (belief.tolerance or 0.0)))
     coefficient, unknown, offset = np.array(coefficients, np.intp), np.array(unknowns, np.intp), np.array(offsets)
-    P = len(plan.regressors)
+    P = len(equations.regressors)
     return DerivativeIndex(
         names=tuple(names),
         coefficient=coefficient,

@@ -37,10 +37,10 @@ def inflation(spread: Uncertainty, gusts: Array) -> Array:
 
 def sensed(
     aircraft: Aircraft,
-    plan: NormalEquations,
+    equations: NormalEquations,
     solution: Solution,
     bias: Array,
-    uneven: NoiseMoments,
+    noise_moments: NoiseMoments,
     step: float,
     omega: Array,
 ) -> Array:
@@ -49,14 +49,14 @@ def sensed(
     ``bias`` (W, W): of the noise of the regressors, per line and second (``noise.gram_bias``); ``step`` (s): the IMU's
     interval; ``omega`` (F,) rad/s: the lines, over which a rate's derivative has the noise of the rate times omega.
     """
-    v = misfits(plan, solution.theta)
+    v = misfits(equations, solution.theta)
     density: Array = ((bias @ v) * v).sum(axis=0)
-    if uneven.duration > 0.0:
-        density = density + (uneven.power + uneven.lifted_power) / uneven.duration
+    if noise_moments.duration > 0.0:
+        density = density + (noise_moments.power + noise_moments.alpha_power) / noise_moments.duration
     reference, g, i = aircraft.reference, aircraft.geometry, aircraft.inertia
     qS = 0.5 * reference.air_density * reference.airspeed**2 * g.S
     force = aircraft.noise["accel"] * aircraft.mass / qS
     turning = aircraft.noise["gyro"] * math.sqrt(float(np.mean(omega**2))) / qS
     gains = {"CL": force, "CD": force, "CY": force}
     gains |= {"Cl": turning * i.Ixx / g.b, "Cm": turning * i.Iyy / g.cbar, "Cn": turning * i.Izz / g.b}
-    return density + step * np.array([gains[c] for c in plan.coefficients]) ** 2
+    return density + step * np.array([gains[c] for c in equations.coefficients]) ** 2

@@ -33,9 +33,11 @@ class NoiseMoments:
     weighted: Array | float = 0.0  # (C, P, P) of w x x'
     power: Array | float = 0.0  # (C,) of w
     moments: Array | float = 0.0  # (P, P) of x x'
-    lifted: Array | float = 0.0  # (C, P, P) of w x x', where w is by the angle of attack
-    lifted_power: Array | float = 0.0  # (C,) of that w
-    steady: Array | float = 0.0  # (C,) of the accelerometer's noise density, where it matters beside that w
+    alpha_weighted: Array | float = 0.0  # (C, P, P) of w x x', where w is by the angle of attack
+    alpha_power: Array | float = 0.0  # (C,) of that w
+    accelerometer_power: Array | float = (
+        0.0  # (C,) of the accelerometer's noise density, where it matters beside that w
+    )
     duration: float = 0.0  # s
 
     def __add__(self, other: NoiseMoments) -> NoiseMoments:
@@ -48,7 +50,7 @@ class NoiseMoments:
 def measure(
     aircraft: Aircraft,
     layout: Layout,
-    plan: NormalEquations,
+    equations: NormalEquations,
     theta: Array,
     rows: Array,
     mean: Array,
@@ -62,23 +64,29 @@ def measure(
     over which their noise lasts. ``boxes``: into so many stretches, as long as the lines' band resolves, regressors are
     averaged; the noise's density is not.
     """
-    x = rows[:, plan.columns] - mean[plan.columns]
+    x = rows[:, equations.columns] - mean[equations.columns]
     relative = 2.0 * aircraft.noise["airspeed"] / aircraft.reference.airspeed
-    w, lifted, steady = (relative * (x @ theta)) ** 2, np.zeros((len(rows), theta.shape[1])), np.zeros(theta.shape[1])
+    w, alpha_weighted, accelerometer_power = (
+        (relative * (x @ theta)) ** 2,
+        np.zeros((len(rows), theta.shape[1])),
+        np.zeros(theta.shape[1]),
+    )
     step = duration / len(rows)
-    if "CD" in plan.coefficients and "alpha" in layout.names:
-        c = plan.coefficients.index("CD")
-        of_alpha = theta[[i for i in plan.unknowns(c).tolist() if plan.regressors[i] == "alpha"], c].sum()
+    if "CD" in equations.coefficients and "alpha" in layout.names:
+        c = equations.coefficients.index("CD")
+        of_alpha = theta[[i for i in equations.unknowns(c).tolist() if equations.regressors[i] == "alpha"], c].sum()
         turned = rows[:, layout.column("CL")] - of_alpha * rows[:, OFFSET]
-        lifted[:, c] = (aircraft.noise["alpha"] * turned) ** 2
-        steady[c] = duration * step * (aircraft.noise["accel"] * _per_acceleration(aircraft)) ** 2
+        alpha_weighted[:, c] = (aircraft.noise["alpha"] * turned) ** 2
+        accelerometer_power[c] = duration * step * (aircraft.noise["accel"] * _per_acceleration(aircraft)) ** 2
     starts = np.arange(0, len(rows), -(-len(rows) // boxes))
     counts = np.diff(starts, append=len(rows))[:, None]
     slow = np.add.reduceat(x, starts) / counts
-    sums = [np.add.reduceat(density, starts) * (every * step) for density in (w, lifted)]
+    sums = [np.add.reduceat(density, starts) * (every * step) for density in (w, alpha_weighted)]
     weighted, by_lift = ((w.T[:, :, None] * slow).swapaxes(1, 2) @ slow for w in sums)
     powers = [w.sum(axis=0) for w in sums]
-    return NoiseMoments(weighted, powers[0], (counts * slow).T @ slow * step, by_lift, powers[1], steady, duration)
+    return NoiseMoments(
+        weighted, powers[0], (counts * slow).T @ slow * step, by_lift, powers[1], accelerometer_power, duration
+    )
 
 
 def _per_acceleration(aircraft: Aircraft) -> float:
@@ -87,21 +95,23 @@ def _per_acceleration(aircraft: Aircraft) -> float:
     return aircraft.mass / (0.5 * reference.air_density * reference.airspeed**2 * aircraft.geometry.S)
 
 
-def heteroskedastic_excess(uneven: NoiseMoments, even: Array, same: Array, density: Array) -> Array | float:
+def heteroskedastic_excess(
+    noise_moments: NoiseMoments, even: Array, same_block: Array, density: Array
+) -> Array | float:
     """(C, P, P) what the unevenness adds to the scores' covariance; ``even`` (P, P) is theirs for noise of density 1.
 
     ``same`` (P, P): 1 where two unknowns belong to one block. The integrals hold more than the lines' band, so they are
     turned and scaled such that for stationary noise they would be ``even``, and no more than the residual's ``density``
     (C,) is taken to come and go.
     """
-    if uneven.duration <= 0.0:
+    if noise_moments.duration <= 0.0:
         return 0.0
-    moments = uneven.moments * same
-    other = density * uneven.duration - DOUBT * (uneven.power + uneven.steady)
-    more = np.maximum(other / np.maximum(uneven.lifted_power, TINY), 1.0)
-    weighted = uneven.weighted + more[:, None, None] * uneven.lifted
-    mean = (uneven.power + more * uneven.lifted_power) / uneven.duration
-    extra = (weighted - np.multiply.outer(mean, moments)) * same
+    moments = noise_moments.moments * same_block
+    other = density * noise_moments.duration - DOUBT * (noise_moments.power + noise_moments.accelerometer_power)
+    more = np.maximum(other / np.maximum(noise_moments.alpha_power, TINY), 1.0)
+    weighted = noise_moments.weighted + more[:, None, None] * noise_moments.alpha_weighted
+    mean = (noise_moments.power + more * noise_moments.alpha_power) / noise_moments.duration
+    extra = (weighted - np.multiply.outer(mean, moments)) * same_block
     extra *= np.minimum(density / np.maximum(mean, TINY), 1.0)[:, None, None]
     turn = np.linalg.solve(_root(moments).T, _root(even).T).T
     found: Array = turn @ extra @ turn.T

@@ -50,7 +50,7 @@ class Information:
     bias: Array  # (W, W) expected contribution of the sensors' noise to the Gram matrix
     integrals: Array  # (W,) of the transformed signals over time
     samples: float
-    uneven: NoiseMoments = field(default_factory=NoiseMoments)
+    noise_moments: NoiseMoments = field(default_factory=NoiseMoments)
 
     def __add__(self, other: Information) -> Information:
         return Information(*(getattr(self, f) + getattr(other, f) for f in self.__dataclass_fields__))

@@ -38,62 +38,62 @@ class Solution:
     usable: bool | NDArray[np.bool_]  # an array where solutions are stacked
 
 
-def solve(plan: NormalEquations, gram: Array, bias: Array | None = None) -> Solution:
+def solve(equations: NormalEquations, gram: Array, bias: Array | None = None) -> Solution:
     """Solve (Z'A - bias) theta = Z'y - bias from a summed Gram matrix (W, W); ``bias`` is from ``bias_of``.
 
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
     """
-    P, flat = plan.columns.size, gram.reshape(-1)
-    gathered = flat.take(plan.entries)
-    gathered *= plan.counted
+    P, flat = equations.columns.size, gram.reshape(-1)
+    gathered = flat.take(equations.entries)
+    gathered *= equations.counted
     normal, cross = gathered
     if bias is not None:
         cross -= bias
-    solved, usable = _factorised(plan, cross)
+    solved, usable = _factorised(equations, cross)
     theta = solved[:, P:]
     # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
     misfit = theta.T.dot(normal[:P])
     misfit -= normal[P:]
-    motion = flat.take(plan.square)
+    motion = flat.take(equations.square)
     residual: Array = np.maximum(misfit.dot(theta).diagonal() + motion, ROUNDING * motion)
     return Solution(theta, solved[:, :P], residual, motion, usable)
 
 
-def _factorised(plan: NormalEquations, cross: Array) -> tuple[Array, bool]:
+def _factorised(equations: NormalEquations, cross: Array) -> tuple[Array, bool]:
     """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), zero and False where there are none."""
-    solved, fault = _factorise(plan, cross)
+    solved, fault = _factorise(equations, cross)
     if fault:
         # a regressor that has not moved, or that moved as others did: its own estimate is lost, not all of them
-        P = plan.columns.size
+        P = equations.columns.size
         ridged = cross.copy()
-        ridged[:P] += plan.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
-        solved, fault = _factorise(plan, ridged)
+        ridged[:P] += equations.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
+        solved, fault = _factorise(equations, ridged)
     if fault or not math.isfinite(solved[0, 0]):
         return np.zeros_like(solved), False
     return solved, True
 
 
-def _factorise(plan: NormalEquations, cross: Array) -> tuple[Array, int]:
+def _factorise(equations: NormalEquations, cross: Array) -> tuple[Array, int]:
     """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), and LAPACK's fault, 0 for none."""
-    P = plan.columns.size
-    known = plan.known.copy()
+    P = equations.columns.size
+    known = equations.known.copy()
     known[P:] = cross[P:]
-    solver = dposv if plan.least_squares else dgesv
+    solver = dposv if equations.least_squares else dgesv
     *_, solved, fault = solver(cross[:P].T, known.T)
     return solved, fault
 
 
-def bias_of(plan: NormalEquations, bias: Array) -> Array:
+def bias_of(equations: NormalEquations, bias: Array) -> Array:
     """(P + C, P) the entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts."""
-    return np.asarray(bias.take(plan.entries[1]) * plan.counted[1])
+    return np.asarray(bias.take(equations.entries[1]) * equations.counted[1])
 
 
-def misfits(plan: NormalEquations, theta: Array) -> Array:
+def misfits(equations: NormalEquations, theta: Array) -> Array:
     """(W, C) the combinations of signals y - sum theta_j x_j that ``theta`` (P, C) leaves of each coefficient."""
-    C = plan.outputs.size
-    v = np.zeros((plan.width, C))
-    np.add.at(v, (plan.columns[:, None], np.arange(C)), -theta)
-    v[plan.outputs, np.arange(C)] = 1.0
+    C = equations.outputs.size
+    v = np.zeros((equations.width, C))
+    np.add.at(v, (equations.columns[:, None], np.arange(C)), -theta)
+    v[equations.outputs, np.arange(C)] = 1.0
     return v
 
 
@@ -107,16 +107,16 @@ class Uncertainty:
     freedom: Array  # (C,) degrees of freedom
 
 
-def uncertainty(plan: NormalEquations, solution: Solution, info: Information) -> Uncertainty:
+def uncertainty(equations: NormalEquations, solution: Solution, info: Information) -> Uncertainty:
     """Sandwich covariance with the residual's density estimated in each band, and with noise that comes and goes."""
-    C, P = len(plan.coefficients), plan.columns.size
+    C, P = len(equations.coefficients), equations.columns.size
     if not solution.usable or info.trace_square <= 0.0:
         return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
-    v = misfits(plan, solution.theta)
-    least = ROUNDING * info.grams[:, plan.outputs, plan.outputs]
+    v = misfits(equations, solution.theta)
+    least = ROUNDING * info.grams[:, equations.outputs, equations.outputs]
     squares = np.maximum(((info.grams @ v) * v).sum(axis=1), least).T  # (C, B)
-    scores = info.scores[:, plan.instruments[:, None], plan.instruments] * plan.same
-    used = ((scores * solution.inverse.T).sum(axis=2) @ plan.mine).T  # (C, B): taken up by the unknowns
+    scores = info.scores[:, equations.instruments[:, None], equations.instruments] * equations.same_block
+    used = ((scores * solution.inverse.T).sum(axis=2) @ equations.belongs).T  # (C, B): taken up by the unknowns
     expected = np.maximum(info.traces - used, 0.05 * info.traces + TINY)
     whole = expected.sum(axis=1)
     density = squares.sum(axis=1) / whole
@@ -124,9 +124,11 @@ def uncertainty(plan: NormalEquations, solution: Solution, info: Information) ->
     share = expected * (freedom / whole)[:, None]
     bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
     middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
-    middle += heteroskedasticity.heteroskedastic_excess(info.uneven, scores.sum(axis=0), plan.same, density)
+    middle += heteroskedasticity.heteroskedastic_excess(
+        info.noise_moments, scores.sum(axis=0), equations.same_block, density
+    )
     covariance = solution.inverse @ middle @ solution.inverse.T
-    covariance *= plan.mine.T[:, :, None] * plan.mine.T[:, None, :]
+    covariance *= equations.belongs.T[:, :, None] * equations.belongs.T[:, None, :]
     return Uncertainty(covariance, density, bands, freedom)
 
 
@@ -134,10 +136,10 @@ class InstrumentStrength(NamedTuple):
     """How firmly instruments hold on to the regressors. Of each of the P unknowns."""
 
     strength: Array  # F statistic: what instruments explain of a regressor over what they do not
-    luck: Array  # by how much variances would be larger without chance; at least 1
+    selection_factor: Array  # by how much variances would be larger without chance; at least 1
 
 
-def instrument_strength(plan: NormalEquations, solution: Solution, info: Information) -> InstrumentStrength:
+def instrument_strength(equations: NormalEquations, solution: Solution, info: Information) -> InstrumentStrength:
     """The instruments' strength, and the luck that is in the solution.
 
     Under an F of about 10 estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
@@ -147,18 +149,18 @@ def instrument_strength(plan: NormalEquations, solution: Solution, info: Informa
     to it instruments seem strong, the standard error is small and the estimate is off, all in one. So the strength is
     that of Z'Z where this is less, and ``luck`` says what it makes of the variance.
     """
-    P = plan.columns.size
-    if plan.least_squares:
+    P = equations.columns.size
+    if equations.least_squares:
         return InstrumentStrength(np.full(P, np.inf), np.ones(P))
     if not solution.usable or info.trace_square <= 0.0:
         return InstrumentStrength(np.zeros(P), np.ones(P))
     gram = info.grams.sum(axis=0)
-    outer = gram[plan.instruments[:, None], plan.instruments] * plan.same
-    plain = solve(with_least_squares_in(plan, tuple(range(int(plan.group.max()) + 1))), gram)
+    outer = gram[equations.instruments[:, None], equations.instruments] * equations.same_block
+    plain = solve(with_least_squares_in(equations, tuple(range(int(equations.group.max()) + 1))), gram)
     if not plain.usable:
         return InstrumentStrength(np.zeros(P), np.ones(P))
     achieved = np.maximum((solution.inverse @ outer @ solution.inverse.T).diagonal(), TINY)
-    ridged = outer + plan.unit * (RIDGE * outer.diagonal() + TINY)
+    ridged = outer + equations.unit * (RIDGE * outer.diagonal() + TINY)
     expected = np.maximum(np.linalg.inv(ridged).diagonal(), achieved)
     efficiency = np.clip(plain.inverse.diagonal() / expected, 0.0, 1.0 - 1e-9)
     freedom = float(info.traces.sum()) ** 2 / info.trace_square
@@ -172,11 +174,11 @@ def student_95(freedom: Array) -> Array:
     return np.asarray(stdtrit(np.maximum(freedom, 1.0), 0.975))
 
 
-def most_correlated(plan: NormalEquations, solution: Solution) -> Index:
+def most_correlated(equations: NormalEquations, solution: Solution) -> Index:
     """(P,) of each unknown the one of the same equation whose estimate is most correlated with its own."""
     spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     # each row's own spread is common to all of it
     correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
-    correlation *= plan.same - plan.unit
+    correlation *= equations.same_block - equations.unit
     rival: Index = correlation.argmax(axis=-1)
     return rival

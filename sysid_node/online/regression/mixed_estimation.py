@@ -15,12 +15,12 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 Array = NDArray[np.float64]
 
 
-def believed_derivatives(aircraft: Aircraft, plan: NormalEquations) -> tuple[Array, Array]:
+def believed_derivatives(aircraft: Aircraft, equations: NormalEquations) -> tuple[Array, Array]:
     """(P, C) believed values and their precisions 1 / tolerance^2; precision 0 where the file states no tolerance."""
-    values, precisions = np.zeros(plan.mine.shape), np.zeros(plan.mine.shape)
-    for c, coefficient in enumerate(plan.coefficients):
-        for i in plan.unknowns(c).tolist():
-            belief = aircraft.derivatives[f"{coefficient}_{plan.regressors[i]}"]
+    values, precisions = np.zeros(equations.belongs.shape), np.zeros(equations.belongs.shape)
+    for c, coefficient in enumerate(equations.coefficients):
+        for i in equations.unknowns(c).tolist():
+            belief = aircraft.derivatives[f"{coefficient}_{equations.regressors[i]}"]
             values[i, c] = belief.value
             if belief.tolerance:
                 precisions[i, c] = belief.tolerance**-2
@@ -28,11 +28,11 @@ def believed_derivatives(aircraft: Aircraft, plan: NormalEquations) -> tuple[Arr
 
 
 def weighed(
-    plan: NormalEquations, theta: Array, covariance: Array, values: Array, precisions: Array
+    equations: NormalEquations, theta: Array, covariance: Array, values: Array, precisions: Array
 ) -> tuple[Array, Array]:
     """``theta`` (P, C) and its ``covariance`` (C, P, P) with the aircraft file's values counted in."""
-    believed = covariance @ (precisions * values).T[:, :, None]
+    prior = covariance @ (precisions * values).T[:, :, None]
     # gain form: needs no inverse of a covariance that may be near singular
-    gain = plan.unit + covariance * precisions.T[:, None]
-    found = np.linalg.solve(gain, theta.T[..., None] + believed)
+    gain = equations.unit + covariance * precisions.T[:, None]
+    found = np.linalg.solve(gain, theta.T[..., None] + prior)
     return np.asarray(found[..., 0].T), np.asarray(np.linalg.solve(gain, covariance))

@@ -31,8 +31,8 @@ class NormalEquations:
     columns: Index  # (P,) column of each unknown's regressor
     outputs: Index  # (C,) column of each coefficient
     instruments: Index  # (P,) column of each unknown's instrument: its regressor, in least squares
-    same: Array  # (P, P) 1 where two unknowns belong to one block
-    mine: Array  # (P, C) 1 where the unknown belongs to the coefficient
+    same_block: Array  # (P, P) 1 where two unknowns belong to one block
+    belongs: Array  # (P, C) 1 where the unknown belongs to the coefficient
     width: int  # W
     # flat indices into the Gram matrix; transposed, so that LAPACK takes what is gathered as it lies
     entries: Index = field(init=False)  # (2, P + C, P) of A'A above A'y, and of Z'A above Z'y
@@ -54,11 +54,11 @@ class NormalEquations:
         object.__setattr__(self, "entries", np.stack([both + rows * self.width for rows in sources]))
         object.__setattr__(self, "square", self.outputs * (self.width + 1))
         object.__setattr__(self, "energy", self.columns * (self.width + 1))
-        counted = [np.vstack([self.same, times * self.mine.T]) for times in (2.0, 1.0)]
+        counted = [np.vstack([self.same_block, times * self.belongs.T]) for times in (2.0, 1.0)]
         object.__setattr__(self, "counted", np.stack(counted))
         object.__setattr__(self, "unit", np.eye(self.columns.size))
         object.__setattr__(self, "known", np.eye(both.size, self.columns.size))
-        object.__setattr__(self, "instrumented", (self.mine.T @ (self.columns != self.instruments)) > 0.0)
+        object.__setattr__(self, "instrumented", (self.belongs.T @ (self.columns != self.instruments)) > 0.0)
         object.__setattr__(self, "least_squares", plain)
 
     def unknowns(self, coefficient: int) -> Index:
@@ -81,8 +81,8 @@ def normal_equations(structure: dict[str, tuple[str, ...]], layout: Layout) -> N
         columns=np.array([layout.column(r) for r in regressors], dtype=np.intp),
         outputs=np.array([layout.column(c) for c in slopes], dtype=np.intp),
         instruments=np.array([layout.instrument(r) for r in regressors], dtype=np.intp),
-        same=(group[:, None] == group).astype(float),
-        mine=(group[:, None] == block).astype(float),
+        same_block=(group[:, None] == group).astype(float),
+        belongs=(group[:, None] == block).astype(float),
         width=layout.width,
     )
 

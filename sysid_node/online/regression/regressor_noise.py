@@ -56,15 +56,15 @@ def gram_bias(aircraft: Aircraft, layout: Layout, mean: Array, step: float, air_
     return bias
 
 
-def allowed(plan: NormalEquations, solution: Solution, density: Array, bias: Array) -> Array:
+def allowed(equations: NormalEquations, solution: Solution, density: Array, bias: Array) -> Array:
     """(W,) factors on the columns, at most one: as much of the noise as the residuals' ``density`` (C,) allows.
 
     ``bias`` (W, W) is per line and second. The residual of a coefficient holds v' bias v of the noise, v = (1, -theta);
     where that is more than the whole residual, the file's noise is too large, and the excess is not subtracted.
     """
-    v = least_squares.misfits(plan, solution.theta)
+    v = least_squares.misfits(equations, solution.theta)
     noise = ((bias @ v) * v).sum(axis=0)
-    share = np.ones(plan.width)
+    share = np.ones(equations.width)
     for c in np.flatnonzero(noise > DOUBT * density).tolist():
         members = np.flatnonzero(v[:, c])
         share[members] = np.minimum(share[members], density[c] / noise[c])

@@ -22,10 +22,10 @@ Array = NDArray[np.float64]
 
 
 def selection_bias_factors(
-    plan: NormalEquations,
+    equations: NormalEquations,
     solution: Solution,
     spread: Uncertainty,
-    hold: InstrumentStrength,
+    instrument_strength: InstrumentStrength,
     gram: Array,
     values: Array,
     precisions: Array,
@@ -34,10 +34,12 @@ def selection_bias_factors(
 
     ``values`` and ``precisions`` (P, C) are those of ``mixed_estimation.believed_derivatives``.
     """
-    if plan.least_squares or not solution.usable:
-        return np.ones_like(plan.mine)
-    meeting, _ = weighed(plan, solution.theta, spread.covariance, values, precisions)
-    v = misfits(plan, meeting)
+    if equations.least_squares or not solution.usable:
+        return np.ones_like(equations.belongs)
+    meeting, _ = weighed(equations, solution.theta, spread.covariance, values, precisions)
+    v = misfits(equations, meeting)
     squares = ((gram @ v) * v).sum(axis=0)
-    more = np.where(plan.instrumented, np.maximum(squares / np.maximum(solution.residual, 1e-300), 1.0), 1.0)
-    return np.asarray(np.where(plan.instrumented, hold.luck[:, None], 1.0) * more * plan.mine)
+    more = np.where(equations.instrumented, np.maximum(squares / np.maximum(solution.residual, 1e-300), 1.0), 1.0)
+    return np.asarray(
+        np.where(equations.instrumented, instrument_strength.selection_factor[:, None], 1.0) * more * equations.belongs
+    )

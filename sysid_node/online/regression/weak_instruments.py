@@ -41,7 +41,7 @@ class AndersonRubinBounds(NamedTuple):
 
 
 def anderson_rubin_bounds(
-    plan: NormalEquations,
+    equations: NormalEquations,
     table: DerivativeIndex,
     solution: Solution,
     gram: Array,
@@ -54,10 +54,10 @@ def anderson_rubin_bounds(
 
     ``noise`` (C, P, P): the part of the ``spread``'s covariance that comes from the residual; the rest does not bend.
     """
-    covariance, P = spread.covariance, plan.columns.size
-    v = misfits(plan, solution.theta)
-    gradient = (gram[plan.columns] @ v).T * plan.mine.T  # (C, P)
-    normal = gram[plan.columns[:, None], plan.columns] * plan.same
+    covariance, P = spread.covariance, equations.columns.size
+    v = misfits(equations, solution.theta)
+    gradient = (gram[equations.columns] @ v).T * equations.belongs.T  # (C, P)
+    normal = gram[equations.columns[:, None], equations.columns] * equations.same_block
     in_offset = covariance @ mean
     ways = np.empty((*covariance.shape[:2], P + 1))  # how the slopes move with each, and behind them with the offset
     ways[:, :, :P] = covariance / np.maximum(covariance.diagonal(axis1=1, axis2=2), TINY)[:, None, :]
@@ -66,7 +66,7 @@ def anderson_rubin_bounds(
     with np.errstate(over="ignore", invalid="ignore"):
         slope = (gradient[:, None] @ ways)[:, 0] * (-2.0 * scale)
         curve = ((normal @ ways) * ways).sum(axis=1) * scale
-    instrumented = plan.instrumented[table.coefficient]
+    instrumented = equations.instrumented[table.coefficient]
     place = table.coefficient, np.where(table.offset, P, table.unknown)
     square = student_95(spread.freedom) ** 2
     counted = ((spread.freedom + gusts * square) / (spread.freedom + square))[table.coefficient]

@@ -46,8 +46,8 @@ def known() -> list[ExcitedSegments]:
     return no_excited_segments(PLAN, LAYOUT)
 
 
-def ends(experience: ExcitedSegments) -> list[float]:
-    return [s.end for s in experience.segments]
+def ends(excited: ExcitedSegments) -> list[float]:
+    return [s.end for s in excited.segments]
 
 
 def test_each_block_has_its_own_controls(known: list[ExcitedSegments]) -> None:
@@ -88,8 +88,8 @@ def test_only_segments_of_the_time_are_recalled(known: list[ExcitedSegments]) ->
 def test_more_than_ever_is_beyond_experience(known: list[ExcitedSegments]) -> None:
     remember(known, segment(), 25.0)
     peak = known[0].peaks()
-    assert not known[0].beyond(2.0 * peak)
-    assert known[0].beyond(5.0 * peak)
+    assert not known[0].exceeds_all(2.0 * peak)
+    assert known[0].exceeds_all(5.0 * peak)
 
 
 def test_memory_is_bounded(known: list[ExcitedSegments]) -> None:

@@ -40,17 +40,17 @@ def test_statistic_is_that_of_plain_least_squares() -> None:
     rng = np.random.default_rng(0)
     lines, duration, density = rng.normal(size=(LINES, PLAN.width)), 500.0, 3.0
     P, C = PLAN.columns.size, PLAN.outputs.size
-    theta = rng.normal(size=(P, C)) * PLAN.mine
+    theta = rng.normal(size=(P, C)) * PLAN.belongs
     found = score_test(reference(theta, np.zeros((C, P, P)), density), lines, SPECTRUM, duration)
     for c in range(C):
-        mine = PLAN.unknowns(c)
-        X = lines[:, PLAN.columns[mine]]
-        r = lines[:, PLAN.outputs[c]] - X @ theta[mine, c]
+        unknowns = PLAN.unknowns(c)
+        X = lines[:, PLAN.columns[unknowns]]
+        r = lines[:, PLAN.outputs[c]] - X @ theta[unknowns, c]
         fit = X @ np.linalg.lstsq(X, r, rcond=None)[0]
         # long enough for the stretch itself to look quiet beside the usual density
-        F = float(fit @ fit) / (mine.size * density * 0.5 / 0.04)
+        F = float(fit @ fit) / (unknowns.size * density * 0.5 / 0.04)
         assert found.statistic[c] == pytest.approx(F, rel=1e-6)
-        assert found.chance(1.0)[c] == pytest.approx(fisher.sf(F, mine.size, 50.0), rel=1e-6)
+        assert found.chance(1.0)[c] == pytest.approx(fisher.sf(F, unknowns.size, 50.0), rel=1e-6)
         rest = float(r @ r - fit @ fit) / float(np.square(lines[:, PLAN.outputs[c]]).sum())
         assert found.share[c] == pytest.approx(rest, rel=1e-6)
 
@@ -88,8 +88,10 @@ def flown(samples: Array, time: Array, method: str) -> EstimatorState:
 
 def looked(state: EstimatorState, span: int) -> ScoreTest:
     model = state.model
-    looking = ChangeTests(model.plan, model.auxiliary, model.spectrum, state.watch, state.transform.last, math.inf)
-    found = next((found for _, found in looking.contradictions([span])), None)
+    tests = ChangeTests(
+        model.equations, model.instrument_model, model.spectrum, state.change_monitor, state.transform.last, math.inf
+    )
+    found = next((found for _, found in tests.contradictions([span])), None)
     assert found is not None
     return found
 
@@ -111,6 +113,6 @@ def test_half_a_surface_lost_contradicts_its_own_equation(method: str) -> None:
     time, flights = fly(AIRCRAFT, multisteps(SECONDS, RATE), RATE, 2, seed=4, gusts=0.7, after=after)
     for samples in flights:
         state = flown(samples, time, method)
-        chance = dict(zip(state.plan.coefficients, looked(state, 7).chance(1.0), strict=True))
+        chance = dict(zip(state.equations.coefficients, looked(state, 7).chance(1.0), strict=True))
         assert chance["Cl"] < 1e-6
         assert chance["Cm"] > 1e-3

@@ -90,8 +90,8 @@ def test_between_renewals_estimates_use_every_sample(flown: tuple[Array, Array],
     renew(state, last=True)
     now = current_solution(state)
     assert now is not None
-    assert state.renewed is not None
-    np.testing.assert_allclose(now.solution.theta, state.renewed.solution.theta, rtol=1e-6, atol=1e-9)
+    assert state.latest is not None
+    np.testing.assert_allclose(now.solution.theta, state.latest.solution.theta, rtol=1e-6, atol=1e-9)
 
 
 def test_nothing_is_known_before_half_a_second_of_data() -> None:

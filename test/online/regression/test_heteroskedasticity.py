@@ -16,13 +16,13 @@ STEP = 0.01  # s
 
 def bursts(seed: int, samples: int = 400) -> tuple[Layout, normal_equations.NormalEquations, Array]:
     """A roll motion of a few short bursts, as rows of signals."""
-    plan = normal_equations.normal_equations({"Cl": ("p", "da")}, layout := signals())
+    equations = normal_equations.normal_equations({"Cl": ("p", "da")}, layout := signals())
     rows = np.zeros((samples, layout.transformed))
     rng = np.random.default_rng(seed)
     envelope = (np.arange(samples) % 100 < 15).astype(float)
-    for column in plan.columns:
+    for column in equations.columns:
         rows[:, column] = envelope * rng.normal(size=samples)
-    return layout, plan, rows
+    return layout, equations, rows
 
 
 def signals() -> Layout:
@@ -32,10 +32,10 @@ def signals() -> Layout:
 
 def measured(theta: Array, seed: int = 0, boxes: int = 400) -> tuple[NoiseMoments, Array, Array]:
     """The unevenness of noise in the airspeed, the regressors (N, P), and the noise's density (N,)."""
-    layout, plan, rows = bursts(seed)
+    layout, equations, rows = bursts(seed)
     mean, duration = np.zeros(rows.shape[1]), STEP * len(rows)
-    found = heteroskedasticity.measure(AIRCRAFT, layout, plan, theta, rows, mean, duration, STEP, boxes)
-    x = rows[:, plan.columns]
+    found = heteroskedasticity.measure(AIRCRAFT, layout, equations, theta, rows, mean, duration, STEP, boxes)
+    x = rows[:, equations.columns]
     relative = 2.0 * AIRCRAFT.noise["airspeed"] / AIRCRAFT.reference.airspeed
     return found, x, STEP * (relative * (x @ theta[:, 0])) ** 2
 
@@ -95,9 +95,12 @@ def test_sums_and_scales() -> None:
 def test_what_is_left_of_the_drag_comes_with_the_lift() -> None:
     """Beyond the sensors' noise, a residual is shaped as the lift's square; within it, by the vane's noise alone."""
     moments = np.eye(1)
-    uneven = NoiseMoments(np.zeros((1, 1, 1)), np.zeros(1), moments, 2.0 * moments[None], np.ones(1), np.ones(1), 1.0)
+    noise_moments = NoiseMoments(
+        np.zeros((1, 1, 1)), np.zeros(1), moments, 2.0 * moments[None], np.ones(1), np.ones(1), 1.0
+    )
     calm, rough = (
-        heteroskedasticity.heteroskedastic_excess(uneven, moments, np.ones((1, 1)), np.array([s])) for s in (2.0, 8.0)
+        heteroskedasticity.heteroskedastic_excess(noise_moments, moments, np.ones((1, 1)), np.array([s]))
+        for s in (2.0, 8.0)
     )
     assert calm == pytest.approx(np.array([[[1.0]]]))  # w x x' less the mean w
     assert rough == pytest.approx(np.array([[[8.0 - 1.5]]]))

@@ -142,7 +142,7 @@ def test_fading_scales_everything() -> None:
     )
     half, double = info.scaled(0.5), info + info
     for field in fields(info):
-        if field.name == "uneven":
+        if field.name == "noise_moments":
             continue  # sums of its own
         np.testing.assert_allclose(4.0 * getattr(half, field.name), getattr(double, field.name))
 

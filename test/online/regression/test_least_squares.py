@@ -29,27 +29,33 @@ def test_all_coefficients_at_once_equal_lstsq_each() -> None:
     solution = least_squares.solve(PLAIN, lines.T @ lines)
     assert solution.usable
     for c in range(len(STRUCTURE)):
-        mine = PLAIN.unknowns(c)
-        expected, residual, *_ = np.linalg.lstsq(lines[:, PLAIN.columns[mine]], lines[:, PLAIN.outputs[c]])
-        np.testing.assert_allclose(solution.theta[mine, c], expected, rtol=1e-10)
+        unknowns = PLAIN.unknowns(c)
+        expected, residual, *_ = np.linalg.lstsq(lines[:, PLAIN.columns[unknowns]], lines[:, PLAIN.outputs[c]])
+        np.testing.assert_allclose(solution.theta[unknowns, c], expected, rtol=1e-10)
         assert solution.residual[c] == pytest.approx(residual[0], rel=1e-9)
-        assert not np.delete(solution.theta[:, c], mine).any()
+        assert not np.delete(solution.theta[:, c], unknowns).any()
 
 
 def test_instrumental_variables_are_those_of_two_stages() -> None:
     """Just identified, (Z'A)^-1 Z'y is least squares on the regressors as predicted from all instruments."""
     lines, _ = made(INSTRUMENTAL, 1)
-    plan = INSTRUMENTAL
-    lines[:, plan.instruments] += lines[:, plan.columns]  # instruments that are correlated with their regressors
-    solution = least_squares.solve(plan, lines.T @ lines)
+    equations = INSTRUMENTAL
+    lines[:, equations.instruments] += lines[
+        :, equations.columns
+    ]  # instruments that are correlated with their regressors
+    solution = least_squares.solve(equations, lines.T @ lines)
     for c in range(len(STRUCTURE)):
-        mine = plan.unknowns(c)
-        A, Z, y = lines[:, plan.columns[mine]], lines[:, plan.instruments[mine]], lines[:, plan.outputs[c]]
+        unknowns = equations.unknowns(c)
+        A, Z, y = (
+            lines[:, equations.columns[unknowns]],
+            lines[:, equations.instruments[unknowns]],
+            lines[:, equations.outputs[c]],
+        )
         predicted = Z @ np.linalg.lstsq(Z, A)[0]
         expected = np.linalg.lstsq(predicted, y)[0]
-        np.testing.assert_allclose(solution.theta[mine, c], expected, rtol=1e-8)
+        np.testing.assert_allclose(solution.theta[unknowns, c], expected, rtol=1e-8)
         assert solution.residual[c] == pytest.approx(np.sum((y - A @ expected) ** 2), rel=1e-9)
-        np.testing.assert_allclose(solution.inverse[np.ix_(mine, mine)], np.linalg.inv(Z.T @ A), rtol=1e-8)
+        np.testing.assert_allclose(solution.inverse[np.ix_(unknowns, unknowns)], np.linalg.inv(Z.T @ A), rtol=1e-8)
 
 
 def test_known_noise_is_taken_out_of_the_normal_equations() -> None:
@@ -57,53 +63,57 @@ def test_known_noise_is_taken_out_of_the_normal_equations() -> None:
     gram = lines.T @ lines
     bias = np.diag(np.linspace(1.0, 5.0, PLAIN.width))
     solution = least_squares.solve(PLAIN, gram, least_squares.bias_of(PLAIN, bias))
-    mine = PLAIN.unknowns(0)
-    J, y = PLAIN.columns[mine], PLAIN.outputs[0]
+    unknowns = PLAIN.unknowns(0)
+    J, y = PLAIN.columns[unknowns], PLAIN.outputs[0]
     expected = np.linalg.solve((gram - bias)[np.ix_(J, J)], gram[J, y])
-    np.testing.assert_allclose(solution.theta[mine, 0], expected, rtol=1e-10)
+    np.testing.assert_allclose(solution.theta[unknowns, 0], expected, rtol=1e-10)
     misfit = lines[:, y] - lines[:, J] @ expected
     assert solution.residual[0] == pytest.approx(misfit @ misfit, rel=1e-9)
 
 
-@pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
+@pytest.mark.parametrize("equations", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
 @pytest.mark.parametrize("spoiled", ["nan", "inf", "more noise than motion"])
-def test_impossible_equations_are_not_usable_and_never_raise(plan: NormalEquations, spoiled: str) -> None:
-    lines, _ = made(plan, 3)
+def test_impossible_equations_are_not_usable_and_never_raise(equations: NormalEquations, spoiled: str) -> None:
+    lines, _ = made(equations, 3)
     bias = None
     if spoiled == "more noise than motion":
-        if not plan.least_squares:
+        if not equations.least_squares:
             pytest.skip("no definiteness is asked of instruments")
-        bias = least_squares.bias_of(plan, 1e4 * np.eye(plan.width))
+        bias = least_squares.bias_of(equations, 1e4 * np.eye(equations.width))
     else:
-        lines[5, plan.columns[0]] = float(spoiled)
+        lines[5, equations.columns[0]] = float(spoiled)
     with np.errstate(all="ignore"):
         gram = lines.T @ lines
-        solution = least_squares.solve(plan, gram, bias)
+        solution = least_squares.solve(equations, gram, bias)
     assert not solution.usable
-    spread = least_squares.uncertainty(plan, solution, information(made(plan)[0], 1.0))
+    spread = least_squares.uncertainty(equations, solution, information(made(equations)[0], 1.0))
     assert not spread.freedom.any()
 
 
-@pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
-def test_nothing_flown_says_nothing_of_anything(plan: NormalEquations) -> None:
-    solution = least_squares.solve(plan, np.zeros((plan.width, plan.width)))
+@pytest.mark.parametrize("equations", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
+def test_nothing_flown_says_nothing_of_anything(equations: NormalEquations) -> None:
+    solution = least_squares.solve(equations, np.zeros((equations.width, equations.width)))
     assert not solution.theta.any()
     assert (solution.inverse.diagonal() > 1e15).all()
 
 
-@pytest.mark.parametrize("plan", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
+@pytest.mark.parametrize("equations", [PLAIN, INSTRUMENTAL], ids=["least squares", "instruments"])
 @pytest.mark.parametrize("twin", [True, False], ids=["moves as another", "does not move"])
-def test_one_regressor_that_tells_nothing_costs_no_other(plan: NormalEquations, twin: bool) -> None:
+def test_one_regressor_that_tells_nothing_costs_no_other(equations: NormalEquations, twin: bool) -> None:
     """Their own errors are without bound; the other equations, and the other regressors, are as ever."""
-    lines, _ = made(plan, 3)
-    alpha, q, de = plan.unknowns(0)
-    lines[:, plan.columns[de]] = lines[:, plan.columns[q]] if twin else 0.0
-    lines[:, plan.instruments[q]] = lines[:, plan.columns[q]]
-    solution = least_squares.solve(plan, lines.T @ lines)
+    lines, _ = made(equations, 3)
+    alpha, q, de = equations.unknowns(0)
+    lines[:, equations.columns[de]] = lines[:, equations.columns[q]] if twin else 0.0
+    lines[:, equations.instruments[q]] = lines[:, equations.columns[q]]
+    solution = least_squares.solve(equations, lines.T @ lines)
     assert solution.usable
     assert abs(solution.inverse[de, de]) > 1e8
-    for c, others in ((0, np.array([alpha])), (3, plan.unknowns(3)), (5, plan.unknowns(5))):
-        J, Z, y = plan.columns[plan.unknowns(c)], plan.instruments[plan.unknowns(c)], lines[:, plan.outputs[c]]
+    for c, others in ((0, np.array([alpha])), (3, equations.unknowns(3)), (5, equations.unknowns(5))):
+        J, Z, y = (
+            equations.columns[equations.unknowns(c)],
+            equations.instruments[equations.unknowns(c)],
+            lines[:, equations.outputs[c]],
+        )
         used = np.array([0, 1]) if c == 0 else np.arange(J.size)
         expected = np.linalg.solve(lines[:, Z[used]].T @ lines[:, J[used]], lines[:, Z[used]].T @ y)
         np.testing.assert_allclose(solution.theta[others, c], expected[: others.size], rtol=1e-3)
@@ -116,8 +126,8 @@ def test_covariance_of_independent_lines_is_the_textbook_one() -> None:
     """
     lines, _ = made(PLAIN, 4)
     for c in range(len(STRUCTURE)):  # the same residual in every band
-        mine = PLAIN.unknowns(c)
-        A = lines[:, PLAIN.columns[mine]]
+        unknowns = PLAIN.unknowns(c)
+        A = lines[:, PLAIN.columns[unknowns]]
         residual = lines[:, PLAIN.outputs[c]] - A @ np.linalg.lstsq(A, lines[:, PLAIN.outputs[c]])[0]
         for part in np.split(np.arange(ROWS), BANDS):
             lines[part, PLAIN.outputs[c]] += residual[part] * (0.3 / np.sqrt(np.mean(residual[part] ** 2)) - 1.0)
@@ -126,14 +136,14 @@ def test_covariance_of_independent_lines_is_the_textbook_one() -> None:
         solution = least_squares.solve(PLAIN, info.grams.sum(axis=0))
         spread = least_squares.uncertainty(PLAIN, solution, info)
         for c in range(len(STRUCTURE)):
-            mine = PLAIN.unknowns(c)
-            A, y = lines[:, PLAIN.columns[mine]], lines[:, PLAIN.outputs[c]]
-            s2 = np.sum((y - A @ solution.theta[mine, c]) ** 2) / (ROWS - mine.size)
+            unknowns = PLAIN.unknowns(c)
+            A, y = lines[:, PLAIN.columns[unknowns]], lines[:, PLAIN.outputs[c]]
+            s2 = np.sum((y - A @ solution.theta[unknowns, c]) ** 2) / (ROWS - unknowns.size)
             textbook = s2 * np.linalg.inv(A.T @ A)
-            found = spread.covariance[c][np.ix_(mine, mine)]
+            found = spread.covariance[c][np.ix_(unknowns, unknowns)]
             np.testing.assert_allclose(found.diagonal(), textbook.diagonal(), rtol=0.05)
             assert spread.density[c] == pytest.approx(s2 / density, rel=1e-9)
-            assert spread.freedom[c] == pytest.approx((ROWS - mine.size) ** 2 / ROWS, rel=1e-9)
+            assert spread.freedom[c] == pytest.approx((ROWS - unknowns.size) ** 2 / ROWS, rel=1e-9)
 
 
 def test_coloured_residuals_count_where_the_regressor_moves() -> None:
@@ -154,34 +164,36 @@ def test_coloured_residuals_count_where_the_regressor_moves() -> None:
 
 def test_strength_is_that_of_the_first_stage() -> None:
     """One instrument that explains a share R^2 of its regressor: F = freedom R^2 / (1 - R^2)."""
-    plan = normal_equations.normal_equations({"Cl": ("p",)}, layout(("p",)))
+    equations = normal_equations.normal_equations({"Cl": ("p",)}, layout(("p",)))
     rng = np.random.default_rng(8)
-    lines = np.zeros((ROWS, plan.width))
-    lines[:, plan.instruments[0]] = rng.normal(size=ROWS)
-    lines[:, plan.columns[0]] = 0.8 * lines[:, plan.instruments[0]] + rng.normal(size=ROWS)
-    lines[:, plan.outputs[0]] = lines[:, plan.columns[0]]
-    info = information(np.pad(lines, ((0, 0), (0, 19 - plan.width))), 1.0)
-    info.grams = info.grams[:, : plan.width, : plan.width]
-    R2 = np.corrcoef(lines[:, plan.instruments[0]], lines[:, plan.columns[0]])[0, 1] ** 2
-    found = least_squares.instrument_strength(plan, least_squares.solve(plan, info.grams.sum(axis=0)), info)
+    lines = np.zeros((ROWS, equations.width))
+    lines[:, equations.instruments[0]] = rng.normal(size=ROWS)
+    lines[:, equations.columns[0]] = 0.8 * lines[:, equations.instruments[0]] + rng.normal(size=ROWS)
+    lines[:, equations.outputs[0]] = lines[:, equations.columns[0]]
+    info = information(np.pad(lines, ((0, 0), (0, 19 - equations.width))), 1.0)
+    info.grams = info.grams[:, : equations.width, : equations.width]
+    R2 = np.corrcoef(lines[:, equations.instruments[0]], lines[:, equations.columns[0]])[0, 1] ** 2
+    found = least_squares.instrument_strength(equations, least_squares.solve(equations, info.grams.sum(axis=0)), info)
     assert found.strength[0] == pytest.approx(ROWS * R2 / (1.0 - R2), rel=0.05)
-    assert normal_equations.with_strong_instruments(plan, np.array([100.0])) is plan
-    assert normal_equations.with_strong_instruments(plan, np.array([3.0])).least_squares
+    assert normal_equations.with_strong_instruments(equations, np.array([100.0])) is equations
+    assert normal_equations.with_strong_instruments(equations, np.array([3.0])).least_squares
 
 
-@pytest.mark.parametrize("hold", [0.8, 1.25])
-def test_a_regressor_that_follows_its_instrument_more_than_expected_is_luck(hold: float) -> None:
+@pytest.mark.parametrize("ratio", [0.8, 1.25])
+def test_a_regressor_that_follows_its_instrument_more_than_expected_is_chance(ratio: float) -> None:
     """x = hold z: the variance is that of 1 / hold^2; what is less than that of z itself is luck."""
     lines, _ = made(INSTRUMENTAL, 4)
     columns, instruments = INSTRUMENTAL.columns, INSTRUMENTAL.instruments
-    lines[:, columns] = hold * lines[:, instruments]
+    lines[:, columns] = ratio * lines[:, instruments]
     info = information(lines, 1.0)
     found = least_squares.instrument_strength(
         INSTRUMENTAL, least_squares.solve(INSTRUMENTAL, info.grams.sum(axis=0)), info
     )
     free = columns != instruments
-    np.testing.assert_allclose(found.luck[free & (INSTRUMENTAL.group == INSTRUMENTAL.block[5])], max(hold, 1.0) ** 2)
-    assert (found.luck >= 1.0).all()
+    np.testing.assert_allclose(
+        found.selection_factor[free & (INSTRUMENTAL.group == INSTRUMENTAL.block[5])], max(ratio, 1.0) ** 2
+    )
+    assert (found.selection_factor >= 1.0).all()
 
 
 def test_an_instrument_that_does_not_move_is_none() -> None:

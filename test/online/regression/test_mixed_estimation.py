@@ -30,28 +30,30 @@ def test_the_mean_is_that_of_mixed_estimation() -> None:
     """Klein & Morelli (2006), sec. 5.4: (P^-1 + D^-1)^-1 (P^-1 theta + D^-1 believed)."""
     rng = np.random.default_rng(0)
     values, precisions = believed_derivatives(AIRCRAFT, PLAN)
-    theta = (values + 0.3 * rng.normal(size=values.shape)) * PLAN.mine
-    covariance = np.zeros((theta.shape[1], *PLAN.same.shape))
+    theta = (values + 0.3 * rng.normal(size=values.shape)) * PLAN.belongs
+    covariance = np.zeros((theta.shape[1], *PLAN.same_block.shape))
     for c in range(theta.shape[1]):
-        root = rng.normal(size=PLAN.same.shape)
-        covariance[c] = root @ root.T * np.outer(PLAN.mine[:, c], PLAN.mine[:, c])
+        root = rng.normal(size=PLAN.same_block.shape)
+        covariance[c] = root @ root.T * np.outer(PLAN.belongs[:, c], PLAN.belongs[:, c])
     mean, spread = weighed(PLAN, theta, covariance, values, precisions)
     for c in range(theta.shape[1]):
-        mine = PLAN.unknowns(c)
-        P, D = np.linalg.inv(covariance[c][np.ix_(mine, mine)]), np.diag(precisions[mine, c])
+        unknowns = PLAN.unknowns(c)
+        P, D = np.linalg.inv(covariance[c][np.ix_(unknowns, unknowns)]), np.diag(precisions[unknowns, c])
         expected = np.linalg.inv(P + D)
-        np.testing.assert_allclose(spread[c][np.ix_(mine, mine)], expected, rtol=1e-7)
-        np.testing.assert_allclose(mean[mine, c], expected @ (P @ theta[mine, c] + D @ values[mine, c]), rtol=1e-7)
+        np.testing.assert_allclose(spread[c][np.ix_(unknowns, unknowns)], expected, rtol=1e-7)
+        np.testing.assert_allclose(
+            mean[unknowns, c], expected @ (P @ theta[unknowns, c] + D @ values[unknowns, c]), rtol=1e-7
+        )
 
 
 def test_without_tolerances_nothing_changes() -> None:
     values, precisions = believed_derivatives(AIRCRAFT, PLAN)
-    theta, covariance = values + 1.0, np.tile(PLAN.same, (values.shape[1], 1, 1))
+    theta, covariance = values + 1.0, np.tile(PLAN.same_block, (values.shape[1], 1, 1))
     mean, spread = weighed(PLAN, theta, covariance, values, 0.0 * precisions)
     for c in range(theta.shape[1]):
-        mine = PLAN.unknowns(c)
-        np.testing.assert_allclose(mean[mine, c], theta[mine, c])
-        np.testing.assert_allclose(spread[c][np.ix_(mine, mine)], covariance[c][np.ix_(mine, mine)])
+        unknowns = PLAN.unknowns(c)
+        np.testing.assert_allclose(mean[unknowns, c], theta[unknowns, c])
+        np.testing.assert_allclose(spread[c][np.ix_(unknowns, unknowns)], covariance[c][np.ix_(unknowns, unknowns)])
 
 
 def test_a_flight_that_shows_little_leaves_the_beliefs() -> None:

@@ -92,11 +92,11 @@ def test_no_more_noise_is_subtracted_than_the_residuals_show(noisy_flights: tupl
 def test_all_that_the_residual_holds_is_allowed() -> None:
     """One regressor with noise of energy b: the residual holds theta^2 b, beyond which the column's share shrinks."""
     layout = regression_signals.Layout(("p",))
-    plan = normal_equations.normal_equations({"Cl": ("p",)}, layout)
+    equations = normal_equations.normal_equations({"Cl": ("p",)}, layout)
     bias = np.zeros((layout.width, layout.width))
     p = layout.column("p")
     bias[p, p] = 3.0
     solution = least_squares.Solution(np.array([[2.0]]), np.eye(1), np.ones(1), np.ones(1), True)
-    np.testing.assert_allclose(regressor_noise.allowed(plan, solution, np.array([12.0]), bias), 1.0)
-    share = regressor_noise.allowed(plan, solution, np.array([4.0]), bias)
+    np.testing.assert_allclose(regressor_noise.allowed(equations, solution, np.array([12.0]), bias), 1.0)
+    share = regressor_noise.allowed(equations, solution, np.array([4.0]), bias)
     assert share[p] == pytest.approx(np.sqrt(4.0 / 12.0))

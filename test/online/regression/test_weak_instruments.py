@@ -20,8 +20,8 @@ def test_least_squares_have_students_interval() -> None:
     """With curve = 1 / (nu se^2), as the sum of squares of least squares has."""
     errors, freedom = np.array([0.1, 2.0]), np.array([4.0, 40.0])
     t = student.ppf(0.975, freedom)
-    bend = AndersonRubinBounds(np.zeros(2), 1.0 / (freedom * errors**2), freedom / (freedom + t**2))
-    below, above = weak_instruments.interval_arms((t * errors) ** 2, bend)
+    anderson_rubin = AndersonRubinBounds(np.zeros(2), 1.0 / (freedom * errors**2), freedom / (freedom + t**2))
+    below, above = weak_instruments.interval_arms((t * errors) ** 2, anderson_rubin)
     np.testing.assert_allclose(below, t * errors)
     np.testing.assert_allclose(above, t * errors)
 
@@ -29,13 +29,15 @@ def test_least_squares_have_students_interval() -> None:
 def test_ends_are_where_the_density_of_the_tested_value_allows_no_more() -> None:
     rng = np.random.default_rng(0)
     squares = rng.uniform(0.1, 1.0, 50) ** 2
-    bend = AndersonRubinBounds(rng.normal(size=50), rng.uniform(0.01, 2.0, 50), rng.uniform(0.5, 1.0, 50))
-    below, above = weak_instruments.interval_arms(squares, bend)
+    anderson_rubin = AndersonRubinBounds(rng.normal(size=50), rng.uniform(0.01, 2.0, 50), rng.uniform(0.5, 1.0, 50))
+    below, above = weak_instruments.interval_arms(squares, anderson_rubin)
     ended = np.isfinite(below)
     assert ended.sum() > 20
-    np.testing.assert_array_equal(~ended, squares * bend.counted * bend.curve >= 1.0)
+    np.testing.assert_array_equal(~ended, squares * anderson_rubin.counted * anderson_rubin.curve >= 1.0)
     for delta in (-below[ended], above[ended]):
-        allowed = (squares * bend.counted)[ended] * (1.0 + bend.slope[ended] * delta + bend.curve[ended] * delta**2)
+        allowed = (squares * anderson_rubin.counted)[ended] * (
+            1.0 + anderson_rubin.slope[ended] * delta + anderson_rubin.curve[ended] * delta**2
+        )
         np.testing.assert_allclose(delta**2, allowed)
 
 
@@ -43,22 +45,26 @@ PLAN = normal_equations.normal_equations({"Cl": ("p",)}, layout(AIRCRAFT, ("p",)
 P, Z, Y = PLAN.columns[0], PLAN.instruments[0], PLAN.outputs[0]
 
 
-def solved(hold: float, endogeneity: float, rng: np.random.Generator, lines: int = 40) -> tuple[Array, Array, Array]:
+def solved(
+    instrument_strength: float, endogeneity: float, rng: np.random.Generator, lines: int = 40
+) -> tuple[Array, Array, Array]:
     """Estimate, standard error and reach of the slope 1 of y = x + u; x = hold z + v, where v is correlated with u."""
     z, u, other = rng.normal(size=(3, lines))
-    x = hold * z + endogeneity * u + np.sqrt(1.0 - endogeneity**2) * other
+    x = instrument_strength * z + endogeneity * u + np.sqrt(1.0 - endogeneity**2) * other
     values = np.zeros((lines, PLAN.width))
     values[:, P], values[:, Z], values[:, Y] = x, z, x + u
     gram = values.T @ values
     solution = least_squares.solve(PLAN, gram)
     covariance = solution.residual[0] / lines * (z @ z) / (z @ x) ** 2 * np.ones((1, 1, 1))
-    bend = bent(solution, gram, covariance, lines)
+    anderson_rubin = bent(solution, gram, covariance, lines)
     error = np.sqrt(covariance[0, 0])
     t = student.ppf(0.975, lines)
     return (
         solution.theta[0],
         error,
-        np.array(weak_instruments.interval_arms((t * error) ** 2, AndersonRubinBounds(*(b[:1] for b in bend)))),
+        np.array(
+            weak_instruments.interval_arms((t * error) ** 2, AndersonRubinBounds(*(b[:1] for b in anderson_rubin)))
+        ),
     )
 
 
@@ -102,11 +108,11 @@ def test_the_residual_bends_as_it_does() -> None:
     values = rng.normal(size=(60, PLAN.width))
     gram = values.T @ values
     solution = least_squares.solve(PLAN, gram)
-    bend = bent(solution, gram, np.ones((1, 1, 1)), 60.0)
+    anderson_rubin = bent(solution, gram, np.ones((1, 1, 1)), 60.0)
     place = TABLE.names.index("Cl_p")
     for delta in (-0.3, 0.2):
         moved = ((values[:, Y] - values[:, P] * (solution.theta[0, 0] + delta)) ** 2).sum()
-        expected = 1.0 + bend.slope[place] * delta + bend.curve[place] * delta**2
+        expected = 1.0 + anderson_rubin.slope[place] * delta + anderson_rubin.curve[place] * delta**2
         assert moved / solution.residual[0] == pytest.approx(expected)
 
 
