@@ -1,7 +1,7 @@
-"""What the estimator does with every piece of data, half a second: look for changes.
+"""The update of the slowly changing quantities, after every piece of half a second of data.
 
-And with every piece at first, the more seldom the more is known: measure the segment, and renew what all estimates rest
-on.
+With every piece the estimator tests for changes of the aircraft. It also measures the present segment and solves for
+the estimates and their covariances: with every piece at first, and less often as data accumulate.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which
 
 
 def renew(state: EstimatorState, last: bool = False) -> None:
-    """Renew what changes slowly, see ``Renewed``; all of it where this is the ``last`` time in the segment."""
+    """Renew the slowly changing quantities (``SegmentSolution``); ``last`` also finishes the segment."""
     time = state.transform.last
     lines = sampled_transform.current(state.transform)
     _append_piece(state, lines)
@@ -75,7 +75,7 @@ def _is_due(state: EstimatorState) -> bool:
 
 
 def begin_segment(state: EstimatorState) -> None:
-    """Begin a segment, of which alone the transform is, and a piece of the watch at the last sample."""
+    """Begin a segment, of which alone the transform is, and a piece of the change monitor at the last sample."""
     time = state.transform.last
     sampled_transform.restart(state.transform)
     state.segment_start, state.samples, state.intervals = time, 0, 0.0
@@ -94,14 +94,14 @@ def _fading(state: EstimatorState, since: float) -> float:
 
 
 def _append_piece(state: EstimatorState, lines: Array) -> None:
-    """Hand the finished piece to the watch."""
+    """Append the finished piece to the change monitor."""
     if state.transform.last > state.piece_start:
         piece = lines - state.piece * _fading(state, state.piece_start)
         state.change_monitor.pieces.append((state.piece_start, piece))
 
 
 def _measure_noise_moments(state: EstimatorState) -> None:
-    """Count how unevenly the noise came since this was last counted."""
+    """Add the moments of the heteroskedastic noise since the last time that they were measured."""
     now = state.transform.last
     duration = now - state.noise_measured_until
     if duration <= 0.0 or not state.transform.recent:
@@ -120,7 +120,7 @@ def _measure_noise_moments(state: EstimatorState) -> None:
 
 
 def _measure_segment(state: EstimatorState, lines: Array) -> Information:
-    """What the present segment says up to now."""
+    """The information of the present segment up to the last sample."""
     model = state.model
     begin, end = state.segment_start, state.transform.last
     info = information.measure(lines, model.instrument_model, model.spectrum, begin, end)
@@ -196,7 +196,7 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
 
 
 def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:
-    """The instruments' hold, the solution by the plan that it allows, and the noise's part in the equations."""
+    """The instruments' strength, the solution by the equations that it allows, and the noise's part in them."""
     full, last = state.model.equations, state.latest
     instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
     equations = state.equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
@@ -257,7 +257,7 @@ def _look_for_changes(state: EstimatorState, lines: Array) -> None:
 
 
 def _change_tests(state: EstimatorState) -> ChangeTests:
-    """What looks for changes share."""
+    """The data that the tests for changes share."""
     model = state.model
     return ChangeTests(
         model.equations,

@@ -40,21 +40,21 @@ class EstimatorModel:
     table: DerivativeIndex
     vocabulary: Vocabulary
     spectrum: Spectrum
-    lower_limits: tuple[float, ...]  # what each value of a sample must lie above
+    lower_limits: tuple[float, ...]  # of each value of a sample, exclusive
     signals: ScalarSignals
     momentum: MomentumGain
     prior: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
-    instrument_model: InstrumentModel | None  # what makes instruments, where the method wants them
+    instrument_model: InstrumentModel | None  # None where the method is least squares
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
 
 
 @dataclass(frozen=True)
 class ValidityBasis:
-    """What the judgement of the D estimates rests on between renewals."""
+    """Criteria of validity of the D estimates that do not change between renewals."""
 
-    unobjected: NDArray[np.bool_]  # (D,) nothing speaks against it but what the present says
-    objections: Codes  # (D,) status of those against which something else speaks, 0 where nothing does
+    unobjected: NDArray[np.bool_]  # (D,) whether all criteria evaluated at the renewal are met
+    objections: Codes  # (D,) status by the criteria evaluated at the renewal, 0 = ok
     squares: Array  # (D,) of half of Student's interval over a standard error
     longest: Array  # (D,) the largest squared standard error of an interval that has an end
     allowed: Array  # (D,) the largest squared standard error of a valid estimate
@@ -65,20 +65,20 @@ class ValidityBasis:
 
 @dataclass
 class SegmentSolution:
-    """What ``renew`` last found; per-sample estimates lean on it until the next time."""
+    """What ``renew`` last found; the estimates use it until the next renewal."""
 
     time: float  # s, when it was found
-    pieces: int  # of the watch, finished by then
-    timed: int  # ... when ``timing`` was looked at
+    pieces: int  # number of pieces finished by then
+    timed: int  # ... when ``lag_test`` was last carried out
     total: Information
     solution: Solution
     uncertainty: Uncertainty
-    compensation: Array | None  # noise's part of the normal equations, see ``regression.bias_of``
+    compensation: Array | None  # noise's part of the normal equations, see ``least_squares.bias_of``
     base: Array  # (W, W) Gram matrix of the finished segments
     integrals: Array  # (W,) of the finished segments' signals
     trim_noise: Array  # (C,) squared error of the coefficients' integrals
     factors: Array  # (C, P) squared standard error over (P_jj residual)
-    lag_test: LagTest  # whether the controls are felt when they are measured
+    lag_test: LagTest  # whether measured deflections are late
     instrument_strength: InstrumentStrength  # of the instruments on the regressors
     selection_bias_factors: Array  # (P, C) see ``selection_bias_factors``
     anderson_rubin: AndersonRubinBounds  # of the intervals
@@ -103,7 +103,7 @@ class EstimatorState:
     segment_start: float = math.nan  # NaN = none is under way
     piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
     piece_start: float = math.nan
-    noise_measured_until: float = math.nan  # time up to which ``uneven`` counts
+    noise_measured_until: float = math.nan  # s: time up to which ``noise_moments`` are measured
     noise_moments: NoiseMoments = field(default_factory=NoiseMoments)  # of the present segment
     renew_at: float = math.inf
     step: float = 0.0  # s between the last two samples
@@ -117,5 +117,5 @@ class EstimatorState:
     latest: SegmentSolution | None = None
     change_monitor: ChangeMonitor = field(default_factory=ChangeMonitor)
     excited_segments: list[ExcitedSegments] = field(default_factory=list)  # by block of the plan
-    pieces: int = 0  # of the watch, finished
+    pieces: int = 0  # number of pieces finished
     changed_at: float = -math.inf

@@ -1,13 +1,14 @@
 """Abrupt changes of the aircraft, and flight that the estimates do not explain.
 
 The transforms of the last seconds are kept in pieces. Each time a piece is complete, stretches of 1.5 s and more that
-end in it are tested against the estimates from before them (``contradiction``): the generalised likelihood ratio over
+end in it are tested against the estimates from before them (``score_test``): the generalised likelihood ratio over
 the time of change (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2).
 
-What is unlikely to be chance casts doubt: estimates that the last seconds contradict are not valid. What cannot be
-chance in an hour of flight ends them: all is learned anew from the time of change. It is announced as a change of the
-aircraft if earlier manoeuvres are contradicted as surely (``experience``); else the estimates were at fault. Residuals
-that no derivatives explain are another matter: there the model itself does not hold (near the stall, say).
+Two levels of significance apply. Estimates that the last seconds contradict at the level ``DOUBT`` are not valid. At
+the level ``FALSE_ALARM`` the estimator forgets all data from before the time of change. It reports a change of the
+aircraft if the last seconds contradict earlier manoeuvres at that level, too (``excited_segments``); otherwise the
+earlier estimates were biased. Where no derivatives explain the residuals, the model itself does not hold, for example
+near the stall.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ class ChangeDecision:
 
 @dataclass(frozen=True)
 class ChangeTests:
-    """What all tests of one time share."""
+    """The data and settings that all tests at one time share."""
 
     full: NormalEquations
     model: InstrumentModel | None
@@ -132,7 +133,7 @@ def _due(look: int) -> list[int]:
 
 
 def examine(tests: ChangeTests, excited_segments: list[ExcitedSegments]) -> ChangeDecision:
-    """Test the spans that are due; see the module's text."""
+    """What the tests of the spans that are due say of each coefficient, and from when on all must be learned anew."""
     change_monitor, C = tests.change_monitor, len(tests.full.coefficients)
     change_monitor.examinations += 1
     surest = 1.0
@@ -167,7 +168,7 @@ def _typical_statistic(change_monitor: ChangeMonitor, span: int, C: int) -> Arra
 
 
 def _update_typical_statistic(change_monitor: ChangeMonitor, found: ScoreTest, C: int) -> None:
-    """Where models are not exact F is usually more than chance makes it."""
+    """Update the typical F: where the model is inexact, F exceeds its distribution under the null hypothesis."""
     last = change_monitor.typical_statistic[-1] if change_monitor.typical_statistic else np.ones(C)
     change_monitor.typical_statistic.append(
         np.maximum(last + LEARNING * (np.minimum(found.statistic, OUTLIER) - last), 1.0)
@@ -195,7 +196,7 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
 def compare(
     full: NormalEquations, change_monitor: ChangeMonitor, excited_segments: list[ExcitedSegments], memory: float
 ) -> None:
-    """Doubt the estimates of a long time that those from well-excited flight contradict."""
+    """Mark the coefficients whose estimates contradict those from well-excited flight."""
     published = change_monitor.references[-1]
     change_monitor.contradicted_by_excited = np.zeros(len(full.coefficients), dtype=bool)
     for block, excited in enumerate(excited_segments):

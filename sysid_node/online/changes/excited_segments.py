@@ -1,6 +1,6 @@
-"""What well-excited flight has said: finished segments in which the controls moved most.
+"""Information from well-excited flight: the finished segments in which the controls moved most.
 
-In quiet flight the surfaces only answer the motion that gusts make, and an autopilot's answers are correlated with the
+In quiet flight the surfaces only answer the motion that gusts cause, and an autopilot's answers are correlated with the
 gusts: estimates from long quiet flight are biased, and the next manoeuvre contradicts them though nothing has changed
 (Soderstrom & Stoica, "System Identification", 1989, ch. 10, on feedback without external excitation). An aircraft has
 changed only if it contradicts its own earlier manoeuvres, too.
@@ -48,16 +48,16 @@ class ExcitedSegments:
         return np.asarray(np.max([np.zeros(self.controls.size), *(s.energy for s in self.segments)], axis=0))
 
     def is_comparable(self, energy: Array) -> bool:
-        """Whether a control moved much, beside how much it ever did."""
+        """Whether a control's ``energy`` (m,) is comparable to its largest in the segments kept."""
         return bool((energy > COMPARABLE * self.peaks()).any())
 
     def exceeds_all(self, energy: Array) -> bool:
-        """Whether a control moved much more than it ever did."""
+        """Whether a control's ``energy`` (m,) is far larger than in any of the segments kept."""
         return bool((COMPARABLE * energy > self.peaks()).any())
 
 
 def no_excited_segments(equations: NormalEquations, layout: Layout) -> list[ExcitedSegments]:
-    """None as yet, for each block of the plan."""
+    """An empty collection for each block of the normal equations."""
     blocks = (equations.columns[equations.group == block] for block in range(int(equations.group.max()) + 1))
     moved = np.arange(layout.width)[layout.deflections]
     return [ExcitedSegments(columns[np.isin(columns, moved)]) for columns in blocks]

@@ -1,7 +1,7 @@
-"""Whether an estimate is to be believed, and what speaks against it.
+"""Whether an estimate is valid, and the reason where it is not.
 
-What changes with renewals only is weighed once for all samples until the next (``grounds``); what changes with every
-sample is decided for all estimates at once (``judge``), as numbers (see ``status``).
+Criteria that change only with renewals are evaluated once per renewal (``validity_basis``). Criteria that change with
+every sample are evaluated for all estimates at once (``judge``). Statuses are numbers (see ``status``).
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ def validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityBa
 
 
 def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityBasis:
-    """See ``grounds_of``."""
+    """Evaluate the criteria of ``validity_basis``."""
     table, equations, freedom = state.model.table, state.equations, latest.uncertainty.freedom
     c = table.coefficient
     start, _, stop = state.model.settings.frequencies
-    # one weak instrument, and its whole equation is solved by least squares, which gusts bias if there are any
+    # an equation with one weak instrument is solved by least squares, which gusts bias
     held = np.where(equations.belongs > 0.0, latest.instrument_strength.strength[:, None], np.inf).min(axis=0)
     objections, squares = _objections(state, latest), student_95(freedom)[c] ** 2
     cautions = np.where(
@@ -62,7 +62,7 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
 
 
 def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
-    """(D,) what speaks against each whatever the present says; what is found later counts more."""
+    """(D,) the status of each by the criteria that change with renewals; a later criterion takes precedence."""
     table, words = state.model.table, state.model.vocabulary
     c = table.coefficient
     objections = np.zeros(c.size, np.uint8)

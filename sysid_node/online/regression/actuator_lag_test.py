@@ -1,10 +1,11 @@
-"""Whether the surfaces' deflections arrive on time, and what it does to the estimates if they do not.
+"""Test for a lag between measured deflections and their effect, and for the bias that it causes.
 
-Commands stand for positions on most small aircraft: the surfaces follow late. A lag tau turns C_delta delta into
-C_delta (delta - tau d delta / dt), to first order, and biases all derivatives of the equation, most of all the damping,
-while the residual hardly shows it. So each equation is solved a second time with the control's rate as a further
-regressor: its coefficient is -C_delta tau (the same device finds time skews in Jategaonkar, "Flight Vehicle System
-Identification", 2nd ed., 2015, sec. 10.5). What moves by this more than its interval allows is not to be believed.
+Most small aircraft record commands instead of positions, and the surfaces follow late. A lag tau turns C_delta delta
+into C_delta (delta - tau d delta / dt), to first order, and biases all derivatives of the equation,
+most of all the damping, while the residual hardly shows it. So each equation is solved a second time with the
+control's rate as a further regressor: its coefficient is -C_delta tau (the same device finds time skews in Jategaonkar,
+"Flight Vehicle System Identification", 2nd ed., 2015, sec. 10.5). An estimate that this moves by more than its interval
+allows is not valid.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Lag(NamedTuple):
 
 
 class LagTest(NamedTuple):
-    """The surest lag of each control, and the estimates that it spoils."""
+    """The most precise lag of each control, and the estimates that a lag biases."""
 
     lags: tuple[Lag, ...]
     biased: NDArray[np.bool_]  # (P, C)

@@ -1,11 +1,11 @@
-"""Gusts that the deflections may know of.
+"""Allowance in the standard errors for a correlation between deflections and gusts.
 
-Instruments made of the deflections hold nothing of the gusts as long as nobody answers to gusts with the surfaces.
-Pilots and autopilots do. What this does to the estimates cannot be told from the flight, but it can be allowed for: a
+Instruments made from the deflections are uncorrelated with gusts only if nobody answers gusts with the surfaces.
+Pilots and autopilots do. The resulting bias cannot be estimated from the flight, but it can be allowed for: a
 correlation of ``ALLOWED`` between instruments and gusts shifts an estimate by that share of the square root of the
 degrees of freedom in standard errors (Conley, Hansen & Rossi, "Plausibly exogenous", Review of Economics and Statistics
-94, 2012). So intervals stop shrinking where they would claim more than that. Noise of the sensors moves no surface
-worth mentioning: only what a residual holds beyond it counts.
+94, 2012). Intervals therefore stop shrinking with more data at that bound. The sensors' noise hardly moves a
+surface, so only the part of a residual beyond the sensors' noise counts as gusts.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Sensor noise that comes and goes with the motion.
+"""Heteroskedastic sensor noise: its variance follows the motion.
 
-Noise in the airspeed multiplies a coefficient's motion, errors of the angle of attack the lift on its way into the
-drag: such noise is there while the regressors move, and a stationary density of the same energy makes too little of it.
+Noise in the airspeed multiplies a coefficient's motion, and an error of the angle of attack turns lift into drag. Such
+noise is large while the regressors move, so that a stationary density of the same energy underestimates its effect.
 With the noise's density w(t) the estimates' covariance holds the integral of w x x' where stationary noise has that of
 x x' times the mean of w (the heteroskedastic sandwich of White, Econometrica 48, 1980). The two integrals are collected
 in the time domain; how many of the lines' products they stand for is told by those of stationary noise.
@@ -98,7 +98,7 @@ def _per_acceleration(aircraft: Aircraft) -> float:
 def heteroskedastic_excess(
     noise_moments: NoiseMoments, even: Array, same_block: Array, density: Array
 ) -> Array | float:
-    """(C, P, P) what the unevenness adds to the scores' covariance; ``even`` (P, P) is theirs for noise of density 1.
+    """(C, P, P) what heteroskedasticity adds to the scores' covariance; ``even`` (P, P) is it for noise of density 1.
 
     ``same`` (P, P): 1 where two unknowns belong to one block. The integrals hold more than the lines' band, so they are
     turned and scaled such that for stationary noise they would be ``even``, and no more than the residual's ``density``

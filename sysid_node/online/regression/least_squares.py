@@ -133,21 +133,21 @@ def uncertainty(equations: NormalEquations, solution: Solution, info: Informatio
 
 
 class InstrumentStrength(NamedTuple):
-    """How firmly instruments hold on to the regressors. Of each of the P unknowns."""
+    """Strength of the instruments of each of the P unknowns."""
 
     strength: Array  # F statistic: what instruments explain of a regressor over what they do not
-    selection_factor: Array  # by how much variances would be larger without chance; at least 1
+    selection_factor: Array  # variance expected without chance correlation, over the variance found; at least 1
 
 
 def instrument_strength(equations: NormalEquations, solution: Solution, info: Information) -> InstrumentStrength:
-    """The instruments' strength, and the luck that is in the solution.
+    """The instruments' strength, and the factor that corrects variances for chance correlation.
 
     Under an F of about 10 estimates are those of weak instruments, far from normal (Stock & Yogo, "Testing for weak
     instruments in linear IV regression", 2005). Infinite where every regressor is its own instrument.
 
-    Instruments are what the aircraft file's model makes of the deflections, so Z'A is Z'Z and chance. Where chance adds
-    to it instruments seem strong, the standard error is small and the estimate is off, all in one. So the strength is
-    that of Z'Z where this is less, and ``luck`` says what it makes of the variance.
+    Instruments are the response of the aircraft file's model to the deflections, so that the expected Z'A is Z'Z. Where
+    chance correlation adds to it, instruments seem strong, and small standard errors and large errors occur together.
+    The strength is therefore that of Z'Z where this is less; ``selection_factor`` is the ratio of the variances.
     """
     P = equations.columns.size
     if equations.least_squares:

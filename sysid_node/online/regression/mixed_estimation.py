@@ -1,6 +1,6 @@
-"""What the aircraft file believes, weighed with what the flight says.
+"""Mixed estimation: estimates combined with the prior values of the aircraft file.
 
-Both are normal: with the estimate's covariance P and tolerances D of the believed values, the mean is
+Both are taken as normal. With the estimate's covariance P and tolerances D of the believed values, the mean is
 (P^-1 + D^-1)^-1 (P^-1 theta + D^-1 believed) (mixed estimation: Klein & Morelli 2006, sec. 5.4).
 """
 

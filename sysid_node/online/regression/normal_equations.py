@@ -88,13 +88,13 @@ def normal_equations(structure: dict[str, tuple[str, ...]], layout: Layout) -> N
 
 
 def with_strong_instruments(full: NormalEquations, strength: Array) -> NormalEquations:
-    """The plan with least squares in the blocks of which an instrument is weak: better biased a little than lost."""
+    """The equations, with least squares in blocks that have a weak instrument: a small bias beats a huge variance."""
     weak = full.group[strength < STRONG].tolist()
     return with_least_squares_in(full, tuple(sorted(set(weak)))) if weak else full
 
 
 def with_least_squares_in(full: NormalEquations, blocks: tuple[int, ...]) -> NormalEquations:
-    """The plan with least squares in these blocks; made once."""
+    """The equations, with least squares in these blocks; made once and kept in ``variants``."""
     if blocks not in full.variants:
         own = np.isin(full.group, blocks)
         full.variants[blocks] = replace(full, instruments=np.where(own, full.columns, full.instruments))

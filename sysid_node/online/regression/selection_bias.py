@@ -1,12 +1,13 @@
-"""When a standard error may be called small.
+"""Correction of standard errors for selection bias, before they decide whether an estimate is valid.
 
-Of many estimates that are hardly known yet, a few have small standard errors by chance, and those are off in one: where
-chance correlates instruments with regressors, and where an estimate lies towards that of least squares, which leaves
-the least residual. Whoever believes the estimates with small standard errors picks out just those. So before a standard
-error is compared with what is allowed, it is made what it would be without such luck: with the correlation that the
-aircraft file's model expects (``regression.hold``), and with the residual that is left where flight and file meet in
-proportion to what they know (mixed estimation, see ``prior``). With more data both factors go to one. The published
-interval is not changed.
+While there are few data, some standard errors are small by chance. Small standard errors and large errors then occur
+together, for two reasons: the instruments correlate with the regressors by chance, or the estimate lies by chance
+towards that of least squares, which has the smallest residual. Selecting the estimates with small standard errors
+would select these. Before a standard error is compared with the largest one allowed, it is therefore multiplied by two
+factors. The first replaces the correlation found by the one that the aircraft file's model predicts
+(``least_squares.instrument_strength``). The second replaces the residual by that of the mixed estimate of flight and
+aircraft file (``mixed_estimation``). Both factors tend to one as data accumulate. The published interval is not
+changed.
 """
 
 from __future__ import annotations
