@@ -14,12 +14,12 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.regression.filtering import differentiate
-from sysid_node.dynamics.airflow import flow_angles, velocity_of
-from sysid_node.dynamics.atmosphere import dynamic_pressure
+from sysid_node.dynamics import scalar
+from sysid_node.dynamics.airflow import speed_of
 from sysid_node.dynamics.coefficients import regressors, with_polar
 from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
-from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
-from sysid_node.dynamics.rigid_body import known_moments, moment_for
+from sysid_node.dynamics.lever_arm import centripetal, tangential, velocity_from
+from sysid_node.dynamics.rigid_body import known_moments
 from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -123,12 +123,19 @@ def _accelerated(record: FlightRecord) -> dict[str, Array]:
 def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, Array]:
     s = dict(signals)
     rates, accelerations = (Vector(s["p"], s["q"], s["r"]), Vector(s["pdot"], s["qdot"], s["rdot"]))
-    force = specific_force_from(Vector(s["ax"], s["ay"], s["az"]), rates, accelerations, aircraft.sensors.imu)
+    imu, probe = aircraft.sensors.imu, aircraft.sensors.air_data
+    # where the search of the maximum-likelihood methods stops depends on the last bit of its inputs: the order of
+    # operations here and in ``_moments`` is that of all results so far
+    relative = tangential(accelerations, imu).plus(centripetal(rates, imu))
+    force = Vector(s["ax"], s["ay"], s["az"]).minus(relative)
     s |= dict(zip(("ax", "ay", "az"), force, strict=True))
-    if any(aircraft.sensors.air_data):
+    if any(probe):
         alpha, beta = (s.get(name, np.zeros_like(s["V"])) for name in ("alpha", "beta"))
-        velocity = velocity_from(velocity_of((s["V"], alpha, beta), np), rates, aircraft.sensors.air_data)
-        s["V"], s["alpha"], s["beta"] = flow_angles(velocity, np)
+        direction = Vector(np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta))
+        velocity = velocity_from(direction.times(s["V"]), rates, probe)
+        s["V"] = speed_of(velocity, np)
+        s["alpha"] = np.arctan2(velocity[2], velocity[0])
+        s["beta"] = np.arctan2(velocity[1], np.hypot(velocity[0], velocity[2]))
     return s
 
 
@@ -172,8 +179,8 @@ def _coefficients(aircraft: Aircraft, s: Mapping[str, Array]) -> tuple[dict[str,
     throttle, remarks = aircraft.throttle, []
     thrust = s.get("thrust", np.zeros_like(s["V"]))
     inclination, arm = thrust_line(throttle)
-    forward, down = thrust_axes(inclination, np)
-    force = dynamic_pressure(s["rho"], s["V"]) * aircraft.geometry.S
+    forward, down = thrust_axes(inclination, scalar)
+    force = 0.5 * s["rho"] * s["V"] ** 2 * aircraft.geometry.S
     c = {
         "CX": (aircraft.mass * s["ax"] - thrust * forward) / force,
         "CY": aircraft.mass * s["ay"] / force,
@@ -194,8 +201,10 @@ def _moments(
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Moment coefficients, and those that cannot be formed with the reason."""
     inertia, geometry = aircraft.inertia, aircraft.geometry
-    rates, accelerations = (Vector(s["p"], s["q"], s["r"]), Vector(s["pdot"], s["qdot"], s["rdot"]))
-    roll, pitch, yaw = moment_for(known_moments(inertia), rates, accelerations)
+    known, p, q, r = known_moments(inertia), s["p"], s["q"], s["r"]
+    roll = known.Ixx * s["pdot"] - known.Ixz * (s["rdot"] + p * q) + (known.Izz - known.Iyy) * q * r
+    pitch = known.Iyy * s["qdot"] + (known.Ixx - known.Izz) * p * r + known.Ixz * (p**2 - r**2)
+    yaw = known.Izz * s["rdot"] - known.Ixz * (s["pdot"] - q * r) + (known.Iyy - known.Ixx) * p * q
     moments = {
         "Cl": roll / (force * geometry.b),
         "Cm": (pitch - thrust_moment) / (force * geometry.cbar),
