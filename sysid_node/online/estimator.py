@@ -3,7 +3,7 @@
 Morelli, "Real-time parameter estimation in the frequency domain", J. Guidance 23(5), 2000, as flown on the CDFP and
 CDRW by Subrahmanyam, Kim & Ghosh. ``init``, then ``update`` with every sample, and ``estimates.estimate`` whenever the
 derivatives are wanted. What changes slowly (the residuals' colour, the segments, the watch for changes) is renewed
-every second or half second of data, see ``renewal``: when the next sample comes, or before it by ``renew_early``, so
+every half second of data or less often (``segment_update``): with the next sample, or before it by ``renew_early``, so
 that no estimate waits for it.
 """
 

@@ -51,7 +51,7 @@ class Vocabulary:
 
 
 def vocabulary(aircraft: Aircraft, equations: NormalEquations) -> Vocabulary:
-    """The words for the estimates by a ``plan``."""
+    """The words for the estimates by these ``equations``."""
     collinear = (f"collinear with {regressor}" for regressor in equations.regressors)
     late = (f"{control} not on time" for control in aircraft.control_symbols)
     return Vocabulary((*WORDS, *collinear, *late), len(WORDS))

@@ -6,7 +6,7 @@ Each coefficient's equation is multiplied by k = qbar / qbar0, the dynamic press
 
 so that a moment's rate-of-momentum part is a plain derivative of a measured rate and needs neither a numerical
 differentiation nor the derivative of the dynamic pressure: it enters as the increment of the angular momentum over a
-sampling interval, which the transform integrates exactly (see ``transform``).
+sampling interval, which the transform integrates exactly (see ``fourier_transform``).
 
 Equations of motion with all products of rates and Ixz: Klein & Morelli, "Aircraft System Identification" (2006), eqs.
 3.35 to 3.37; coefficients from them eqs. 5.96 to 5.101. Body axes FRD, SI, radians.
@@ -53,8 +53,8 @@ class Layout:
     """Which column of the signal vector is what: six coefficients, three nuisances, then the regressors."""
 
     regressors: tuple[str, ...]  # controls come last
-    timed: tuple[str, ...] = ()  # controls whose rates are transformed too, see ``timing``
-    instrumented: tuple[str, ...] = ()  # regressors that have an instrument of their own, see ``auxiliary``
+    timed: tuple[str, ...] = ()  # controls whose rates are transformed too, see ``actuator_lag_test``
+    instrumented: tuple[str, ...] = ()  # regressors that have an instrument of their own, see ``instruments``
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -172,7 +172,7 @@ def _scales(aircraft: Aircraft) -> tuple[float, float, float]:
 def momentum_gain(aircraft: Aircraft) -> MomentumGain:
     """Function from p, q, r, cos alpha, sin alpha at both ends of an interval to what the six coefficients gain by it.
 
-    That is the area (see ``transform``) of their parts in the angular accelerations. Scalars or columns.
+    That is the area (see ``fourier_transform``) of their parts in the angular accelerations. Scalars or columns.
     """
     (_, pY, pZ, pL, _, pN), (qX, _, qZ, _, qM, _), (rX, rY, _, rL, _, rN) = momentum_matrix(aircraft).tolist()
 

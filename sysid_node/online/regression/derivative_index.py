@@ -35,7 +35,7 @@ class DerivativeIndex:
 
 
 def derivative_index(aircraft: Aircraft, equations: NormalEquations, valid_fraction: float) -> DerivativeIndex:
-    """The aircraft's derivatives in the solution of its ``plan``.
+    """The aircraft's derivatives in the solution of its ``equations``.
 
     A standard error is measured against the believed size of a derivative, or twice its tolerance where that is more:
     not against the estimate, which would call the large ones of many chance values valid. An estimate is valid with a

@@ -192,7 +192,7 @@ def _project_out(gram: Array) -> None:
 
 
 def measure(transform: Array, model: InstrumentModel | None, lines: Spectrum, begin: float, end: float) -> Information:
-    """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``uneven``: none."""
+    """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``noise_moments``: none."""
     clean = clean_lines(transform, model)
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
