@@ -46,7 +46,7 @@ def sensed(
 ) -> Array:
     """(C,) density of the sensors' noise in the residuals.
 
-    ``bias`` (W, W): of the noise of the regressors, per line and second (``regressor_noise.gram_bias``); ``step`` (s): IMU
+    ``bias`` (W, W): noise of the regressors, per line and second (``regressor_noise.gram_bias``); ``step`` (s): IMU
     interval; ``omega`` (F,) rad/s: the lines, over which a rate's derivative has the noise of the rate times omega.
     """
     v = misfits(equations, solution.theta)
