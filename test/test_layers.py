@@ -102,20 +102,13 @@ def test_rooms_of_a_layer_import_in_one_direction(layer: str) -> None:
                 assert order.index(parts[2]) <= order.index(room), f"{path.relative_to(PACKAGE)} imports {name}"
 
 
-#: Imports, by module, that close a circle and are still to be removed.
-KNOWN_IN_CIRCLES = {
-    ("sysid_node.online.regression.heteroskedasticity", "sysid_node.online.regression.least_squares"),
-}
-
-
 def test_no_modules_import_each_other_in_a_circle() -> None:
     parts = {path: path.relative_to(PACKAGE.parent).with_suffix("").parts for path in modules()}
     names = {".".join(part for part in words if part != "__init__"): path for path, words in parts.items()}
     graph = {}
     for name, path in names.items():
         imported = {part for full in imports(path) for part in (full, full.rpartition(".")[0])}
-        known = {to for of, to in KNOWN_IN_CIRCLES if of == name}
-        graph[name] = imported & names.keys() - {name} - known
+        graph[name] = imported & names.keys() - {name}
     try:
         list(TopologicalSorter(graph).static_order())
     except CycleError as error:

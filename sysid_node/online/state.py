@@ -116,6 +116,6 @@ class EstimatorState:
     present: Information | None = None  # the present segment's, at the last renewal
     latest: SegmentSolution | None = None
     change_monitor: ChangeMonitor = field(default_factory=ChangeMonitor)
-    excited_segments: list[ExcitedSegments] = field(default_factory=list)  # by block of the plan
+    excited_segments: list[ExcitedSegments] = field(default_factory=list)  # by block of the normal equations
     pieces: int = 0  # number of pieces finished
     changed_at: float = -math.inf

@@ -17,8 +17,8 @@ class DerivativeIndex:
     """Over the D derivatives whose equations can be formed, in the aircraft file's order."""
 
     names: tuple[str, ...]
-    coefficient: NDArray[np.intp]  # (D,) index into the plan's coefficients
-    unknown: NDArray[np.intp]  # (D,) index into the plan's unknowns; 0 for an offset
+    coefficient: NDArray[np.intp]  # (D,) index into the normal equations' coefficients
+    unknown: NDArray[np.intp]  # (D,) index into the normal equations' unknowns; 0 for an offset
     offset: NDArray[np.bool_]  # (D,) whether it is a C_0
     place: NDArray[np.intp]  # (D,) index in (C, P + 1): the coefficients' slopes and, behind them, offsets
     allowed: NDArray[np.float64]  # (D,) the largest standard error of a valid estimate
