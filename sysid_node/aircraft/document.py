@@ -20,6 +20,23 @@ class Entry:
     key: str
     file: str
 
+    @property
+    def is_mapping(self) -> bool:
+        """Whether the value is a mapping."""
+        return isinstance(self.node, yaml.MappingNode)
+
+    @property
+    def is_list(self) -> bool:
+        """Whether the value is a list."""
+        return isinstance(self.node, yaml.SequenceNode)
+
+    def truth(self, expected: str) -> bool:
+        """The value as true or false."""
+        word = str(self.node.value).lower() if self._is_plain() else ""
+        if word not in ("true", "false"):
+            raise self.mismatch(expected)
+        return word == "true"
+
     def error(self, problem: str) -> InputError:
         """The error about this value: ``file:line: dotted.key: problem``."""
         return InputError(f"{self.file}:{self.node.start_mark.line + 1}: {self.key or 'top level'}: {problem}")

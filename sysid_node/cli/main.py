@@ -10,12 +10,13 @@ import argparse
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from typing import NoReturn
 
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, ModelWarning
 
 COMMANDS = {
     "replay": "identify an aircraft from a bag, as the live node does",
@@ -55,7 +56,9 @@ def _run(command: str, arguments: Sequence[str]) -> int:
     if not args.command:
         parser.print_help()
         return BAD_INPUT
-    import_module(f"sysid_node.cli.{command}").run(args)
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning(command, warnings.showwarning)
+        import_module(f"sysid_node.cli.{command}").run(args)
     return DONE
 
 
@@ -100,6 +103,18 @@ def _one_thread_for_linear_algebra() -> None:
     """
     if "OMP_NUM_THREADS" not in os.environ:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def _show_warning(command: str, usual: Callable[..., None]) -> Callable[..., None]:
+    """A ``warnings.showwarning`` that prints a warning about a model as one line, and any other as usual."""
+
+    def show(message: Warning | str, category: type[Warning], *place: object) -> None:
+        if issubclass(category, ModelWarning):
+            print(f"sysid {command}: warning: {' '.join(str(message).split())}", file=sys.stderr)
+        else:
+            usual(message, category, *place)
+
+    return show
 
 
 def _say(command: str, message: str, code: int) -> int:
