@@ -102,7 +102,8 @@ def _words(action: argparse.Action) -> str:
 def _default(action: argparse.Action) -> str:
     if action.required and action.option_strings:
         return "needed"
-    if action.default in (None, False, argparse.SUPPRESS, []) or not action.option_strings:
+    switch = isinstance(action, argparse._StoreConstAction)  # it is given or not: it has no value to fall back on
+    if switch or action.default in (None, argparse.SUPPRESS, []) or not action.option_strings:
         return ""
     return f"`{action.default}`"
 
@@ -253,9 +254,10 @@ def source_map() -> str:
 
 def _first_sentence(path: Path) -> str:
     said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    paragraph = " ".join(said.split("\n\n")[0].split())
-    sentence = re.split(r"(?<=[.:;])\s", paragraph.replace("``", "`"), maxsplit=1)[0].rstrip(":;.")
-    return sentence + ("." if sentence else "")
+    paragraph = re.sub(r"^(Layer `\w+`|sysid): ", "", " ".join(said.split("\n\n")[0].split()).replace("``", "`"))
+    ends = r"(?<=\.)\s" if path.stem == "__init__" else r"(?<=[.:;])\s"  # a package's sentence lists what is inside
+    sentence = re.split(ends, paragraph, maxsplit=1)[0].rstrip(":;.")
+    return sentence[:1].upper() + sentence[1:] + ("." if sentence else "")
 
 
 def _dotted(path: Path) -> str:
