@@ -101,6 +101,11 @@ def resume(state: AxisAdaptation, now: float) -> None:
     state.left = None
 
 
+def forget(state: AxisAdaptation) -> None:
+    """Do not return to the target before the baseline: gains are adapted by new estimates only."""
+    state.left, state.used = None, ()
+
+
 def consider(
     state: AxisAdaptation, estimates: Mapping[str, IdentifiedDerivative], settings: ControllerSettings, now: float
 ) -> None:

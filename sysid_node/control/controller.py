@@ -13,12 +13,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import adaptation, law
 from sysid_node.control.adaptation import AxisAdaptation
 from sysid_node.control.axis import axes
+from sysid_node.control.input_checks import InputChecks
 from sysid_node.control.law import LONGEST_STEP, LawState
 from sysid_node.control.settings import ControllerSettings
+from sysid_node.control.tracking import TrackingWatch
 from sysid_node.control.types import Command, IdentifiedDerivative, Measurements, SetPoints
 
 NO_EXCITATION = (0.0, 0.0, 0.0)
@@ -32,6 +36,8 @@ class ControllerState:
     settings: ControllerSettings
     axes: tuple[AxisAdaptation, AxisAdaptation]  # pitch, lateral
     law: LawState
+    checks: InputChecks
+    tracking: TrackingWatch
     time: float = math.nan  # s, of the last step
     estimates_time: float = -math.inf  # s, of the last estimates
     stale: str = "no estimates yet"  # the reason why the baseline is flown; empty where estimates are used
@@ -43,12 +49,14 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> ControllerState:
     Raises InputError where the aircraft file or the actuators do not suffice.
     """
     pitch, lateral = (adaptation.init(axis) for axis in axes(aircraft, settings.actuator_lag, settings.delay))
-    return ControllerState(settings, (pitch, lateral), law.init(aircraft, settings))
+    flown = law.init(aircraft, settings)
+    checks = InputChecks(np.minimum(flown.limits, settings.largest_excitation))
+    return ControllerState(settings, (pitch, lateral), flown, checks, TrackingWatch(settings.largest_tracking_error))
 
 
 def receive_estimates(state: ControllerState, time: float, estimates: Mapping[str, IdentifiedDerivative]) -> None:
     """Take new estimates at a time (s, by the sensors' clock)."""
-    state.estimates_time = time
+    state.estimates_time, estimates = time, state.checks.estimates(estimates)
     if state.settings.adapt and not state.stale:
         for axis in state.axes:
             adaptation.consider(axis, estimates, state.settings, time)
@@ -57,7 +65,11 @@ def receive_estimates(state: ControllerState, time: float, estimates: Mapping[st
 def step(
     state: ControllerState, measured: Measurements, points: SetPoints, excitation: Sequence[float] = NO_EXCITATION
 ) -> Command:
-    """The command at ``measured.time``; ``excitation`` (rad) of elevator, aileron and rudder is added to it."""
+    """The command at ``measured.time``; ``excitation`` (rad) of elevator, aileron and rudder is added to it.
+
+    Measurements that are implausible count as not measured, and the excitation is limited; ``checks`` counts both.
+    """
+    measured, added = state.checks.measurements(measured), state.checks.excitation(excitation)
     elapsed = measured.time - state.time
     duration = min(elapsed, LONGEST_STEP) if elapsed > 0.0 else FIRST_STEP
     state.time = measured.time
@@ -65,13 +77,18 @@ def step(
     for axis in state.axes:
         if state.stale:
             adaptation.fall_back(axis, state.stale, measured.time)
+            if state.tracking.lost:
+                adaptation.forget(axis)
         else:
             adaptation.resume(axis, measured.time)
     for axis in state.axes:
         adaptation.advance(axis, state.settings, duration)
     pitch, lateral = state.axes
     parameters = ((pitch.axis, pitch.flown), (lateral.axis, lateral.flown))
-    return law.step(state.law, measured, points, parameters, excitation, duration)
+    command = law.step(state.law, measured, points, parameters, added, duration)
+    if state.law.wanted is not None:
+        state.tracking.update(measured, state.law.wanted)
+    return command
 
 
 def _stale_reason(state: ControllerState, measured: Measurements) -> str:
@@ -81,6 +98,8 @@ def _stale_reason(state: ControllerState, measured: Measurements) -> str:
         return f"{silent[0]} not measured"
     if not state.settings.adapt:
         return "adaptation is off"
+    if state.tracking.lost:
+        return f"the tracking error was over {state.settings.largest_tracking_error:g} rad"
     age = abs(measured.time - state.estimates_time)  # the clock may step back
     if age > state.settings.stale_after:
         return f"no estimates for {age:.1f} s" if math.isfinite(age) else "no estimates yet"

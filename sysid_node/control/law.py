@@ -55,6 +55,9 @@ class LawState:
     gains: tuple[Array, ...] = ()  # (m, n) of both axes, the last
     pending: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback within the actuators' delay
     wanted: ReferenceMotion | None = None  # the delayed reference, with which the motion is compared
+    at_limit: NDArray[np.bool_] = field(
+        default_factory=lambda: np.zeros(3, bool)
+    )  # surfaces at the end of their travel
 
 
 def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
@@ -71,7 +74,7 @@ def step(
     measured: Measurements,
     points: SetPoints,
     flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]],
-    excitation: Sequence[float],
+    excitation: Sequence[float] | Array,
     step: float,
 ) -> Command:
     """The command now, ``step`` (s) after the last one; ``excitation`` (3,) rad is added to it."""
@@ -83,8 +86,9 @@ def step(
     if law.reference is None:
         law.reference = ReferenceState(_finite(measured.theta, level), _finite(measured.phi, 0.0))
     pitch, side = (dict(zip(axis.derivatives, f.values.tolist(), strict=True)) for axis, f in flown)
+    s = law.settings
     flight = reference.FlightCondition(
-        law.airspeed, level, scales.force * side.get("CY_beta", 0.0), law.settings.bandwidth
+        law.airspeed, level, scales.force * side.get("CY_beta", 0.0), s.bandwidth, s.largest_pitch, s.largest_roll
     )
     wanted = reference.advance(law.reference, points, step, flight)
     forward = _feedforward(law.reference, wanted, pitch, side, scales, step)
@@ -183,7 +187,11 @@ def _transfer_bumplessly(
 
 
 def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -> None:
-    """Advance the model of the surfaces' deflections, with the delay and lag of the actuators."""
+    """Advance the model of the surfaces' deflections, with the delay and lag of the actuators.
+
+    A surface moves by its whole travel at most, whatever the feedforward has asked for.
+    """
+    feedback = np.clip(feedback, -2.0 * law.limits, 2.0 * law.limits)
     late = reference.delayed(law.pending, time, feedback, law.settings.delay)
     law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (late - law.surfaces)
 
@@ -194,7 +202,7 @@ def _limited(law: LawState, asked: Array, step: float) -> tuple[Array, NDArray[n
     if law.command is not None:
         reach = law.settings.command_rate * step
         within = np.clip(within, law.command - reach, law.command + reach)
-    law.command = within
+    law.command, law.at_limit = within, np.abs(within) >= law.limits
     return within, np.abs(within - asked) > 1e-9
 
 

@@ -44,6 +44,8 @@ class FlightCondition(NamedTuple):
     level: float  # rad, angle of attack of level flight
     side: float  # 1/s, qbar S CY_beta / (m V)
     bandwidth: float  # rad/s
+    largest_pitch: float = math.inf  # rad
+    largest_roll: float = math.inf  # rad
 
 
 @dataclass
@@ -86,13 +88,13 @@ def limited(points: SetPoints, level: float, speed: float, settings: ControllerS
 def advance(state: ReferenceState, points: SetPoints, step: float, flight: FlightCondition) -> ReferenceMotion:
     """The reference motion a ``step`` (s) later. The caller moves alpha on, which follows from the elevator."""
     w, level, airspeed = flight.bandwidth, flight.level, flight.airspeed
-    q_rate = _pitch_acceleration(state, points, w)
+    q_rate = _pitch_acceleration(state, points, flight)
     p_rate = _within(w * w * (points.roll - state.phi) - 2.0 * DAMPING * w * state.p, MOST_ACCELERATION)
     beta_rate = w * (points.sideslip - state.beta)
     state.q = _within(state.q + q_rate * step, MOST_RATE)
     state.p = _within(state.p + p_rate * step, MOST_RATE)
-    state.theta += state.q * step
-    state.phi += state.p * step
+    state.theta, state.q = _bounded(state.theta, state.q, step, flight.largest_pitch)
+    state.phi, state.p = _bounded(state.phi, state.p, step, flight.largest_roll)
     state.beta += beta_rate * step
     sin, cos = math.sin(level), math.cos(level)
     pull = GRAVITY / airspeed * cos
@@ -103,10 +105,25 @@ def advance(state: ReferenceState, points: SetPoints, step: float, flight: Fligh
     return ReferenceMotion(state.theta, state.q, state.phi, p, r, state.alpha, state.beta, q_rate, p_rate, r_rate, turn)
 
 
-def _pitch_acceleration(state: ReferenceState, points: SetPoints, w: float) -> float:
+def _pitch_acceleration(state: ReferenceState, points: SetPoints, flight: FlightCondition) -> float:
+    """Pitch acceleration (rad/s^2) towards the pitch, or towards the pitch rate where one is asked for.
+
+    Near the largest pitch the rate that is asked for falls in proportion to what is left, at half of the bandwidth:
+    with the rate's own model, of twice the bandwidth, this is critically damped, and the pitch does not overshoot.
+    """
+    w, most = flight.bandwidth, flight.largest_pitch
     if math.isnan(points.pitch_rate):
         return _within(w * w * (points.pitch - state.theta) - 2.0 * DAMPING * w * state.q, MOST_ACCELERATION)
-    return _within(2.0 * w * (points.pitch_rate - state.q), MOST_ACCELERATION)
+    upper, lower = 0.5 * w * (most - state.theta), 0.5 * w * (-most - state.theta)
+    return _within(2.0 * w * (min(max(points.pitch_rate, lower), upper) - state.q), MOST_ACCELERATION)
+
+
+def _bounded(angle: float, rate: float, step: float, most: float) -> tuple[float, float]:
+    """Angle and rate a ``step`` (s) later; the angle does not grow beyond ``most``, but may return from beyond it."""
+    later = angle + rate * step
+    if abs(later) <= max(most, abs(angle)):
+        return later, rate
+    return math.copysign(max(most, abs(angle)), later), 0.0
 
 
 def _within(value: float, most: float) -> float:

@@ -25,6 +25,9 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "largest_roll": (0.05, 1.2),
     "largest_pitch": (0.05, 0.8),
     "largest_sideslip": (0.0, 0.4),
+    "largest_excitation": (0.0, 0.5),
+    "largest_tracking_error": (0.1, 3.0),
+    "set_points_expire_after": (0.1, 3600.0),
 }
 
 
@@ -47,6 +50,9 @@ class ControllerSettings:
     largest_roll: float = 0.8  # rad
     largest_pitch: float = 0.4  # rad
     largest_sideslip: float = 0.15  # rad
+    largest_excitation: float = 0.1  # rad, of each surface; never more than the surface's own limit
+    largest_tracking_error: float = 0.6  # rad of pitch or roll, beyond which the baseline gains are flown
+    set_points_expire_after: float = 2.0  # s, after which level flight is flown
 
     def __post_init__(self) -> None:
         for name, (lower, upper) in RANGES.items():

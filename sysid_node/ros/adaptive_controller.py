@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections import Counter
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
@@ -17,8 +19,9 @@ from sysid_node.control import controller
 from sysid_node.control.allocation import Allocation
 from sysid_node.control.estimates import identified_derivatives
 from sysid_node.control.plant import CONTROLS
+from sysid_node.control.set_point_input import SetPointInput
 from sysid_node.control.settings import RANGES, ControllerSettings
-from sysid_node.control.types import Command, Measurements, SetPoints
+from sysid_node.control.types import Command, Measurements
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.arrivals import Arrivals
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
@@ -34,6 +37,7 @@ from sysid_node.ros.support.loop_node import (
     EXCITATION,
     LAG,
     LATEST,
+    SET_POINT_QOS,
     SET_POINTS,
     LoopNode,
     by_name,
@@ -84,6 +88,24 @@ PARAMETERS = (
     _setting("largest_roll", "rad", "Largest roll set-point.", "Up for aerobatics."),
     _setting("largest_pitch", "rad", "Largest pitch set-point.", "Up for aerobatics."),
     _setting("largest_sideslip", "rad", "Largest sideslip set-point.", "Up for crosswind landings."),
+    _setting(
+        "largest_excitation",
+        "rad",
+        "Largest excitation of a surface; more is clipped.",
+        "Up together with the exciter's largest_amplitude.",
+    ),
+    _setting(
+        "largest_tracking_error",
+        "rad",
+        "Of pitch or roll; beyond it the baseline is flown until the error was small for 5 s.",
+        "Up for aerobatics.",
+    ),
+    _setting(
+        "set_points_expire_after",
+        "s",
+        "Without set-points for so long, level flight is flown.",
+        "Up where set-points come rarely.",
+    ),
 )
 SENSOR_AGE = 0.5  # s: older air data count as not measured
 IMU_AGE = 0.1  # s without an IMU message, after which the surfaces return to their positions in level flight
@@ -98,21 +120,25 @@ class AdaptiveController(LoopNode):
         super().__init__("adaptive_controller", PARAMETERS)
         self._state = controller.init(self.aircraft, ControllerSettings.from_mapping(self.values))
         self._allocation = Allocation.of(self.aircraft)
-        self._points = SetPoints()
+        self._points = SetPointInput(self.values["set_points_expire_after"])
         self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
         self._extra: tuple[float, list[float]] = (-math.inf, [0.0] * len(CONTROLS))
         self._now, self._imu_count, self._steps_without_imu = math.nan, 0, 0
-        self._imu = Arrivals(IMU, IMU_AGE)
-        self._others = {topic: Arrivals(topic, age) for topic, age in AGES.items()}
         self._start_ns = 0
         self._work = Durations()
+        self._checked = Counter[str]()  # what the controller's checks had counted at the last report
+        self._present: dict[str, str] = {}  # the conditions of the last report
+        self._wrong: dict[str, str] = {}  # what was wrong with set-points and estimates since the last report
+        self._steps, self._steps_at_limit = 0, np.zeros(len(CONTROLS), int)  # since the last report
         self._command = self.create_publisher(JointState, COMMAND, 10)
         self._tracking = self.create_publisher(JointState, "~/tracking", 10)
         self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
-        self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
-        self.listen(JointState, EXCITATION, PATHS[ACTUATORS], self._on_excitation, LATEST)
-        self.listen(JointState, SET_POINTS, PATHS[ACTUATORS], self._on_set_points, 10)
+        self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.listen(JointState, EXCITATION, PATHS[ACTUATORS], self._on_excitation, LATEST, needed=False)
+        self.listen(JointState, SET_POINTS, PATHS[ACTUATORS], self._on_set_points, SET_POINT_QOS, needed=False)
+        self._imu = Arrivals(self.inputs[IMU].name, IMU_AGE)
+        self._others = {topic: Arrivals(self.inputs[topic].name, age) for topic, age in AGES.items()}
         self.every(0.02, self._watch)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
@@ -128,11 +154,35 @@ class AdaptiveController(LoopNode):
             values[f"{axis.axis.name}: estimates used"] = " ".join(axis.used)
             values[f"{axis.axis.name}: checks passed"] = axis.accepted
             values[f"{axis.axis.name}: checks failed"] = axis.refused
+        values |= {f"inputs: {what}": count for what, count in self._state.checks.counts.items()}
         line = "; ".join(f"{axis.axis.name}: {axis.verdict}" for axis in self._state.axes)
         if self._imu.silent() or not self._imu_count:
-            return DiagnosticStatus.ERROR, f"{IMU} silent: surfaces at level flight's; {line}", values
+            return DiagnosticStatus.ERROR, f"{self._imu.topic} silent: surfaces at level flight's; {line}", values
+        troubles += [f"{subject}: {text}" for subject, text in self._present.items()]
         line = "; ".join([line, *troubles])
         return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
+
+    def conditions(self) -> Mapping[str, str]:
+        """What arrived and was left out or clipped, surfaces at their limits, and a large tracking error."""
+        present, self._wrong = self._wrong, {}
+        counts, before = self._state.checks.counts, self._checked
+        present |= {f"input {what}": f"{n - before[what]} times" for what, n in counts.items() if n > before[what]}
+        self._checked = Counter(counts)
+        for name, steps, limit in zip(CONTROLS, self._steps_at_limit.tolist(), self._state.law.limits, strict=True):
+            if 2 * steps > self._steps:
+                present[name] = f"at its limit of {limit:g} rad"
+        self._steps, self._steps_at_limit = 0, np.zeros(len(CONTROLS), int)
+        if self._state.tracking.words:
+            present["tracking"] = self._state.tracking.words
+        if self._points.expired(time.monotonic()):
+            expired = f"none for {self.values['set_points_expire_after']:g} s: level flight is flown"
+            present["set-points"] = expired
+        self._present = present
+        return present
+
+    def states(self) -> Mapping[str, str]:
+        """The gains that are flown, and why."""
+        return {f"{axis.axis.name} gains": axis.verdict for axis in self._state.axes}
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
         stamp, (_x, _y, _z, p, q, r), (phi, theta) = messages.imu_and_attitude(numbers)
@@ -152,6 +202,10 @@ class AdaptiveController(LoopNode):
         self._air = (stamp - self._start_ns) / NANOSECONDS, values
 
     def _on_estimates(self, message: Any) -> None:
+        if message.aircraft != self.aircraft.name:
+            ours = f"of aircraft {message.aircraft!r}, left out: this node flies {self.aircraft.name!r}"
+            self._wrong[self.inputs[DERIVATIVES].name] = ours
+            return
         estimates = conversion.estimates_from_message(message, self._start_ns)
         self._others[DERIVATIVES].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
         controller.receive_estimates(self._state, estimates.time, identified_derivatives(estimates))
@@ -159,12 +213,13 @@ class AdaptiveController(LoopNode):
     def _on_excitation(self, numbers: Numbers, texts: Texts) -> None:
         stamp, values = by_name(numbers, texts)
         self._others[EXCITATION].arrived(stamp / NANOSECONDS)
-        found = [values.get(name, 0.0) for name in CONTROLS]
-        self._extra = time.monotonic(), found if all(map(math.isfinite, found)) else [0.0] * len(found)
+        self._extra = time.monotonic(), [values.get(name, 0.0) for name in CONTROLS]
 
     def _on_set_points(self, numbers: Numbers, texts: Texts) -> None:
         _stamp, values = by_name(numbers, texts)
-        self._points = SetPoints(**{name: values.get(name, math.nan) for name in SetPoints._fields})
+        wrong = self._points.receive(time.monotonic(), values)
+        if wrong:
+            self._wrong[self.inputs[SET_POINTS].name] = "; ".join(wrong)
 
     def _watch(self) -> None:
         """Without an IMU: no feedback, and the surfaces return to their positions in level flight."""
@@ -177,7 +232,8 @@ class AdaptiveController(LoopNode):
         start = time.perf_counter()
         heard, extra = self._extra
         excitation = extra if time.monotonic() - heard < EXCITATION_AGE else controller.NO_EXCITATION
-        command = controller.step(self._state, sensed, self._points, excitation)
+        command = controller.step(self._state, sensed, self._points.current(time.monotonic()), excitation)
+        self._steps, self._steps_at_limit = self._steps + 1, self._steps_at_limit + self._state.law.at_limit
         stamp = self._start_ns + round(NANOSECONDS * sensed.time)
         self._command.publish(named(stamp, self._joints(command)))
         self._tracking.publish(named(stamp, self._errors(sensed)))

@@ -83,7 +83,7 @@ class Exciter(LoopNode):
         self._reset = self.create_client(Trigger, "identifier/reset")
         self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
-        self.create_subscription(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.every(PERIOD, self._on_time)

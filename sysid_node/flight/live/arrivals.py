@@ -29,6 +29,7 @@ class Arrivals:
     clock: Callable[[], float] = time.monotonic  # s
     heard: float = -math.inf  # s, by ``clock``, of the last message
     stamp: float = math.nan  # s, the newest
+    start: tuple[float, float] = (math.nan, math.nan)  # s, ``clock`` and stamp when the stamps began, or were set
     intervals: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))  # s between stamps
     smallest_delay: float = math.inf  # s, arrival less stamp, in this period
     smallest_before: float = math.inf  # s, in the period before
@@ -44,15 +45,18 @@ class Arrivals:
         now = self.clock()
         if self.silent():
             self._add(f"was silent for {now - self.heard:.1f} s")
+        step, expected = stamp - self.stamp, self._expected_step(now)
         self.heard = now
-        step = stamp - self.stamp
         if -STEP_BACK < step <= 0.0:
             self._add("out of order")
             return False
-        if step <= -STEP_BACK or step > STEP_AHEAD:
+        if math.isnan(self.start[0]):
+            self.start = now, stamp
+        if step <= -STEP_BACK or step - expected > STEP_AHEAD:
+            self.start = now, stamp
             self._add(f"clock set by {step:+.1f} s")
             self.smallest_delay = self.smallest_before = math.inf
-        elif step > 0.0:
+        elif 0.0 < step < self.silent_after:  # a silence is said as such, not as messages that are missing
             self._count_missing(step)
         self.stamp, self.received = stamp, self.received + 1
         self._compare_delay(now, now - stamp)
@@ -75,6 +79,17 @@ class Arrivals:
         self.count += share > SHARE or self.largest_delay > LATE
         self.received, self.missing, self.largest_delay = 0, 0, 0.0
         return [f"{self.topic} {problem}" for problem in words]
+
+    def _expected_step(self, now: float) -> float:
+        """The step (s) of the stamps since the last message, at the pace at which they have run; 0 where it is unknown.
+
+        A simulation runs faster or slower than the real clock, so that stamps go on at another pace during a silence.
+        """
+        began, stamp = self.start
+        lasted = self.heard - began
+        pace = (self.stamp - stamp) / lasted if lasted > 1.0 else 1.0
+        expected = pace * (now - self.heard)
+        return expected if math.isfinite(expected) else 0.0
 
     def _add(self, event: str) -> None:
         self.events.append(event)

@@ -18,9 +18,10 @@ class TopicMonitor:
     last: float = float("nan")  # s, by ``clock``, of the last message
     _counted: int = 0  # messages at the last call of ``rate``
     _since: float = float("nan")  # s, of that call
+    _made: float = float("nan")  # s
 
     def __post_init__(self) -> None:
-        self._since = self.clock()
+        self._since = self._made = self.clock()
 
     def arrived(self) -> None:
         """Count one more message."""
@@ -30,6 +31,10 @@ class TopicMonitor:
     def silence(self) -> float:
         """Seconds since the last message, NaN where there was none."""
         return self.clock() - self.last
+
+    def waited(self) -> float:
+        """Seconds since the last message, or since this monitor was made where there was none."""
+        return self.clock() - (self.last if self.received else self._made)
 
     def rate(self) -> float:
         """Messages per second since the last call of this method."""

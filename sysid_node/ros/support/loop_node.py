@@ -18,7 +18,9 @@ from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.flight.live import messages
-from sysid_node.flight.live.messages import Numbers, Paths, Texts
+from sysid_node.flight.live.conditions import Conditions, States
+from sysid_node.flight.live.messages import UNREADABLE, Numbers, Paths, Texts
+from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.parameter import Parameter, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
@@ -35,6 +37,9 @@ LATEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: Best effort, as sensor data are published; deep enough for a burst after a pause of the process.
 SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
+#: Best effort takes publishers of either reliability.
+SET_POINT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+
 #: The parameter that all nodes of the loop have.
 AIRCRAFT = Parameter(
     "aircraft",
@@ -45,6 +50,7 @@ AIRCRAFT = Parameter(
 )
 #: The parameter of the nodes that model the surfaces.
 LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
+UNHEARD = 2.0  # s without a message, after which a node says so in its log
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
@@ -53,11 +59,15 @@ class LoopNode(Node, ABC):
 
     def __init__(self, name: str, table: Sequence[Parameter], live: frozenset[str] = frozenset()) -> None:
         super().__init__(name)
+        self.inputs: dict[str, TopicMonitor] = {}  # by topic; the monitors' names are the resolved ones
+        self._needed: set[str] = set()  # topics without which the node cannot do its work
+        self._unreadable: dict[str, int] = {}  # messages since the last report, by resolved topic
+        self._conditions, self._states = Conditions(), States()
         self._table, self._live = table, live
         declare(self, table, lambda values: check_each(table, values))
         self.values = values_of(self, table)
         if not self.values["aircraft"]:
-            raise InputError("parameter aircraft is empty: give a name or a file, e.g. -p aircraft:=cdrw")
+            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
         self.aircraft = load_aircraft(self.values["aircraft"])
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.add_on_set_parameters_callback(self._on_parameters)
@@ -70,12 +80,27 @@ class LoopNode(Node, ABC):
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
         """Level, message and values for /diagnostics."""
 
+    def conditions(self) -> Mapping[str, str]:
+        """What is wrong now, besides silent inputs: subject -> text. It is said in the log."""
+        return {}
+
+    def states(self) -> Mapping[str, str]:
+        """What the node does: subject -> text. Changes are said in the log."""
+        return {}
+
     def listen(
-        self, kind: Any, topic: str, paths: Paths, take: Callable[[Numbers, Texts], None], profile: QoSProfile | int
+        self,
+        kind: Any,
+        topic: str,
+        paths: Paths,
+        take: Callable[[Numbers, Texts], None],
+        profile: QoSProfile | int,
+        needed: bool = True,
     ) -> None:
         """Subscribe to the numbers and texts at ``paths`` of messages that stay serialised; skip unreadable ones.
 
-        To make objects of all parts of a message would take longer than the work on it.
+        To make objects of all parts of a message would take longer than the work on it. Where a topic that is
+        ``needed`` is silent, the node says so.
         """
         reader = MessageReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *paths)
 
@@ -83,11 +108,32 @@ class LoopNode(Node, ABC):
             try:
                 message = reader.read(raw)
             except DamageError:
-                self.get_logger().warning(f"{topic}: {messages.UNREADABLE}", throttle_duration_sec=1.0)
+                name = self.inputs[topic].name
+                self._unreadable[name] = self._unreadable.get(name, 0) + 1
                 return
             take(*message)
 
-        self.create_subscription(kind, topic, on_message, profile, raw=True)
+        self.hear(kind, topic, on_message, profile, needed, raw=True)
+
+    def hear(
+        self,
+        kind: Any,
+        topic: str,
+        take: Callable[[Any], None],
+        profile: QoSProfile | int,
+        needed: bool = True,
+        raw: bool = False,
+    ) -> None:
+        """Subscribe to messages, and count them."""
+        monitor = self.inputs[topic] = TopicMonitor(topic)
+
+        def on_message(message: Any) -> None:
+            monitor.arrived()
+            take(message)
+
+        monitor.name = self.create_subscription(kind, topic, on_message, profile, raw=raw).topic_name
+        if needed:
+            self._needed.add(topic)
 
     def every(self, period: float, callback: Any) -> None:
         """Call back every ``period`` s of a clock that never jumps."""
@@ -105,14 +151,42 @@ class LoopNode(Node, ABC):
         return SetParametersResult(successful=True)
 
     def _on_tick(self) -> None:
+        silent = self._silent()
+        unreadable = {name: f"{count} messages are {UNREADABLE}" for name, count in self._unreadable.items()}
+        self._unreadable = {}
+        for wrong, line in self._conditions.update({**silent, **unreadable, **self.conditions()}):
+            if wrong:  # a line each: rclpy knows a call by its line, and wants one severity of each
+                self.get_logger().warning(line)
+            else:
+                self.get_logger().info(line)
+        for line in self._states.update(self.states()):
+            self.get_logger().warning(line)
         level, line, values = self.words()
+        missing = [f"{name}: {text}" for name, text in {**silent, **unreadable}.items() if name not in line]
         pairs = [KeyValue(key=k, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for k, v in values.items()]
         status = DiagnosticStatus(
-            level=level, name=f"{self.get_name()}: state", message=line, hardware_id=self.aircraft.name, values=pairs
+            level=max(level, DiagnosticStatus.WARN) if missing else level,
+            name=f"{full_name(self)}: state",
+            message="; ".join([line, *missing]),
+            hardware_id=self.aircraft.name,
+            values=pairs,
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
+
+    def _silent(self) -> dict[str, str]:
+        """The needed topics without a message for ``UNHEARD`` s, by resolved name."""
+        return {
+            monitor.name: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
+            for topic, monitor in self.inputs.items()
+            if topic in self._needed and monitor.waited() > UNHEARD
+        }
+
+
+def full_name(node: Node) -> str:
+    """The node's name with its namespace, without the first slash."""
+    return str(node.get_fully_qualified_name()).lstrip("/")
 
 
 def named(stamp_ns: int, values: Mapping[str, float]) -> JointState:

@@ -100,3 +100,18 @@ def test_a_clock_that_steps_back(clock: Clock) -> None:
     assert topic.arrived(newest - 5.0)
     assert topic.troubles() == ["imu/data out of order", "imu/data clock set by -5.0 s"]
     assert topic.count == 2
+
+
+@pytest.mark.parametrize("pace", [1.0, 10.0])
+def test_a_silence_is_no_clock_that_was_set(clock: Clock, pace: float) -> None:
+    """The sender goes on after 8 s, its stamps as far ahead as its clock has run; a simulation's may run faster."""
+    topic = Arrivals("imu/data", 0.1, clock)
+    for k in range(300):
+        clock.now += 0.01
+        topic.arrived(1000.0 + 0.01 * pace * k)
+    clock.now += 8.0
+    topic.arrived(1000.0 + pace * (3.0 + 8.0))
+    assert topic.troubles() == ["imu/data was silent for 8.0 s"]
+    clock.now += 0.01
+    topic.arrived(topic.stamp + 60.0)
+    assert topic.troubles() == ["imu/data clock set by +60.0 s"]
