@@ -134,7 +134,7 @@ class AdaptiveController(LoopNode):
         self._tracking = self.create_publisher(JointState, "~/tracking", 10)
         self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
-        self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10, needed=self.values["adapt"])
         self.listen(JointState, EXCITATION, PATHS[ACTUATORS], self._on_excitation, LATEST, needed=False)
         self.listen(JointState, SET_POINTS, PATHS[ACTUATORS], self._on_set_points, SET_POINT_QOS, needed=False)
         self._imu = Arrivals(self.inputs[IMU].name, IMU_AGE)

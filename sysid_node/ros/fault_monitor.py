@@ -71,8 +71,8 @@ class FaultMonitor(LoopNode):
         self.listen(Imu, IMU, PATHS[IMU], self._on_imu, SENSOR_QOS)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, SENSOR_QOS)
         self.listen(JointState, ACTUATORS, PATHS[ACTUATORS], self._on_actuators, SENSOR_QOS)
-        self.listen(JointState, COMMAND, PATHS[ACTUATORS], self._on_command, SENSOR_QOS)
-        self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.listen(JointState, COMMAND, PATHS[ACTUATORS], self._on_command, SENSOR_QOS, needed=False)
+        self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10, needed=False)
         self.every(PERIOD, self._on_time)
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
