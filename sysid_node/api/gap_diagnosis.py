@@ -19,7 +19,8 @@ from sysid_node.gap.diagnose import diagnose as diagnose_flights
 from sysid_node.gap.document import document
 from sysid_node.gap.flightdata.gap_flight import load_gap_flight
 from sysid_node.report.drawing.plotly_figure import plotly_figure
-from sysid_node.report.files.gap_folder import corrected_aircraft, write_gap
+from sysid_node.report.files.gap_folder import UNFINISHED, corrected_aircraft, write_gap
+from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import REPORT
 from sysid_node.report.sections.gap.flight import flight_figures
 from sysid_node.report.sections.gap.paragraph import paragraph
@@ -77,9 +78,18 @@ class GapDiagnosis:
         columns = {name: [row[name] for row in rows] for name in ("probability", "share")}
         return data_frame(columns, index=[row["effect"] for row in rows], index_name="effect")
 
-    def save(self, folder: str | Path) -> Path:
-        """Write what ``sysid gap`` writes; returns the path of the report. Raises InputError."""
-        write_gap(Path(folder), self.diagnosis)
+    def write(self, folder: Path) -> None:
+        """Write what ``sysid gap`` writes into a folder that holds nothing else. Raises InputError."""
+        write_gap(folder, self.diagnosis)
+
+    def save(self, folder: str | Path, *, force: bool = False) -> Path:
+        """Write what ``sysid gap`` writes; returns the path of the report.
+
+        Raises InputError where the folder holds anything but an earlier diagnosis and ``force`` is not given, or cannot
+        be written.
+        """
+        with output_folder(folder, "gap", force=force, working=[UNFINISHED]) as out:
+            out.publish(self.write)
         return Path(folder) / REPORT
 
     def __repr__(self) -> str:

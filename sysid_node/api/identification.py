@@ -14,6 +14,7 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.truth import read_truth
 from sysid_node.report.files.batch_tables import write_batch_tables
+from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import REPORT, write_run
 from sysid_node.report.results.from_identification import identification_result
 from sysid_node.report.results.run_result import RunResult
@@ -26,12 +27,20 @@ class BatchIdentification(EstimatedRun):
     run: RunResult
     identification: Identification
 
-    def save(self, folder: str | Path) -> Path:
-        """Write what ``sysid identify`` writes; returns the path of the report. Raises InputError."""
-        folder = Path(folder)
+    def write(self, folder: Path) -> None:
+        """Write what ``sysid identify`` writes into a folder that holds nothing else. Raises InputError."""
         write_run(folder, self.run)
         write_batch_tables(folder, self.identification)
-        return folder / REPORT
+
+    def save(self, folder: str | Path, *, force: bool = False) -> Path:
+        """Write what ``sysid identify`` writes; returns the path of the report.
+
+        Raises InputError where the folder holds anything but an earlier identification and ``force`` is not given, or
+        cannot be written.
+        """
+        with output_folder(folder, "identify", force=force) as out:
+            out.publish(self.write)
+        return Path(folder) / REPORT
 
 
 def identify(

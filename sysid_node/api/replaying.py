@@ -28,8 +28,8 @@ from sysid_node.online.alignment.whole_record import AlignedSamples, align_strea
 from sysid_node.online.replay import run as run_online
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
-from sysid_node.report.files.bag_folder import remove_earlier_bag
 from sysid_node.report.files.estimates_bag import write_estimates
+from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import REPORT, write_run
 from sysid_node.report.results.from_replay import replay_result
 from sysid_node.report.results.run_result import RunResult
@@ -81,18 +81,24 @@ class Replay(EstimatedRun):
         )
         return replace(result, settings={**result.settings, "publish_rate": self.publish_rate})
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write what ``sysid replay`` writes; returns the path of the report.
 
-        These are summary.json, the tables, report.html and the bag of all estimates. What an earlier replay left in
-        the folder is replaced. Raises InputError where the folder cannot be written.
+        What an earlier replay left in the folder is replaced. Raises InputError where the folder holds anything else
+        and ``force`` is not given, or cannot be written.
         """
-        folder = Path(folder)
+        with output_folder(folder, "replay", force=force) as out:
+            out.publish(self.write)
+        return Path(folder) / REPORT
+
+    def write(self, folder: Path) -> None:
+        """Write summary.json, the tables, report.html and the bag of all estimates into an empty folder.
+
+        Raises InputError where it cannot be written.
+        """
         write_run(folder, self.run)
-        bag = folder / ESTIMATES_BAG
-        remove_earlier_bag(bag, "sysid replay")
         write_estimates(
-            bag,
+            folder / ESTIMATES_BAG,
             self.history,
             self.stamps_ns,
             aircraft=self.aircraft.name,
@@ -100,7 +106,6 @@ class Replay(EstimatedRun):
             frame_id=self.streams.imu.frame_id,
             faults=self.faults.reports if self.faults else (),
         )
-        return folder / REPORT
 
 
 def replay(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.shared import options
 from sysid_node.flight.autopilots.base import AdapterSettings, adapter_for
 from sysid_node.flight.autopilots.known import ADAPTERS
 from sysid_node.flight.autopilots.recorded import read_recorded
@@ -14,6 +15,7 @@ from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.logs import READERS, read_log, streams_from_record
 from sysid_node.flight.streams import Streams
+from sysid_node.report.files.output_file import output_bag
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -26,6 +28,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument(
         "--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist"
     )
+    options.add_force(parser)
     parser.add_argument("--aircraft", help="file or name: its joints carry the controls; else elevator, aileron, ...")
     parser.add_argument("--autopilot", choices=list(ADAPTERS), help="LOG is a bag of this autopilot's own topics")
     parser.add_argument("--joints", default="", help="with --autopilot: NAME=OUTPUT:TRIM:SCALE ... in one argument")
@@ -48,8 +51,10 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Converts the log and prints what was written."""
-    streams = _recorded(args) if args.autopilot else _logged(args)
-    write_streams(args.out, streams, args.storage, args.body_frame)
+    inputs = options.inputs_of([args.log], args.aircraft)
+    with output_bag(args.out, inputs, force=args.force) as bag:
+        streams = _recorded(args) if args.autopilot else _logged(args)
+        write_streams(bag, streams, args.storage, args.body_frame)
     if not args.quiet:
         stamps = streams.imu.arrival.stamp_ns
         seconds = (stamps[-1] - stamps[0]) / 1e9

@@ -15,7 +15,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.live.live_table import LiveStatus, ReferenceValues, live_table
 from sysid_node.cli.live.processes import node_process
-from sysid_node.cli.live.ros_domain import make_folder, own_domain
+from sysid_node.cli.live.ros_domain import own_domain
+from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.align import why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
@@ -25,8 +26,10 @@ from sysid_node.flight.truth import read_truth
 from sysid_node.online.alignment.whole_record import AlignedSamples, align_streams
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
+from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import write_run
 from sysid_node.report.results.from_replay import replay_result
+from sysid_node.report.results.run_result import RunResult
 
 if TYPE_CHECKING:
     from sysid_node.ros.support.follower import Follower
@@ -74,6 +77,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("--aircraft", default="cdrw", help="file or name (default: cdrw)")
     parser.add_argument("--rate", type=float, default=1.0, help="how many times as fast as flown (default: 1)")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/demo"), help="default: out/demo")
+    options.add_force(parser)
     return parser
 
 
@@ -82,10 +86,20 @@ def run(args: argparse.Namespace) -> None:
     if not args.rate > 0.0:
         raise InputError(f"--rate {args.rate:g}: expected a number over zero")
     flight = _read(args.bag, load_aircraft(args.aircraft))
-    make_folder(args.out)
     own_domain()
-    follower, history = _fly(flight, args.aircraft, args.rate, args.out)
-    result = replay_result(
+    inputs, logs = options.inputs_of([args.bag], args.aircraft), ("identifier.log", "player.log")
+    with output_folder(args.out, "demo", inputs=inputs, force=args.force, working=logs) as out:
+        follower, history = _fly(flight, args.aircraft, args.rate, args.out)
+        out.publish(lambda folder: write_run(folder, _result(flight, follower, history)))
+    print(_summary(flight, history[-1], args.out))
+    lost = _lost(flight, follower)
+    if lost:
+        print(f"{lost} messages were lost on the way; a lower --rate loses fewer")
+
+
+def _result(flight: DemoFlight, follower: Follower, history: list[Estimates]) -> RunResult:
+    """What the report shows."""
+    return replay_result(
         flight.aircraft,
         OnlineSettings(),
         time=flight.aligned.time,
@@ -95,11 +109,6 @@ def run(args: argparse.Namespace) -> None:
         truth=flight.truth,
         title=f"{flight.bag.name}, identified live",
     )
-    write_run(args.out, result)
-    print(_summary(flight, history[-1], args.out))
-    lost = _lost(flight, follower)
-    if lost:
-        print(f"{lost} messages were lost on the way; a lower --rate loses fewer")
 
 
 def _read(bag: Path, aircraft: Aircraft) -> DemoFlight:
@@ -116,10 +125,11 @@ def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Fol
     The live table is shown until the flight is over.
     """
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
     from sysid_node.ros.support.follower import Follower  # noqa: PLC0415
 
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     follower = Follower(flight.start_ns)
     try:
         identifier = ["--ros-args", "-p", f"aircraft:={aircraft}", "-p", f"publish_rate:={PUBLISH_RATE}"]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
 from sysid_node.errors import InputError
+from sysid_node.report.files.output_folder import output_folder
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
@@ -31,7 +32,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add(
         "--manoeuvre", action="append", required=True, metavar="SPEC", help="e.g. 3211, or 3211:elevator:amplitude=0.05"
     )
-    add("--out", required=True, metavar="DIR", type=Path, help="folder for the results")
+    options.add_out(parser)
     add("--rate", type=float, default=100.0, help="samples a second (default: 100)")
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre)")
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
@@ -47,8 +48,10 @@ def run(args: argparse.Namespace) -> None:
     """Predicts, optimises with ``--optimise``, and writes the results."""
     from sysid_node.report.files.manoeuvre_folder import write_manoeuvre  # noqa: PLC0415  # JAX takes its time
 
-    result = design(args)
-    write_manoeuvre(args.out, result)
+    inputs = options.inputs_of([], args.aircraft)
+    with output_folder(args.out, "excite", inputs=inputs, force=args.force) as out:
+        result = design(args)
+        out.publish(lambda folder: write_manoeuvre(folder, result))
     if not args.quiet:
         print(result.prediction.manoeuvre.spec)
         print(args.out / "report.html")

@@ -11,10 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Derivative
+from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
+from sysid_node.report.files.output_file import check_file, write_file
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+#: What stands near the beginning of every file that this command writes, by which a later run knows it.
+MARK = "sysid export"
 
 FORMATS = ("jsbsim", "gazebo", "rosflight")
 
@@ -27,6 +32,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("--aircraft", help="file or name (default: the one that the estimate names)")
     parser.add_argument("--format", choices=FORMATS, required=True, help="whose model")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
+    options.add_force(parser)
     parser.add_argument(
         "--effect",
         action="append",
@@ -40,16 +46,15 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Reads the estimate and writes the model."""
+    inputs = options.inputs_of([args.estimate], args.aircraft)
+    check_file(args.out, inputs, MARK, force=args.force)
     summary = _summary(args.estimate)
     aircraft = load_aircraft(args.aircraft or (summary["aircraft"] if summary else args.estimate))
     left: list[str] = []
     if summary:
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
     text = _write(args.format, aircraft, args.effect)
-    try:
-        args.out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{args.out}: cannot be written: {error.strerror}; choose another file") from error
+    write_file(args.out, text)
     if not args.quiet:
         kept = f"; not valid, kept as in the aircraft file: {', '.join(left)}" if left else ""
         print(f"{args.out}: {aircraft.name} for {args.format}{kept}")

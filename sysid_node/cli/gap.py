@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 from sysid_node.api.flight_file import load
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
+from sysid_node.report.files.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
-
-#: Folder in ``--out`` that holds the finished steps of an interrupted run.
-UNFINISHED = "unfinished"
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -32,14 +30,17 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Diagnoses the flights and writes the results."""
     from sysid_node.api.gap_diagnosis import diagnose  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.report.files.gap_folder import UNFINISHED  # noqa: PLC0415
 
     flights, holdout = (
         [load(path, args.aircraft, topics=args.topic, body_frame=args.body_frame) for path in paths]
         for paths in (args.bags, args.holdout)
     )
-    with progress_bar("gap", quiet=args.quiet) as progress:
-        found = diagnose(flights, holdout=holdout, resume=args.out / UNFINISHED, progress=progress)
-    report = found.save(args.out)
+    inputs = options.inputs_of([*args.bags, *args.holdout], args.aircraft)
+    with output_folder(args.out, "gap", inputs=inputs, force=args.force, working=[UNFINISHED]) as out:
+        with progress_bar("gap", quiet=args.quiet) as progress:
+            found = diagnose(flights, holdout=holdout, resume=args.out / UNFINISHED, progress=progress)
+        out.publish(found.write)
     if not args.quiet:
         print(found.words)
-        print(report)
+        print(args.out / "report.html")

@@ -13,6 +13,7 @@ from sysid_node.batch.identify import METHODS
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar, show_estimates
+from sysid_node.report.files.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -40,9 +41,11 @@ def run(args: argparse.Namespace) -> None:
         for paths in (args.bag, args.holdout)
     )
     settings = options.settings_of(args.set, args.frequencies, "segment=10")
-    with progress_bar("identify", quiet=args.quiet) as progress:
-        found = identify(flights, args.method, settings, holdout=holdout, progress=progress)
-        report = found.save(args.out)
+    inputs = options.inputs_of([*args.bag, *args.holdout], args.aircraft)
+    with output_folder(args.out, "identify", inputs=inputs, force=args.force) as out:
+        with progress_bar("identify", quiet=args.quiet) as progress:
+            found = identify(flights, args.method, settings, holdout=holdout, progress=progress)
+        out.publish(found.write)
     if not args.quiet:
         show_estimates(found.run.history[-1], found.run.references.truth)
-        print(report)
+        print(args.out / "report.html")

@@ -20,9 +20,11 @@ from sysid_node.cli.live.loop_director import LoopDirector
 from sysid_node.cli.live.loop_scenario import NODES, ONSET, LoopScenario
 from sysid_node.cli.live.loop_table import loop_table
 from sysid_node.cli.live.processes import node_process
-from sysid_node.cli.live.ros_domain import make_folder, own_domain
+from sysid_node.cli.live.ros_domain import own_domain
+from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
+from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.pages.closed_loop_page import write_loop
 from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 
@@ -45,6 +47,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
     add("--method", choices=METHODS, default="sls_rft", help="of the identifier (default: sls_rft)")
     add("--out", metavar="DIR", type=Path, default=Path("out/loop"), help="default: out/loop")
+    options.add_force(parser)
     return parser
 
 
@@ -53,25 +56,32 @@ def run(args: argparse.Namespace) -> None:
     if not 5.0 <= args.seconds <= 36000.0:
         raise InputError(f"--seconds {args.seconds:g}: expected 5 to 36000")
     aircraft = load_aircraft(args.aircraft)
-    make_folder(args.out)
     own_domain()
     scenario = LoopScenario(
         aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.method, args.out
     )
     scenario.check_effects()
-    flight = _fly(scenario)
-    write_loop(args.out, flight)
-    (args.out / "summary.json").write_text(json.dumps(flight.summary(), indent=2) + "\n", encoding="utf-8")
+    inputs, logs = options.inputs_of([], args.aircraft), [f"{node}.log" for node in NODES]
+    with output_folder(args.out, "loop", inputs=inputs, force=args.force, working=logs) as out:
+        flight = _fly(scenario)
+        out.publish(lambda folder: _write(folder, flight))
     print(_summary(scenario, flight))
+
+
+def _write(folder: Path, flight: ClosedLoopFlight) -> None:
+    """Write the report and the summary."""
+    write_loop(folder, flight)
+    (folder / "summary.json").write_text(json.dumps(flight.summary(), indent=2) + "\n", encoding="utf-8")
 
 
 def _fly(scenario: LoopScenario) -> ClosedLoopFlight:
     """Start the nodes and fly."""
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
     from sysid_node.ros.support.loop_watch import LoopWatch  # noqa: PLC0415
 
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     watch = LoopWatch()
     director = LoopDirector(scenario, watch)
     try:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import traceback
 import warnings
@@ -17,6 +18,7 @@ from importlib.util import find_spec
 from typing import NoReturn
 
 from sysid_node.errors import InputError, ModelWarning
+from sysid_node.interruption import end_on_signals
 
 COMMANDS = {
     "replay": "identify an aircraft from a bag, as the live node does",
@@ -32,6 +34,7 @@ COMMANDS = {
 }
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+ENDINGS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -43,10 +46,31 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs a command; returns the exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else."""
+    """Runs a command; returns the exit code: 0 done, 2 bad input, 130 interrupted, 143 terminated, 1 anything else.
+
+    Without ``argv`` the arguments are those of the process, which a signal ends, and which ends with the command.
+    """
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = next((word for word in arguments if not word.startswith("-")), "")
-    return exit_code(command, lambda: _run(command, arguments), debug="--debug" in arguments)
+    debug = "--debug" in arguments
+    if argv is not None:
+        return exit_code(command, lambda: _run(command, arguments), debug=debug)
+    end_on_signals(lambda number: print(f"sysid {command}: {ENDINGS[signal.Signals(number)]}", file=sys.stderr))
+    try:
+        code = exit_code(command, lambda: _run(command, arguments), debug=debug)
+    except SystemExit as end:  # argparse has said what is wrong, or printed its help
+        code = end.code if isinstance(end.code, int) else DONE
+    return _leave(code)
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process. Compiled libraries' threads may crash while Python shuts down, so it does not."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        code = code or FAILED
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _run(command: str, arguments: Sequence[str]) -> int:
@@ -119,5 +143,5 @@ def _show_warning(command: str, usual: Callable[..., None]) -> Callable[..., Non
 
 def _say(command: str, message: str, code: int) -> int:
     """The code, after the message as one line on stderr."""
-    print(f"sysid {command}: {' '.join(message.split())}", file=sys.stderr)
+    print(" ".join(f"sysid {command}: {message}".split()), file=sys.stderr, flush=True)
     return code

@@ -10,6 +10,7 @@ from sysid_node.api.flight_file import load
 from sysid_node.api.replaying import replay
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar, show_estimates, show_faults
+from sysid_node.report.files.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -31,11 +32,13 @@ def run(args: argparse.Namespace) -> None:
     """Replays the bag and writes the results."""
     flight = load(args.bag, args.aircraft, topics=args.topic, body_frame=args.body_frame)
     settings = options.settings_of(args.set, args.frequencies, "window=20")
-    with progress_bar(f"replay {args.bag.name}", quiet=args.quiet) as progress:
-        found = replay(flight, settings, progress=progress)
-    report = found.save(args.out)
+    inputs = options.inputs_of([args.bag], args.aircraft)
+    with output_folder(args.out, "replay", inputs=inputs, force=args.force) as out:
+        with progress_bar(f"replay {args.bag.name}", quiet=args.quiet) as progress:
+            found = replay(flight, settings, progress=progress)
+        out.publish(found.write)
     if not args.quiet:
         show_estimates(found.final, found.truth.values, found.truth.since)
         if found.faults:
             show_faults(found.faults)
-        print(report)
+        print(args.out / "report.html")

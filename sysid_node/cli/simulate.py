@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.streams import Streams
 from sysid_node.flight.truth import truth_path
+from sysid_node.report.files.output_file import output_bag
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
@@ -46,6 +48,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         help="an effect of the aircraft flown",
     )
     add("--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist")
+    options.add_force(parser)
     add("--seed", type=int, default=0, help="of turbulence, noise and jitter (default: 0)")
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre; 60 s without one)")
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
@@ -67,12 +70,21 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Flies, then writes the bag and the truth."""
+    inputs = options.inputs_of([], args.aircraft)
+    with output_bag(args.out, inputs, force=args.force, truth=True) as bag:
+        sortie, streams = _fly(args)
+        write_streams(bag, streams, args.storage, args.body_frame)
+        truth_path(bag).write_text(json.dumps(_truth(args, sortie), indent=2) + "\n", encoding="utf-8")
+    if not args.quiet:
+        print(_summary(args.out, sortie, streams))
+
+
+def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams]:
+    """The flight and its messages."""
     from sysid_node.sim.flying.recording import Recorder  # noqa: PLC0415  # JAX takes its time
     from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
-    if args.out.exists():
-        raise InputError(f"bag {args.out}: exists already; remove it or choose another name")
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate))
     conditions = SortieConditions(
@@ -86,11 +98,7 @@ def run(args: argparse.Namespace) -> None:
         rotary_gusts=not args.linear_gusts,
     )
     sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
-    streams = recorder.record(sortie)
-    write_streams(args.out, streams, args.storage, args.body_frame)
-    truth_path(args.out).write_text(json.dumps(_truth(args, sortie), indent=2) + "\n", encoding="utf-8")
-    if not args.quiet:
-        print(_summary(args.out, sortie, streams))
+    return sortie, recorder.record(sortie)
 
 
 def _deflections(simulator: Simulator, specs: list[str], duration: float | None) -> NDArray[np.float64]:
@@ -173,7 +181,7 @@ def _command(args: argparse.Namespace) -> str:
         option = f"--{name.replace('_', '-')}"
         if isinstance(value, list):
             words += [word for item in value for word in (option, item)]
-        elif isinstance(value, bool):
+        elif isinstance(value, bool):  # --force and --quiet are not part of what was flown
             words += ["--open-loop"] if name == "autopilot" and not value else []
             words += ["--linear-gusts"] if name == "linear_gusts" and value else []
         elif value is not None and name != "command":

@@ -9,6 +9,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from sysid_node.interruption import on_interrupt
+
+PATIENCE = 10.0  # s for a node to end
+
 
 @contextlib.contextmanager
 def node_process(name: str, arguments: Sequence[str], folder: Path) -> Iterator[subprocess.Popen[bytes]]:
@@ -20,11 +24,21 @@ def node_process(name: str, arguments: Sequence[str], folder: Path) -> Iterator[
     command = [sys.executable, "-m", f"sysid_node.ros.{name}", *arguments]
     with log.open("wb") as file:
         process = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT)
-        try:
-            yield process
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait()
+        with on_interrupt(lambda: _end(process)):
+            try:
+                yield process
+            finally:
+                _end(process)
     if process.returncode:
         lines = log.read_text(encoding="utf-8").splitlines() or ["the log is empty"]
         raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Interrupt a process, and kill it where it does not end."""
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

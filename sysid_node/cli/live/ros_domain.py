@@ -1,19 +1,8 @@
-"""A folder for results and a ROS domain of its own: what a command that runs nodes needs first."""
+"""A ROS domain of its own for a command that runs nodes."""
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
-
-from sysid_node.errors import InputError
-
-
-def make_folder(out: Path) -> None:
-    """Make the folder of ``--out``. Raises InputError where that cannot be done."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
 
 
 def own_domain() -> None:

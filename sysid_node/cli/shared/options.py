@@ -21,6 +21,12 @@ def add_aircraft(parser: argparse.ArgumentParser) -> None:
 def add_out(parser: argparse.ArgumentParser, more: str = "") -> None:
     """``--out``, which is required; ``more`` ends its help."""
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=f"folder for the results{more}")
+    add_force(parser)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """``--force``."""
+    parser.add_argument("--force", action="store_true", help="write into --out although it holds something else")
 
 
 def add_holdout(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +52,12 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 def add_quiet(parser: argparse.ArgumentParser) -> None:
     """``--quiet``."""
     parser.add_argument("--quiet", action="store_true", help="print nothing")
+
+
+def inputs_of(files: Iterable[str | Path], aircraft: str | None) -> list[Path]:
+    """What a command reads: files and folders, and the aircraft's file where no name is given."""
+    found = [Path(file) for file in files]
+    return [*found, Path(aircraft)] if aircraft and Path(aircraft).is_file() else found
 
 
 def settings_of(texts: Iterable[str], frequencies: str | None, example: str) -> dict[str, object]:

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from sysid_node.faults.recorded_flight import FaultVerdict
+from sysid_node.interruption import on_interrupt
 from sysid_node.online.types import Estimates
 
 
@@ -23,7 +24,8 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
         task = progress.add_task("", total=1.0)
-        yield lambda share, doing: progress.update(task, completed=share, description=doing)
+        with on_interrupt(progress.stop):
+            yield lambda share, doing: progress.update(task, completed=share, description=doing)
 
 
 def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[str, float] | None = None) -> None:

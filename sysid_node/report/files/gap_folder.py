@@ -14,6 +14,9 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.report.pages.gap_page import write_gap_report
 
+#: Folder in the results' that holds the finished steps of an interrupted diagnosis.
+UNFINISHED = "unfinished"
+
 
 def write_gap(folder: Path, found: Diagnosis) -> None:
     """Writes gap.json, where.csv, candidates.csv, corrected.yaml, effects.txt and report.html. Raises InputError."""

@@ -13,7 +13,6 @@ from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.logs import streams_from_record
-from sysid_node.report.files.bag_folder import remove_earlier_bag
 from sysid_node.report.pages.manoeuvre_page import write_manoeuvre_report
 from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
 
@@ -23,11 +22,10 @@ FLIGHT_BAG = "flight"
 def write_manoeuvre(folder: Path, result: ManoeuvreResult) -> None:
     """Write manoeuvre.csv, prediction.csv, correlations.csv, summary.json, report.html and the bag ``flight``.
 
-    What an earlier run left there is replaced. Raises InputError where the folder cannot be written.
+    Raises InputError where the folder cannot be written or holds such a bag.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        remove_earlier_bag(folder / FLIGHT_BAG, "sysid excite")
         _write_tables(folder, result)
         text = json.dumps(summary(result), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sysid_node.errors import InputError
+from sysid_node.interruption import on_interrupt
 from sysid_node.online.types import Estimates
 from sysid_node.report.drawing.thinning import MAX_ROWS, thin_curve, thin_flight
 from sysid_node.report.files import run_tables as tables
@@ -41,8 +42,13 @@ def write_run(folder: Path, run: RunResult) -> None:
 def rebuild_report(folder: Path) -> Path:
     """Draws ``report.html`` from the folder's other files and gives its path. Raises as ``read_run`` does."""
     run = read_run(folder)
-    with _writing(folder):
-        write_report(folder / REPORT, run)
+    aside = folder / f".{REPORT}"
+    with _writing(folder), on_interrupt(lambda: aside.unlink(missing_ok=True)):
+        try:
+            write_report(aside, run)
+            aside.replace(folder / REPORT)
+        finally:
+            aside.unlink(missing_ok=True)
     return folder / REPORT
 
 

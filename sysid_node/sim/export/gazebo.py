@@ -21,8 +21,9 @@ _NAMES = {"CL": "CL", "CD": "CD", "CY": "CY", "Cl": "Cell", "Cm": "Cem", "Cn": "
 _RATES = ("p", "q", "r")
 
 _NOTE = (
-    " Put this into a model whose link base_link has its origin in the centre of gravity, x forward, z up. Versions of"
-    " gz-sim before the fix of July 2026 (gazebosim/gz-sim pull request 3817) drop the pitching moment of alpha. "
+    " Written by sysid export. Put this into a model whose link base_link has its origin in the centre of gravity,"
+    " x forward, z up. Versions of gz-sim before the fix of July 2026 (gazebosim/gz-sim pull request 3817) drop the"
+    " pitching moment of alpha. "
 )
 
 
