@@ -1,5 +1,7 @@
 """Finished steps are taken up again, and never those of another flight."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -51,3 +53,39 @@ def test_without_a_folder_nothing_is_written(tmp_path, start, monkeypatch) -> No
     monkeypatch.chdir(tmp_path)
     Checkpoint().table(start, ["a"], lambda: {"a": [1.0]})
     assert not any(tmp_path.iterdir())
+
+
+class Code:
+    """An object that would run code where it is unpickled."""
+
+    def __reduce__(self):
+        return pytest.fail, ("code of a kept step was run",)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: path.write_bytes(path.read_bytes()[:-40]),
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(pickle.dumps(Code())),
+        lambda path: np.savez(path, point0=np.array([Code()], object), power0=np.array([Code()], object)),
+        lambda path: np.savez(path, point0=np.zeros(3)),
+        lambda path: np.savez(path, point0=np.zeros(3), power0=np.zeros(3)),
+    ],
+)
+def test_a_damaged_step_is_made_again_and_no_code_in_it_is_run(tmp_path, plain_model, start, damage) -> None:
+    first = Checkpoint.of(tmp_path, [plain_model]).converged(start)
+    (path,) = tmp_path.iterdir()
+    damage(path)
+    again = Checkpoint.of(tmp_path, [plain_model]).converged(start)
+    np.testing.assert_array_equal(again.flights[0].point, first.flights[0].point)
+
+
+@pytest.mark.parametrize("text", ["", '{"a": [1.0', "[1.0]", '{"a": 1.0}', "[" * 100_000])
+def test_a_damaged_table_is_made_again(tmp_path, plain_model, start, text) -> None:
+    steps = Checkpoint.of(tmp_path, [plain_model])
+    steps.table(start, ["a"], lambda: {"a": [1.0]})
+    (path,) = tmp_path.iterdir()
+    path.write_text(text)
+    assert steps.table(start, ["a"], lambda: {"a": [2.0]}) == {"a": [2.0]}
+    assert steps.table(start, ["a"], lambda: pytest.fail("worked out again")) == {"a": [2.0]}
