@@ -1,4 +1,4 @@
-"""The error for bad input, and the warning about a model."""
+"""The error for bad input, and the warnings about input and about a model."""
 
 
 class InputError(ValueError):
@@ -7,3 +7,7 @@ class InputError(ValueError):
 
 class ModelWarning(UserWarning):
     """Something in a model that is taken as it is but that its author should know. The CLI prints it as one line."""
+
+
+class InputWarning(UserWarning):
+    """Something in an input that is taken as it is but that its user should know. The CLI prints it as one line."""

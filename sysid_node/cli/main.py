@@ -17,7 +17,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import NoReturn
 
-from sysid_node.errors import InputError, ModelWarning
+from sysid_node.errors import InputError, InputWarning, ModelWarning
 from sysid_node.interruption import end_on_signals
 
 COMMANDS = {
@@ -81,6 +81,7 @@ def _run(command: str, arguments: Sequence[str]) -> int:
         parser.print_help()
         return BAD_INPUT
     with warnings.catch_warnings():
+        warnings.simplefilter("always", InputWarning)
         warnings.showwarning = _show_warning(command, warnings.showwarning)
         import_module(f"sysid_node.cli.{command}").run(args)
     return DONE
@@ -130,10 +131,10 @@ def _one_thread_for_linear_algebra() -> None:
 
 
 def _show_warning(command: str, usual: Callable[..., None]) -> Callable[..., None]:
-    """A ``warnings.showwarning`` that prints a warning about a model as one line, and any other as usual."""
+    """A ``warnings.showwarning``: a warning about a model or an input is one line, any other is as usual."""
 
     def show(message: Warning | str, category: type[Warning], *place: object) -> None:
-        if issubclass(category, ModelWarning):
+        if issubclass(category, ModelWarning | InputWarning):
             print(f"sysid {command}: warning: {' '.join(str(message).split())}", file=sys.stderr)
         else:
             usual(message, category, *place)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
@@ -22,6 +23,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stream, Streams
 
 _SECOND = 1e9  # ns
+_LONGEST_SILENCE = 300_000_000_000  # ns between two messages; what is longer is not time that passed in the flight
 
 
 class RecordedEstimates(NamedTuple):
@@ -87,10 +89,9 @@ def judge(
     remaining = iter(estimates)
     pending = next(remaining, None)
     messages = _messages(streams, commands)
-    begin, end = messages[0].log_ns, messages[-1].log_ns
+    times = _recorder_time([message.log_ns for message in messages])
     looks = 0
-    for message in messages:
-        now = (message.log_ns - begin) / _SECOND
+    for message, now in zip(messages, times, strict=True):
         while (looks + 1) * PERIOD < now:
             looks += 1
             faults = watching.present_faults(watch, looks * PERIOD)
@@ -101,8 +102,17 @@ def judge(
             watching.on_estimates(watch, pending.known)
             pending = next(remaining, None)
         if progress is not None:
-            progress((message.log_ns - begin) / max(end - begin, 1))
+            progress(now / max(times[-1], 1e-9))
     return FaultVerdict(watch.judged, reports, episodes(reports))
+
+
+def _recorder_time(log_ns: Sequence[int]) -> list[float]:
+    """Seconds since the first of the log times, without jumps: a clock that was set, or a pause of the recorder."""
+    shift, times = log_ns[0], []
+    for before, now in pairwise([log_ns[0], *log_ns]):
+        shift += max(now - before - _LONGEST_SILENCE, 0)
+        times.append((now - shift) / _SECOND)
+    return times
 
 
 def episodes(reports: Sequence[FaultReport]) -> list[Episode]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rosbags.rosbag2 import Reader
-
 from sysid_node.flight.bag.message_types import definitions_of, type_store
+from sysid_node.flight.bag.reader import open_bag, reading
 from sysid_node.flight.cdr.decoding import decode
 from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS
 
@@ -25,10 +25,19 @@ class JointMessage(NamedTuple):
 
 
 def read_commands(path: str | Path) -> list[JointMessage]:
-    """The commands in a bag that ``read_streams`` can read; an empty list where it holds none of this type."""
-    with Reader(Path(path)) as reader:
+    """The commands in a bag that ``read_streams`` can read; an empty list where it holds none of this type.
+
+    Raises InputError where it is damaged.
+    """
+    path = Path(path)
+    with open_bag(path) as reader, reading(path):
         chosen = [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]
         found = [(log_ns, data) for _, log_ns, data in reader.messages(chosen)] if chosen else []
+        return _decoded(found)
+
+
+def _decoded(found: Sequence[tuple[int, bytes]]) -> list[JointMessage]:
+    """The messages from their log times and bytes, by log time."""
     messages = []
     for places, fields in decode(definitions_of(type_store()), COMMANDS_TYPE, [data for _, data in found]):
         seconds, fraction = (fields.numbers(f"header.stamp.{part}").tolist() for part in ("sec", "nanosec"))

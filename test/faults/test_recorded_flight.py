@@ -135,3 +135,16 @@ def test_a_flight_too_short_to_learn_says_so(flight: Streams) -> None:
     verdict = judge(AIRCRAFT, FaultMonitorSettings(), shortened(flight, 0.0, 6.0))
     assert (verdict.judged, verdict.episodes) == (0.0, [])
     assert "too short to learn" in verdict.sentences[0]
+
+
+def test_a_jump_of_the_recorders_clock_from_1970_to_today_takes_no_time(flight: Streams) -> None:
+    """The monitor looked every 0.2 s of the recorder's clock: 9e9 times in 56 years."""
+    some = shortened(flight, 0.0, 4.0)
+
+    def set_clock(stream: Stream) -> Stream:
+        log_ns = stream.arrival.log_ns - some.imu.arrival.log_ns[0]
+        log_ns = log_ns + np.where(log_ns > 2 * 10**9, 56 * 365 * 86400 * 10**9, 0)
+        return dataclasses.replace(stream, arrival=dataclasses.replace(stream.arrival, log_ns=log_ns))
+
+    jumping = Streams(set_clock(some.imu), set_clock(some.air_data), set_clock(some.actuators), some.name)
+    assert judge(AIRCRAFT, FaultMonitorSettings(), jumping).judged < 10.0

@@ -16,6 +16,7 @@ from rosbags.typesys.store import Typestore
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.base import Adapter, AirSample, ImuSample, JointSample, Sample
 from sysid_node.flight.bag.message_types import type_store
+from sysid_node.flight.bag.storage_files import checked_files
 from sysid_node.flight.frames import euler_from_quaternion
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Streams
@@ -46,7 +47,7 @@ def read_recorded(path: str | Path, adapter: Adapter) -> Streams:
 
 
 def _read(path: Path, adapter: Adapter, said: str) -> list[LoggedSample]:
-    with Reader(path) as reader:
+    with checked_files(path) as files, Reader(files) as reader:
         chosen = [connection for connection in reader.connections if connection.topic in adapter.topics]
         if not chosen:
             raise InputError(f"{said}: none of the autopilot's topics in it; expected {', '.join(adapter.topics)}")

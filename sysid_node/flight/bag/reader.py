@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -12,15 +13,18 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.raw_messages import RawMessages, read_messages
+from sysid_node.flight.bag.storage_files import checked_files
 from sysid_node.flight.cdr.decoding import DecodedMessages, decode
 from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
+RECORDER_JUMP = 300.0  # s; a larger step of the recorder's clock means that it was set or that it paused
+JOINT_LIMIT = 1000  # different joints of a vehicle
 #: A heading with a larger variance (rad^2) counts as not measured.
 HEADING_UNKNOWN = 1.0e3
 
@@ -46,7 +50,7 @@ def open_bag(path: Path) -> Iterator[Reader]:
     """A bag that is open for reading. Raises InputError where it is missing, empty or damaged; see ``reading``."""
     with ExitStack() as stack:
         with reading(path):
-            reader = stack.enter_context(Reader(path))
+            reader = stack.enter_context(Reader(stack.enter_context(checked_files(path))))
             if not reader.message_count:
                 raise InputError(f"bag {path.name}: holds no messages; record imu/data, air_data and actuators")
         yield reader
@@ -62,7 +66,9 @@ def reading(path: Path) -> Iterator[None]:
     except FileNotFoundError as error:
         raise InputError(f"bag {path.name}: {_not_found(path)}") from error
     except Exception as error:  # parsers of a damaged file raise all kinds of exceptions
-        raise InputError(f"bag {path.name}: cannot be read: {_one_line(error)}; {_remedy(path)}") from error
+        raise InputError(
+            f"bag {path.name}: cannot be read: {_one_line(error)}; {_remedy(path, _one_line(error))}"
+        ) from error
 
 
 def _not_found(path: Path) -> str:
@@ -74,7 +80,11 @@ def _not_found(path: Path) -> str:
     return f"no bag: neither metadata.yaml nor an .mcap or .db3 file in {path}"
 
 
-def _remedy(path: Path) -> str:
+def _remedy(path: Path, said: str) -> str:
+    if path.is_file() and path.suffix not in (".mcap", ".db3"):
+        return "give a rosbag2 folder, .mcap or .db3 file; sysid convert makes a bag of a log"
+    if path.is_dir() and ("metadata" in said or "Rosbag2 version" in said):
+        return f"its metadata.yaml is damaged; run: ros2 bag reindex {path}"
     mcap = path.suffix == ".mcap" or (path.is_dir() and any(path.glob("*.mcap")))
     repair = "mcap recover FILE.mcap -o NEW.mcap" if mcap else "sqlite3 FILE.db3 .recover | sqlite3 NEW.db3"
     return f"give a rosbag2 folder, .mcap or .db3 file; if this one was cut short, try: {repair}"
@@ -86,11 +96,37 @@ def _one_line(error: Exception) -> str:
 
 def _read_messages(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, RawMessages]:
     """The bytes of all messages of the input topics."""
-    messages = read_messages(reader, _choose(reader, topics, bag))
+    chosen = _choose(reader, topics, bag)
+    messages = read_messages(reader, chosen)
     for topic, raw in messages.items():
         if not raw.data:
             raise InputError(f"{bag}: no messages on {topics[topic]}; record that topic too")
+        missing = sum(connection.msgcount for connection in chosen[topic]) - len(raw.data)
+        if missing > 0:
+            warnings.warn(
+                f"{bag}: {missing} of {missing + len(raw.data)} messages on {topics[topic]} that the bag's index "
+                "promises are not in it; it is damaged or was cut short",
+                InputWarning,
+                stacklevel=2,
+            )
+    _warn_of_recorder_clock(messages, bag)
     return messages
+
+
+def _warn_of_recorder_clock(messages: Mapping[str, RawMessages], bag: str) -> None:
+    """Warn where the recorder's clock was set during the recording."""
+    order = np.argsort(np.concatenate([raw.order for raw in messages.values()]))
+    log_ns = np.concatenate([raw.log_ns for raw in messages.values()])[order]
+    step = np.diff(log_ns) / 1e9
+    jumps = np.flatnonzero((step > RECORDER_JUMP) | (step < -1.0))
+    if jumps.size:
+        at = float(np.clip(step[: jumps[0]], 0.0, RECORDER_JUMP).sum())
+        warnings.warn(
+            f"{bag}: the recorder's clock jumps by {step[jumps[0]]:.0f} s, {at:.1f} s into the recording (it was set or"
+            " the recording was paused); the headers' stamps are used, the jump is left out",
+            InputWarning,
+            stacklevel=2,
+        )
 
 
 def _choose(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, list[Connection]]:
@@ -165,9 +201,12 @@ def _joint_stream(raw: RawMessages) -> JointStream:
         stamps[at] = _stamps(fields)
         parts.append((at, fields.strings("name"), fields.numbers("position")))
     names = tuple(dict.fromkeys(name for _, part_names, _ in parts for name in part_names))
+    if len(names) > JOINT_LIMIT:
+        raise InputError(f"{len(names)} different joints in the messages, over {JOINT_LIMIT}; names must not change")
+    place = {name: i for i, name in enumerate(names)}
     positions = np.full((len(raw.data), len(names)), np.nan)
     for at, part_names, values in parts:
         # The first position of a name that is given twice counts; a name without a position stays NaN.
         for i in reversed(range(min(len(part_names), values.shape[1]))):
-            positions[at, names.index(part_names[i])] = values[:, i]
+            positions[at, place[part_names[i]]] = values[:, i]
     return JointStream(_arrival(raw, stamps), names, positions)

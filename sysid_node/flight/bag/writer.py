@@ -13,6 +13,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.reader import HEADING_UNKNOWN
+from sysid_node.flight.bag.storage_files import add_checksums, writable_path
 from sysid_node.flight.cdr.template import Templates, Values
 from sysid_node.flight.frames import BodyFrame, quaternion_from_euler, turn_vectors
 from sysid_node.flight.record import Array
@@ -25,13 +26,19 @@ STORAGES: Mapping[str, StoragePlugin] = {"mcap": StoragePlugin.MCAP, "sqlite3": 
 @contextmanager
 def new_bag(path: str | Path, storage: str = "mcap") -> Iterator[Writer]:
     """A bag to write: a folder that does not exist yet. Raises InputError where it exists or cannot be made."""
+    path = Path(path)
     if storage not in STORAGES:
         raise InputError(f"storage {storage!r}: expected {' or '.join(STORAGES)}")
     try:
-        with Writer(path, version=9, storage_plugin=STORAGES[storage]) as writer:
+        with (
+            writable_path(path, storage) as place,
+            Writer(place, version=9, storage_plugin=STORAGES[storage]) as writer,
+        ):
             yield writer
+        for file in path.glob("*.mcap"):
+            add_checksums(file)
     except (WriterError, OSError) as error:
-        if Path(path).exists() and isinstance(error, WriterError):
+        if path.exists() and isinstance(error, WriterError):
             raise InputError(f"bag {path}: exists already; remove it or choose another name") from error
         raise InputError(f"bag {path}: cannot be written: {error}") from error
 
