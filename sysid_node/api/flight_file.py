@@ -39,10 +39,13 @@ class FlightFile:
         """The aligned samples: SI units and radians, body axes forward-right-down. Raises InputError."""
         return self.aligned(max_gap=0.2)
 
-    def aligned(self, max_gap: float) -> FlightRecord:
-        """The samples, those left out that stand more than ``max_gap`` s from a message. Raises InputError."""
+    def aligned(self, max_gap: float, carried: str = "auto") -> FlightRecord:
+        """The samples, those left out that stand more than ``max_gap`` s from a message. Raises InputError.
+
+        ``carried``: what the actuators' messages are: "commands", "positions", or "auto" (told from the messages).
+        """
         record = load_flight_record(
-            self.path, self.aircraft, topics=self.topics, frame=self.body_frame, max_gap=max_gap
+            self.path, self.aircraft, topics=self.topics, frame=self.body_frame, max_gap=max_gap, carried=carried
         )
         return replace(record, name=self.name)
 

@@ -65,7 +65,9 @@ def identify(
     chosen = BatchSettings.from_mapping(settings or {})
     tell = progress or (lambda share, doing: None)
     tell(0.0, "reading the flights")
-    records, held_out = ([flight.aligned(chosen.max_gap) for flight in group] for group in (flights, holdout))
+    records, held_out = (
+        [flight.aligned(chosen.max_gap, chosen.actuators) for flight in group] for group in (flights, holdout)
+    )
     tell(0.2, method.replace("_", " "))
     aircraft = flights[0].aircraft
     found = identify_records(method, aircraft, records, chosen, held_out)

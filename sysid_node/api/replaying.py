@@ -19,6 +19,7 @@ from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.commands import read_commands
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
@@ -67,6 +68,8 @@ class Replay(EstimatedRun):
         shown = {estimates.time: estimates for estimates in (*self.history[every - 1 :: every], self.final)}
         flow = flow_angle_filter.init(self.aircraft)
         time, gap = self.aligned.time, self.settings.max_gap
+        commanded = self.aligned.commands_from < time.size
+        carried = carried_in_words(self.aircraft, self.settings.actuators, commanded)
         result = replay_result(
             self.aircraft,
             self.settings,
@@ -77,9 +80,10 @@ class Replay(EstimatedRun):
             truth=self.truth.values,
             truth_since=self.truth.since,
             faults=self.faults,
-            remarks=flow_angle_filter.remarks(flow),
+            remarks=[*flow_angle_filter.remarks(flow), *([carried] if carried else [])],
         )
-        return replace(result, settings={**result.settings, "publish_rate": self.publish_rate})
+        said = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
+        return replace(result, settings={**result.settings, **said})
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write what ``sysid replay`` writes; returns the path of the report.
@@ -139,7 +143,7 @@ def _estimated(
     """Decodes, aligns and identifies."""
     streams = read_streams(flight.path, flight.topics, flight.body_frame)
     Actuation.of(flight.aircraft).require(streams.actuators.names, streams.name)
-    aligned = align_streams(flight.aircraft, streams, settings.max_gap)
+    aligned = align_streams(flight.aircraft, streams, settings.max_gap, settings.actuators)
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
     time = aligned.time
@@ -152,6 +156,7 @@ def _estimated(
         aligned.samples,
         np.union1d(due, time[-1:]),
         lambda t: progress(t / last if last else 1.0),
+        aligned.commands_from,
     )
     published = history if due.size and due[-1] == last else history[:-1]
     stamps = aligned.stamps[np.searchsorted(time, due)]

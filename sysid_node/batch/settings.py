@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
 from sysid_node.errors import InputError
+from sysid_node.flight.commanded import CARRIED
 from sysid_node.setting import check_frequencies, parse_setting
 
 #: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
@@ -35,6 +36,7 @@ class BatchSettings:
     correct_sensors: bool = False  # estimate IMU and air-data errors from the kinematics first, and take them out
     process_noise: float = 1.0  # times that of light turbulence (Kalman filters of state and parameters); 0 = none
     max_gap: float = 0.2  # s: the longest gap in a bag that is bridged by interpolation
+    actuators: str = "auto"  # what the topic actuators carries: "commands", "positions", or "auto", by the messages
 
     def __post_init__(self) -> None:
         check_frequencies(self.frequencies)
@@ -42,6 +44,8 @@ class BatchSettings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"setting {name} = {value}: expected a number, zero or more")
+        if self.actuators not in CARRIED:
+            raise InputError(f"setting actuators = {self.actuators!r}: expected one of {', '.join(CARRIED)}")
         if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):
             raise InputError(f"setting max_gap = {self.max_gap}: expected seconds, more than zero")
 

@@ -86,7 +86,8 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams]:
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
-    simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate))
+    held = args.actuator_rate if args.surfaces == "commanded" else None
+    simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate, held or 0.0))
     conditions = SortieConditions(
         args.effect,
         args.airspeed,
@@ -96,6 +97,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams]:
         args.noise,
         args.seed,
         rotary_gusts=not args.linear_gusts,
+        command_rate=held,
     )
     sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
     return sortie, recorder.record(sortie)

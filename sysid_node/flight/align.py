@@ -22,6 +22,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.checks import DUPLICATE, OUT_OF_ORDER, UNSTAMPED, air_data_faults, gap, imu_faults
+from sysid_node.flight.commanded import AROUND, Commands, commands_of, deflections, known_from, take_command
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Arrival, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
@@ -62,6 +63,7 @@ class Alignment:
     used: NDArray[np.intp]  # places of the aligned samples among the IMU's accepted messages
     samples: Array
     rejected: Rejected
+    commands_from: int  # the place of the first sample whose deflections follow from commands; their number for none
 
     @property
     def stamps(self) -> Stamps:
@@ -119,12 +121,24 @@ def _steps(stamps: Stamps) -> tuple[Stamps, NDArray[np.intp]]:
     return step, np.flatnonzero(step < -STEP_BACK_NS)
 
 
-def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
+def align(
+    aircraft: Aircraft,
+    streams: Streams,
+    max_gap: float,
+    carried: str = "positions",
+    *,
+    afterwards: bool = False,
+    servos: bool = True,
+) -> Alignment:
     """One sample for each IMU message between neighbours in air data and actuators at most ``max_gap`` (s) apart.
 
     IMU messages at the end whose later neighbours are missing are neither used nor rejected, unless they waited longer
     than the buffer. The stamps decide, not the order of arrival. Where a clock was set back in the recording
     (``steps_back``), the messages after that are left out as late.
+
+    ``carried`` says what the actuators' messages are. Where it is "auto" and they turn out to be commands, all samples
+    take their deflections from commands if that is decided ``afterwards``, else those after the messages that tell,
+    as in flight. ``servos``: whether the aircraft file's servos follow the commands.
     """
     imu = screen(streams.imu.arrival, streams.imu.values, imu_faults(streams.imu.values))
     air = _screen_air_data(aircraft, streams)
@@ -137,7 +151,10 @@ def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
     right_act, near_act, wait_act = bracket(actuators.stamps, at, max_gap)
     decided = ~(wait_air | wait_act) | late
     used = np.flatnonzero(near_air & near_act)
-    actuated = interpolate(actuators.stamps, actuators.values, right_act[used], at[used])
+    if carried == "auto" and afterwards:
+        carried = "commands" if known_from(actuators.stamps, actuators.values[:, 1:]) is not None else "positions"
+    commands = commands_of(aircraft, carried, servos=servos)
+    actuated, commands_from = _actuated(commands, actuators, right_act[used], at[used])
     samples = np.column_stack(
         [
             imu.values[used],
@@ -156,7 +173,35 @@ def align(aircraft: Aircraft, streams: Streams, max_gap: float) -> Alignment:
         AIR_DATA: dict(air.rejected),
         ACTUATORS: dict(actuators.rejected),
     }
-    return Alignment(imu, (air, actuators), (right_air, right_act), used, samples, rejected)
+    return Alignment(imu, (air, actuators), (right_air, right_act), used, samples, rejected, commands_from)
+
+
+def _actuated(
+    commands: Commands | None, messages: ScreenedMessages, right: NDArray[np.intp], at: Stamps
+) -> tuple[Array, int]:
+    """Thrust and deflections (n, 1 + controls) at the stamps ``at`` (n,), and the place from which commands make them.
+
+    The calls are those of ``online.alignment.streaming`` in the same order, so that both give the same bits.
+    """
+    stamps, values = messages.stamps, messages.values
+    actuated = interpolate(stamps, values, right, at)
+    if commands is None:
+        return actuated, len(at)
+    known = 0 if commands.decided else known_from(stamps, values[:, 1:])
+    if known is None:
+        return actuated, len(at)
+    begin = 0 if commands.decided else int(np.searchsorted(at, stamps[known - 1], side="right"))
+    first = 0 if commands.decided else known - AROUND - 1  # the servos are at rest on this message's command
+    if not commands.decided:
+        commands.since = 0, int(stamps[known - 1])
+    rows = zip(stamps[first:].tolist(), values[first:].tolist(), strict=True)
+    given = first
+    for k, (moment, last) in enumerate(zip(at[begin:].tolist(), right[begin:].tolist(), strict=True), begin):
+        while given <= last:
+            take_command(commands, 0, *next(rows))
+            given += 1
+        actuated[k] = deflections(commands, 0, moment, ())
+    return actuated, begin
 
 
 def _screen_air_data(aircraft: Aircraft, streams: Streams) -> ScreenedMessages:
@@ -218,12 +263,16 @@ def counts_by_reason(rejected: Mapping[str, Mapping[str, int]]) -> dict[str, int
     return {f"{topic}: {reason}": n for topic, reasons in rejected.items() for reason, n in reasons.items()}
 
 
-def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> FlightRecord:
+def flight_record(
+    aircraft: Aircraft, streams: Streams, max_gap: float, carried: str = "positions", *, servos: bool = True
+) -> FlightRecord:
     """The flight as aligned columns, with the attitude where the IMU's messages hold one.
+
+    ``carried`` and ``servos`` are those of ``align``; what the messages carry is decided by the whole flight.
 
     Raises InputError where nothing could be aligned, or a clock was set back during the recording.
     """
-    aligned = align(aircraft, streams, max_gap)
+    aligned = align(aircraft, streams, max_gap, carried, afterwards=True, servos=servos)
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
@@ -232,7 +281,8 @@ def flight_record(aircraft: Aircraft, streams: Streams, max_gap: float) -> Fligh
     attitude = streams.imu.attitude[aligned.imu.kept[aligned.used]]
     columns |= dict(zip(("phi", "theta", "psi"), np.ascontiguousarray(attitude.T), strict=True))
     start = int(aligned.imu.stamps[0])
-    return FlightRecord(aligned.time, columns, streams.name, start, counts_by_reason(aligned.rejected))
+    commanded = aligned.commands_from < aligned.used.size
+    return FlightRecord(aligned.time, columns, streams.name, start, counts_by_reason(aligned.rejected), commanded)
 
 
 def sample_columns(aircraft: Aircraft) -> tuple[str, ...]:

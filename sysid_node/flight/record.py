@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ class FlightRecord:
     name: str = ""
     start_ns: int = 0
     rejected: Mapping[str, int] = field(default_factory=dict)
+    commanded: bool = False  # whether the controls follow from commands by the aircraft file's servos
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.size < 2:
@@ -85,4 +86,4 @@ class FlightRecord:
         """The part with start <= time < stop (s), on the same clock."""
         keep = (self.time >= start) & (self.time < stop)
         columns = {name: values[keep] for name, values in self.columns.items()}
-        return FlightRecord(self.time[keep], columns, self.name, self.start_ns, self.rejected)
+        return replace(self, time=self.time[keep], columns=columns)

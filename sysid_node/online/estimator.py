@@ -43,8 +43,11 @@ JITTER = 1e-3  # s by which a stamp may be early and its sample still be the one
 SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorter steps would pass for acceleration
 
 
-def init(aircraft: Aircraft, settings: OnlineSettings) -> EstimatorState:
-    """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate."""
+def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = False) -> EstimatorState:
+    """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate.
+
+    ``commanded``: whether the samples' deflections follow from commands (``flight.commanded``).
+    """
     layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
     unformed = regression_signals.unformed(aircraft)
     structure = {c: rs for c, rs in aircraft.model_structure.items() if c not in unformed and set(rs) - {"0"}}
@@ -70,6 +73,7 @@ def init(aircraft: Aircraft, settings: OnlineSettings) -> EstimatorState:
         instrument_model=instrument_model(aircraft, layout, grid.omega),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
+        commanded=commanded,
     )
     transform = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
     running = SampledTransform(layout, transform)
@@ -77,6 +81,18 @@ def init(aircraft: Aircraft, settings: OnlineSettings) -> EstimatorState:
     return EstimatorState(
         model, running, equations, nothing, flow, excited_segments=no_excited_segments(equations, layout)
     )
+
+
+def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
+    """An estimator that has seen nothing before ``time`` (s), when deflections begin to follow from commands.
+
+    What the samples said of the aircraft's instruments remains known.
+    """
+    fresh = init(state.model.aircraft, state.model.settings, commanded=True)
+    fresh.transform.transform.last = time
+    fresh.flow, fresh.begin = state.flow, state.begin
+    fresh.thrust_known, fresh.incomplete = state.thrust_known, state.incomplete
+    return fresh
 
 
 def _lowest(controls: int) -> tuple[float, ...]:

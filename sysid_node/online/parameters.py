@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from sysid_node.flight.commanded import CARRIED
 from sysid_node.online.settings import METHODS, OnlineSettings
 from sysid_node.parameter import Parameter, annotated_yaml, check_each
 
@@ -112,6 +113,15 @@ PARAMETERS = (
         "Up where air data come at less than 10 Hz.",
         lower=0.001,
         upper=5.0,
+    ),
+    Parameter(
+        "actuators",
+        _ESTIMATOR.actuators,
+        "",
+        "What the topic actuators carries. commands are held from message to message, and the aircraft file's servos "
+        "follow them; positions are interpolated. auto: by the messages; commands jump, and surfaces do not.",
+        "commands or positions where it is known: auto begins anew when it finds commands.",
+        choices=CARRIED,
     ),
     Parameter(
         "use_prior",

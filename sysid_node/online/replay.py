@@ -31,16 +31,20 @@ def run(
     samples: Array,
     publish_times: Array,
     progress: Callable[[float], None] | None = None,
+    commands_from: int | None = None,
 ) -> list[Estimates]:
     """Estimates as they stand after the first sample at or past each of ``publish_times`` (K,) s, at most one a sample.
 
     ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them. ``progress`` is called with the
-    time (s) of the last sample, every ``REPORT_EVERY`` samples and at the end.
+    time (s) of the last sample, every ``REPORT_EVERY`` samples and at the end. ``commands_from``: the place of the
+    first sample whose deflections follow from commands; the estimator begins anew there.
     """
     state = estimator.init(aircraft, settings)
     due = set(np.searchsorted(time, publish_times, side="left").tolist())
     estimates = []
     for i, moment in enumerate(time.tolist()):
+        if i == commands_from:
+            state = estimator.begin_with_commands(state, moment)
         estimator.update(state, moment, samples[i].tolist())
         if i in due:
             estimates.append(estimate(state, moment))

@@ -39,7 +39,7 @@ class Session:
     def reset(self) -> None:
         """Forget all messages and estimates."""
         self.state = estimator.init(self.aircraft, self.settings)
-        self.intake = streaming.init(self.aircraft, self.settings.max_gap)
+        self.intake = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
         self.schedule = schedule.Schedule(self.publish_rate)
         self.samples = 0
         self._heard = time.monotonic()
@@ -90,6 +90,8 @@ class Session:
         results = []
         for moment, sample, wait in samples:
             start = time.perf_counter()
+            if moment >= self.intake.commands_from and not self.state.model.commanded:
+                self.state = estimator.begin_with_commands(self.state, moment)
             estimator.update(self.state, moment, sample)
             self.update_times.add(time.perf_counter() - start)
             self.samples += 1

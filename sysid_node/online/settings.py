@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
 from sysid_node.errors import InputError
+from sysid_node.flight.commanded import CARRIED
 from sysid_node.setting import check_frequencies, parse_setting
 
 METHODS = ("sls_rft", "iv_rft")
@@ -26,6 +27,7 @@ class OnlineSettings:
     window: float = 0.0  # s: only the last so many seconds count; 0 = the whole record
     settle_time: float = 0.5  # s left out at the start, while filters and pilots settle
     max_gap: float = 0.2  # s: the longest gap in the data that is bridged by interpolation
+    actuators: str = "auto"  # what the topic actuators carries: "commands", "positions", or "auto", by the messages
     use_prior: bool = False  # whether the aircraft file's derivatives count, by their tolerances
     detect_changes: bool = True  # forget what was before an abrupt change of the aircraft
     valid_fraction: float = 0.3  # a derivative is valid once its standard error is under this share of its size
@@ -37,6 +39,8 @@ class OnlineSettings:
             raise InputError(f"frequencies {start}:{step}:{stop}: expected at most {MOST_LINES} lines; widen the step")
         if self.method not in METHODS:
             raise InputError(f"method {self.method!r}: expected one of {', '.join(METHODS)}")
+        if self.actuators not in CARRIED:
+            raise InputError(f"actuators {self.actuators!r}: expected one of {', '.join(CARRIED)}")
         for name in ("forgetting_time", "window", "settle_time"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):

@@ -47,6 +47,7 @@ class EstimatorModel:
     instrument_model: InstrumentModel | None  # None where the method is least squares
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
+    commanded: bool = False  # whether deflections follow from commands by the aircraft file's servos
 
 
 @dataclass(frozen=True)

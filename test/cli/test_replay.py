@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from made_flights import JOINTS, made_aircraft, made_streams
 from rosbags.rosbag2 import Reader
 
 from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.api import load, replay
 from sysid_node.api.replaying import replay_settings
 from sysid_node.cli.main import main
@@ -24,6 +26,7 @@ from sysid_node.online import estimator
 from sysid_node.online.alignment import streaming
 from sysid_node.online.alignment.schedule import Schedule, due
 from sysid_node.online.estimates import published
+from sysid_node.online.session import Session
 from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = made_aircraft()
@@ -91,6 +94,31 @@ def test_a_replay_is_the_live_run_to_the_last_bit(bag, rate):
     assert done.stamps_ns.tolist() == [stamp for stamp, _ in live]
     for ours, (_, theirs) in zip(done.history, live, strict=True):
         assert bits(ours) == bits(theirs)
+
+
+@pytest.mark.parametrize("carried", ["auto", "commands"])
+def test_commands_are_followed_in_flight_as_in_a_replay(tmp_path, flight, carried):
+    """Joints that jump are commands; from then on, servos of the file follow, and the estimator begins anew."""
+    lags = {"elevator": UncertainValue(0.04), "aileron": UncertainValue(0.02), "damping": UncertainValue(0.7)}
+    aircraft = replace(AIRCRAFT, effects={"actuator_lag": lags, "command_delay": {"rudder": UncertainValue(0.03)}})
+    steps = flight.actuators.positions.copy()
+    steps[:, 1:] = 0.05 * ((np.arange(len(steps)) // 40) % 2)[:, None]
+    streams = replace(flight, actuators=replace(flight.actuators, positions=steps))
+    write_streams(tmp_path / "steps", streams)
+    done = replay(load(tmp_path / "steps", aircraft), LINES | {"actuators": carried, "publish_rate": 10.0})
+    session = Session(aircraft, replace(SETTINGS, actuators=carried), 10.0)
+    calls = [
+        *((session.imu, streams.imu, i, (tuple(v),)) for i, v in enumerate(streams.imu.values.tolist())),
+        *((session.air_data, streams.air_data, i, (tuple(v),)) for i, v in enumerate(streams.air_data.values.tolist())),
+        *((session.actuators, streams.actuators, i, (JOINTS, v)) for i, v in enumerate(steps.tolist())),
+    ]
+    live = []
+    for take, stream, i, values in sorted(calls, key=lambda call: call[1].arrival.order[call[2]]):
+        live += [due.estimates for due in take(int(stream.arrival.stamp_ns[i]), *values)]
+    assert [bits(one) for one in done.history] == [bits(one) for one in live]
+    assert done.run.settings["actuators_carry"] == "commands"
+    assert (done.aligned.commands_from > 0) == (carried == "auto")
+    assert any("elevator 40 ms" in remark for remark in done.run.remarks)
 
 
 def test_files_and_summary_are_the_contracts(arguments, tmp_path, capsys):

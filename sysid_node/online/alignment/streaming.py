@@ -2,8 +2,9 @@
 
 The live node and the replay both feed this. Each message is checked (``flight.checks``: plausible values; here: its
 stamp), and every IMU message waits until air data and actuators stamped after it have come, so that both are
-interpolated and never held (``flight.align`` says why). What comes out depends on the stamps alone, not on the order in
-which topics arrive, as long as none is more than the buffer (5 s) behind; a replay therefore equals the live run.
+interpolated and never held (``flight.align`` says why); only commands are held (``flight.commanded``). What comes out
+depends on the stamps alone, not on the order in which topics arrive, as long as none is more than the buffer (5 s)
+behind; a replay therefore equals the live run.
 
 A stamp that leaps (back by more than 1 s, ahead by more than 5 min) is left out; if the next message follows it, the
 clock was set, and a new time base begins: the samples' time goes on after a break longer than ``max_gap``, which
@@ -12,6 +13,7 @@ no estimator integrates across. Messages before and after a step are never combi
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from copy import copy
@@ -32,6 +34,7 @@ from sysid_node.flight.checks import (
     imu_fault,
     is_nan,
 )
+from sysid_node.flight.commanded import Commands, commands_of, deflections, follows, take_command
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 FOLLOWS_NS = 1_000_000_000  # a message this soon after a leap of the stamps confirms it
@@ -137,16 +140,22 @@ class AlignmentState:
     actuators: _Neighbours = field(default_factory=lambda: _Neighbours(ACTUATORS))
     since: int = 0  # of the last IMU message
     bases: deque[_Base] = field(default_factory=lambda: deque(maxlen=16))  # of the last epochs
+    commands: Commands | None = None  # None: the topic carries positions
+    commands_from: float = math.inf  # s: time of the first sample whose deflections follow from commands
     joints: tuple[Sequence[str], tuple[int, ...]] = ((), ())  # the last message's names, and our joints among them
     accepted: dict[str, int] = field(default_factory=lambda: dict.fromkeys((IMU, AIR_DATA, ACTUATORS), 0))
     rejected: Rejected = field(default_factory=lambda: {IMU: {}, AIR_DATA: {}, ACTUATORS: {}})
 
 
-def init(aircraft: Aircraft, max_gap: float) -> AlignmentState:
-    """An alignment that has seen nothing; ``max_gap`` (s): the longest spacing that is interpolated across."""
+def init(aircraft: Aircraft, max_gap: float, carried: str = "positions") -> AlignmentState:
+    """An alignment that has seen nothing; ``max_gap`` (s): the longest spacing that is interpolated across.
+
+    ``carried`` says what the topic ``actuators`` carries.
+    """
     actuation = Actuation.of(aircraft)
     state = AlignmentState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap))
     state.joints = ((), actuation.places(()))
+    state.commands = commands_of(aircraft, carried)
     return state
 
 
@@ -198,7 +207,8 @@ def on_actuators(
     if names != known:
         places = state.actuation.places(names)
         state.joints = (copy(names), places)
-    return _on_neighbour(state, state.actuators, stamp_ns, state.actuation.of_message(places, positions))
+    values = state.actuation.of_message(places, positions)
+    return _on_neighbour(state, state.actuators, stamp_ns, values, state.commands)
 
 
 def stamp_of(state: AlignmentState, time: float) -> int:
@@ -208,8 +218,10 @@ def stamp_of(state: AlignmentState, time: float) -> int:
     return base.stamp + since - base.since
 
 
-def _on_neighbour(state: AlignmentState, topic: _Neighbours, stamp: int, values: Values | str) -> list[AlignedSample]:
-    """Takes a message of an interpolated topic, or the reason why not."""
+def _on_neighbour(
+    state: AlignmentState, topic: _Neighbours, stamp: int, values: Values | str, commands: Commands | None = None
+) -> list[AlignedSample]:
+    """Takes a message of a topic with neighbours, or the reason why not; ``commands`` are told of it."""
     fault = values if isinstance(values, str) else topic.clock.fault(stamp)
     if fault is not None or isinstance(values, str):
         refuse(state, topic.topic, str(fault))
@@ -219,6 +231,8 @@ def _on_neighbour(state: AlignmentState, topic: _Neighbours, stamp: int, values:
     before = topic.newest if topic.newest is not None and topic.newest.epoch == epoch else None
     topic.newest = _Entry(epoch, stamp, min(stamp - before.stamp, state.gap) if before else 0, values)
     entries.append(topic.newest)
+    if commands is not None:
+        take_command(commands, epoch, stamp, values)
     horizon = stamp - KEPT_BUFFERS * state.buffer
     while entries[0].epoch < epoch - 1 or (entries[0].epoch == epoch and entries[0].stamp < horizon):
         entries.popleft()
@@ -243,16 +257,22 @@ def _release(state: AlignmentState) -> list[AlignedSample]:
         elif actuators is _Missing.FOR_GOOD:
             refuse(state, IMU, gap(ACTUATORS))
         else:
-            complete.append(_completed(imu, air_data, actuators))
+            complete.append(_completed(state, imu, air_data, actuators))
     return complete
 
 
-def _completed(imu: _Waiting, air_data: _Pair, actuators: _Pair) -> AlignedSample:
+def _completed(state: AlignmentState, imu: _Waiting, air_data: _Pair, actuators: _Pair) -> AlignedSample:
     """The IMU message with what the other topics say at its stamp."""
-    thrust, *controls = _interpolated(actuators, imu.stamp)
-    right = air_data[1]
+    left, right = actuators[0], air_data[1]
+    commands = state.commands
+    if commands is not None and follows(commands, left.epoch, imu.stamp):
+        state.commands_from = min(state.commands_from, imu.since / 1e9)
+        thrust, *controls = deflections(commands, left.epoch, imu.stamp, left.values)
+    else:
+        thrust, *controls = _interpolated(actuators, imu.stamp)
     sample = (*imu.values, *_interpolated(air_data, imu.stamp), thrust, right.interval / 1e9, *controls)
-    return AlignedSample(imu.since / 1e9, sample, (max(right.stamp, actuators[1].stamp) - imu.stamp) / 1e9)
+    wait = (max(right.stamp, actuators[1].stamp) - imu.stamp) / 1e9
+    return AlignedSample(imu.since / 1e9, sample, wait)
 
 
 def _interpolated(pair: _Pair, stamp: int) -> Sequence[float]:

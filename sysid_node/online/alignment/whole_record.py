@@ -35,14 +35,15 @@ class AlignedSamples(NamedTuple):
     rejected: Rejected
     stamps: Stamps  # (N,) header stamps of the IMU messages, ns
     wait: Array  # (N,) s from each to the last of the messages that it lies before
+    commands_from: int  # place of the first sample whose deflections follow from commands; N where none do
 
 
-def align_streams(aircraft: Aircraft, streams: Streams, max_gap: float) -> AlignedSamples:
+def align_streams(aircraft: Aircraft, streams: Streams, max_gap: float, carried: str = "positions") -> AlignedSamples:
     """The samples of a recording: all at once where clocks ran on and topics came together, else message by message."""
-    bulk = align(aircraft, streams, max_gap)
+    bulk = align(aircraft, streams, max_gap, carried)
     if is_regular(bulk, streams, max_gap):
-        return AlignedSamples(bulk.time, bulk.samples, bulk.rejected, bulk.stamps, bulk.wait)
-    return align_by_message(aircraft, streams, max_gap)
+        return AlignedSamples(bulk.time, bulk.samples, bulk.rejected, bulk.stamps, bulk.wait, bulk.commands_from)
+    return align_by_message(aircraft, streams, max_gap, carried)
 
 
 def is_regular(bulk: Alignment, streams: Streams, max_gap: float) -> bool:
@@ -73,9 +74,11 @@ def _order_after(topic: ScreenedMessages, stamps: Stamps) -> Stamps:
     return np.append(topic.order, np.iinfo(np.int64).max)[after]
 
 
-def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> AlignedSamples:
+def align_by_message(
+    aircraft: Aircraft, streams: Streams, max_gap: float, carried: str = "positions"
+) -> AlignedSamples:
     """Feeds the messages in the order in which they came."""
-    state = init(aircraft, max_gap)
+    state = init(aircraft, max_gap, carried)
     imu, air_data, actuators = streams.imu, streams.air_data, streams.actuators
     order = np.concatenate([stream.arrival.order for stream in (imu, air_data, actuators)])
     topics = np.repeat([0, 1, 2], [len(imu.arrival), len(air_data.arrival), len(actuators.arrival)])
@@ -97,4 +100,6 @@ def align_by_message(aircraft: Aircraft, streams: Streams, max_gap: float) -> Al
     width = len(SAMPLE_COLUMNS) + len(aircraft.controls)
     time, samples, wait = (np.array([one[i] for one in complete]) for i in range(3))
     stamps_used = np.array(sources, np.int64)
-    return AlignedSamples(time, samples.reshape(len(complete), width), state.rejected, stamps_used, wait)
+    commands_from = int(np.searchsorted(time, state.commands_from))
+    samples = samples.reshape(len(complete), width)
+    return AlignedSamples(time, samples, state.rejected, stamps_used, wait, commands_from)

@@ -14,6 +14,7 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.results.response import ModelResponse, goodness_of_fit
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
@@ -33,6 +34,8 @@ def identification_result(
 ) -> RunResult:
     """The result of a batch method as the reports take it. ``records`` are the flights that were fitted."""
     fit, first = found.fit, records[0]
+    commanded = any(record.commanded for record in records)
+    carried = carried_in_words(aircraft, settings.actuators, commanded)
     trusted = "ok" if fit.converged else f"not converged: {fit.message}"
     derivatives = {
         name: _derivative(name, fit.estimates.get(name), trusted, fit.remarks) for name in aircraft.derivatives
@@ -45,13 +48,13 @@ def identification_result(
         data=RunData(
             sum(record.duration for record in records), sum(len(record) for record in records), _rejected(records)
         ),
-        settings=settings.as_dict(fit.method),
+        settings={**settings.as_dict(fit.method), "actuators_carry": "commands" if commanded else "positions"},
         references=References(prior_of(aircraft), truth or {}),
         signals=RunSignals(
             first, _spectra(aircraft, first, found.coefficients), _responses(found), _note(records, settings)
         ),
         holdout=found.holdout,
-        remarks=[_sentence(remark) for remark in (fit.message, *fit.remarks)],
+        remarks=[_sentence(remark) for remark in (fit.message, *fit.remarks, carried) if remark],
     )
 
 

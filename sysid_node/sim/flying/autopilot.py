@@ -55,6 +55,7 @@ class _AutopilotState(NamedTuple):
     """What the autopilot carries from sample to sample."""
 
     integral: Scalar  # (6,) of outputs - hold
+    sample: Scalar  # number of the next sample
     history: Scalar  # (K, controls + 1) commands given, the newest last
 
 
@@ -81,11 +82,29 @@ def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
     )
 
 
-def fly_held(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, autopilot: Autopilot) -> SimulatedFlight:
-    """The flight from trim with the autopilot on; ``inputs.commands`` are the planned ones, trim included."""
+def fly_held(
+    simulator: Simulator,
+    theta: Array,
+    trim: Trim,
+    inputs: Inputs,
+    autopilot: Autopilot,
+    given: NDArray[np.bool_] | None = None,
+) -> SimulatedFlight:
+    """The flight from trim with the autopilot on; ``inputs.commands`` are the planned ones, trim included.
+
+    ``given`` (N,): at which samples the autopilot gives a new command, which is held until the next; None: at all.
+    """
     history = round(_LONGEST_DELAY * simulator.rate) + 2
     flight: SimulatedFlight = _fly_held(
-        simulator.layout, history, simulator.model, theta, trim.initial, inputs, simulator.step, autopilot
+        simulator.layout,
+        history,
+        simulator.model,
+        theta,
+        trim.initial,
+        inputs,
+        simulator.step,
+        autopilot,
+        None if given is None or given.all() else jnp.asarray(given),
     )
     return flight
 
@@ -100,6 +119,7 @@ def _fly_held(
     inputs: Inputs,
     step: Scalar,
     autopilot: Autopilot,
+    given: Scalar | None,
 ) -> SimulatedFlight:
     chain = Chain.of(layout, model, theta, step, -initial[2])
     columns = jnp.array([OUTPUTS.index(name) for name in _SEEN])
@@ -110,12 +130,15 @@ def _fly_held(
         wanted = jnp.sum(autopilot.gains * error + autopilot.integral * state.integral, axis=1)
         correction = jnp.clip(wanted, -autopilot.limit, autopilot.limit)
         saturated = jnp.any(jnp.abs(wanted) > autopilot.limit)  # the integral stops while the correction is limited
-        given = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)
-        past = jnp.concatenate([state.history[1:], given[None]])
+        commanded = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)
+        if given is not None:
+            commanded = jnp.where(given[state.sample], commanded, state.history[-1])
+        past = jnp.concatenate([state.history[1:], commanded[None]])
         arriving = command.arrive_from_history(chain.effects, past, step)
-        return given, arriving, _AutopilotState(state.integral + jnp.where(saturated, 0.0, error * step), past)
+        integral = state.integral + jnp.where(saturated, 0.0, error * step)
+        return commanded, arriving, _AutopilotState(integral, state.sample + 1, past)
 
-    start = _AutopilotState(jnp.zeros(len(_SEEN)), jnp.tile(inputs.commands[0], (history, 1)))
+    start = _AutopilotState(jnp.zeros(len(_SEEN)), jnp.ones((), int), jnp.tile(inputs.commands[0], (history, 1)))
     return fly(chain, initial, inputs, pilot, start)
 
 

@@ -32,7 +32,9 @@ _STEPS = np.array(
 class Recorder:
     """Rates (Hz), jitter (s rms) of the sampling times, latency (s) from stamp to log, and what is recorded.
 
-    Raises InputError for a rate outside 1 to 5000 Hz or an unknown choice of ``surfaces``.
+    Where an autopilot holds its commands (``SortieConditions.command_rate``), the commanded surfaces are its commands,
+    one message each; otherwise they are sampled at ``actuator_rate``. Raises InputError for a rate outside 1 to 5000 Hz
+    or an unknown choice of ``surfaces``.
     """
 
     imu_rate: float = 200.0
@@ -56,15 +58,18 @@ class Recorder:
         span = (len(sortie.flight.outputs) - 1) * sortie.simulator.step
         rates = (self.imu_rate, self.air_data_rate, self.actuator_rate)
         times = [_instants(rate, span, self.jitter, random) for rate in rates]
+        if self.surfaces == "commanded" and sortie.conditions.command_rate is not None:
+            times[2], controls = self._commands(sortie)
+        else:
+            controls = self._controls(sortie, times[2])
         imu, air, actuators = self._arrivals(times, random)
         inertial, flow = self._readings(sortie, times[0]), self._readings(sortie, times[1])
         altitude = np.interp(times[1], _grid(sortie), -np.asarray(sortie.flight.states[:, 2]))
         density = np.round(np.asarray(air_density(altitude, jnp)), 5)
-        joints, positions = _joints(sortie.simulator.aircraft, self._controls(sortie, times[2]))
         return Streams(
             ImuStream(imu, inertial[:, :6], inertial[:, 6:9], "imu"),
             AirDataStream(air, np.column_stack([flow[:, 9:], density])),
-            JointStream(actuators, joints, positions),
+            JointStream(actuators, *_joints(sortie.simulator.aircraft, controls)),
             f"simulated {sortie.simulator.aircraft.name}",
         )
 
@@ -83,6 +88,25 @@ class Recorder:
         known = sortie.flight.commands if self.surfaces == "commanded" else sortie.flight.surfaces
         late = sortie.effects.get("actuator_stamp_delay", {}).get("delay", 0.0)
         return np.column_stack([np.interp(times - late, _grid(sortie), column) for column in np.asarray(known).T])
+
+    def commands(self, sortie: Sortie) -> JointStream:
+        """The messages of the autopilot's commands, each logged ``latency`` after its stamp."""
+        times, controls = self._commands(sortie)
+        stamps = START_NS + np.round(times * 1e9).astype(np.int64)
+        logged = stamps + round(self.latency * 1e9)
+        arrival = Arrival(stamps, logged, np.arange(stamps.size))
+        return JointStream(arrival, *_joints(sortie.simulator.aircraft, controls))
+
+    def _commands(self, sortie: Sortie) -> tuple[Array, Array]:
+        """Times (K,), s, at which commands are given, and the commands (K, controls + 1), rad and N.
+
+        The simulator's commands are linear between samples. One that is reached at a sample is, but for terms in the
+        square of the step, one that is given half a step before and held.
+        """
+        places, late = sortie.command_places, sortie.effects.get("actuator_stamp_delay", {}).get("delay", 0.0)
+        times = np.maximum(places - 0.5, 0.0) * sortie.simulator.step + late
+        kept = times >= 0.0
+        return times[kept], np.asarray(sortie.flight.commands)[places[kept]]
 
     def _arrivals(self, times: list[Array], random: np.random.Generator) -> list[Arrival]:
         """For each stream, its stamps, logging times and positions among all messages."""

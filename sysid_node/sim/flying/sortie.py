@@ -35,6 +35,7 @@ class SortieConditions:
     noise: float = 1.0  # multiple of the aircraft file's sigmas
     seed: int = 0
     rotary_gusts: bool = True  # whether the turbulence has angular velocities, too
+    command_rate: float | None = None  # Hz, of commands that are held; None: the simulator's, linear between samples
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ class Sortie:
         error = self.effects.get("derivative_error", {})
         return {name: d.value + error.get(name, 0.0) for name, d in self.simulator.aircraft.derivatives.items()}
 
+    @property
+    def command_places(self) -> NDArray[np.intp]:
+        """(K,) the samples at which a command is given; it is held until the next."""
+        return np.flatnonzero(_given(self.simulator, self.conditions, len(self.flight.outputs)))
+
 
 def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieConditions | None = None) -> Sortie:
     """The flight with deflections (N, controls + 1) from trim (rad, N), sampled at the simulator's rate.
@@ -66,11 +72,12 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieCondi
     effects = _all_effects(conditions)
     theta = simulator.vector(effects)
     trim = trim_flight(simulator, conditions.airspeed, theta)
-    commands = trim.command + deflections
+    given = _given(simulator, conditions, len(deflections))
+    commands = trim.command + deflections[np.flatnonzero(given)[np.cumsum(given) - 1]]
     _check_travel(simulator, commands)
     inputs = _inputs(simulator, trim, commands, conditions)
     if conditions.autopilot:
-        flight = fly_held(simulator, theta, trim, inputs, autopilot_for(simulator, trim))
+        flight = fly_held(simulator, theta, trim, inputs, autopilot_for(simulator, trim), given)
     else:
         flight = simulator.rollout(theta, trim.initial, inputs)
     return Sortie(simulator, conditions, effects, theta, trim, inputs, simulator.check(flight))
@@ -87,6 +94,17 @@ def _all_effects(conditions: SortieConditions) -> dict[str, dict[str, float]]:
         if value and name not in effects:
             effects[name] = {key: value}
     return effects
+
+
+def _given(simulator: Simulator, conditions: SortieConditions, samples: int) -> NDArray[np.bool_]:
+    """(N,) whether a new command is given at each sample; always at the first. Raises InputError for a wrong rate."""
+    rate = simulator.rate if conditions.command_rate is None else conditions.command_rate
+    if not 0.0 < rate <= simulator.rate:
+        raise InputError(
+            f"commands at {rate:g} Hz: expected more than 0 and at most the simulator's {simulator.rate:g}"
+        )
+    count = np.floor(np.arange(samples) * (rate / simulator.rate) + 1e-6)
+    return np.asarray(np.diff(count, prepend=-1.0) > 0.0)
 
 
 def _check_travel(simulator: Simulator, commands: Array) -> None:

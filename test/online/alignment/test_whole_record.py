@@ -16,9 +16,10 @@ from sysid_node.online.alignment.whole_record import align_streams
 AIRCRAFT = made_aircraft()
 
 
-def assert_same_bits(streams, max_gap=0.2):
-    bulk = align_streams(AIRCRAFT, streams, max_gap)
-    single = whole_record.align_by_message(AIRCRAFT, streams, max_gap)
+def assert_same_bits(streams, max_gap=0.2, carried="positions"):
+    bulk = align_streams(AIRCRAFT, streams, max_gap, carried)
+    single = whole_record.align_by_message(AIRCRAFT, streams, max_gap, carried)
+    assert bulk.commands_from == single.commands_from
     assert bulk.time.tobytes() == single.time.tobytes()
     assert bulk.samples.tobytes() == single.samples.reshape(bulk.samples.shape).tobytes()
     assert bulk.stamps.tobytes() == single.stamps.tobytes()
@@ -50,6 +51,24 @@ def test_clean_recordings(seed, max_gap):
     bulk = assert_same_bits(streams, max_gap)
     assert (bulk.time.size > 100) == (max_gap > 0.001)  # nothing is that close together
     assert np.all(np.diff(bulk.stamps) > 0)
+
+
+def with_steps(streams: Streams, every: int) -> Streams:
+    """The streams with joints that stay where they are and jump with every so many messages."""
+
+    def change(arrival, values):
+        values[:, 1:] = 0.1 * ((np.arange(len(values)) // every) % 2)[:, None]
+
+    return changed(streams, "actuators", change)
+
+
+@pytest.mark.parametrize("carried", ["commands", "auto"])
+@pytest.mark.parametrize("every", [7, 1000])
+def test_commands(carried, every):
+    """Servos follow the commands in the same bits; where nothing jumps, ``auto`` interpolates positions."""
+    bulk = assert_same_bits(with_steps(made_streams(3.0, 1), every), 0.2, carried)
+    assert (bulk.commands_from == 0) == (carried == "commands")
+    assert (bulk.commands_from < bulk.time.size) == (carried == "commands" or every == 7)
 
 
 def test_faulty_values_are_left_out_in_bulk_too():
@@ -124,8 +143,14 @@ faults = st.lists(st.tuples(st.integers(0, 1000), st.sampled_from(SHIFTS), st.bo
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.integers(0, 3), st.tuples(faults, faults, faults), st.booleans(), st.integers(0, 9))
-def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed):
+@given(
+    st.integers(0, 3),
+    st.tuples(faults, faults, faults),
+    st.booleans(),
+    st.integers(0, 9),
+    st.sampled_from(["positions", "commands", "auto"]),
+)
+def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried):
     """Repeated, absent, leaping and disordered stamps; topics that arrive in any order."""
     streams = made_streams(0.5, seed=seed)
     lengths = [len(stream.arrival) for stream in streams.by_topic.values()]
@@ -144,4 +169,4 @@ def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed):
                 rng.shuffle(arrival.stamp_ns[3:9])
 
         streams = changed(streams, topic, spoil)
-    assert_same_bits(streams)
+    assert_same_bits(with_steps(streams, 4) if carried == "auto" else streams, carried=carried)
