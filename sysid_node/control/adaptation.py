@@ -37,6 +37,9 @@ PERIOD = 0.5
 #: s without estimates or sensors, after which the parameters flown before are not flown again.
 LAPSE = 5.0
 
+#: s in which the baseline is reached once it must be flown.
+FALL = 0.1
+
 #: Least effect of the surfaces relative to the file's (for two, the determinant); estimates with less are not used.
 LEAST_AUTHORITY = 0.1
 
@@ -74,6 +77,7 @@ class AxisAdaptation:
     refused: int = 0
     left: AxisParameters | None = None  # the target before the baseline, to which it may return
     left_at: float = math.nan  # s
+    fall_rate: float = 0.0  # 1/s, of the move to the baseline
 
 
 def init(axis: Axis) -> AxisAdaptation:
@@ -84,10 +88,12 @@ def init(axis: Axis) -> AxisAdaptation:
 
 def fall_back(state: AxisAdaptation, why: str, now: float) -> None:
     """Make the baseline the target, at a time (s)."""
+    baseline = AxisParameters(state.axis.believed, state.axis.baseline)
     if state.left is None:
         state.left, state.left_at = state.target, now
+        state.fall_rate = _distance(state.axis, state.flown, baseline) / FALL
     state.check, state.verdict = None, f"baseline: {why}"
-    state.target = AxisParameters(state.axis.believed, state.axis.baseline)
+    state.target = baseline
 
 
 def resume(state: AxisAdaptation, now: float) -> None:
@@ -103,7 +109,7 @@ def resume(state: AxisAdaptation, now: float) -> None:
 
 def forget(state: AxisAdaptation) -> None:
     """Do not return to the target before the baseline: gains are adapted by new estimates only."""
-    state.left, state.used = None, ()
+    state.used, state.left_at = (), -math.inf
 
 
 def consider(
@@ -132,10 +138,11 @@ def consider(
 
 
 def advance(state: AxisAdaptation, settings: ControllerSettings, step: float) -> None:
-    """Check some corners, and move the parameters towards the target for ``step`` (s)."""
+    """Check some corners, and move the parameters towards the target for ``step`` (s): fast where it is a fall-back."""
     if state.check is not None:
         _check_corners(state, state.check, settings)
-    state.flown = _moved(state.axis, state.flown, state.target, settings.gain_rate * step)
+    rate = settings.gain_rate if state.left is None else max(settings.gain_rate, state.fall_rate)
+    state.flown = _moved(state.axis, state.flown, state.target, rate * step)
 
 
 def _usable(estimate: IdentifiedDerivative, half: float, explained: float) -> bool:
@@ -209,9 +216,14 @@ def _between(start: AxisParameters, end: AxisParameters, share: float) -> AxisPa
     return AxisParameters(*(a + share * (b - a) for a, b in zip(start, end, strict=True)))
 
 
-def _moved(axis: Axis, flown: AxisParameters, target: AxisParameters, most: float) -> AxisParameters:
-    """The parameters after a move to the target by at most ``most``, relative to the baseline's gains and the sizes."""
+def _distance(axis: Axis, start: AxisParameters, end: AxisParameters) -> float:
+    """The length of the way between two parameters, relative to the baseline's gains and the derivatives' sizes."""
     size = np.abs(axis.baseline).max(axis=0)  # (n,) the largest gain of each state
-    gains = np.abs(target.gains - flown.gains).max(axis=0) / np.maximum(size, 0.1 * size.max())
-    length = max(float(np.max(np.abs(target.values - flown.values) / axis.sizes)), float(gains.max()))
+    gains = np.abs(end.gains - start.gains).max(axis=0) / np.maximum(size, 0.1 * size.max())
+    return max(float(np.max(np.abs(end.values - start.values) / axis.sizes)), float(gains.max()))
+
+
+def _moved(axis: Axis, flown: AxisParameters, target: AxisParameters, most: float) -> AxisParameters:
+    """The parameters after a move to the target by at most ``most``; see ``_distance``."""
+    length = _distance(axis, flown, target)
     return target if length <= most else _between(flown, target, most / length)

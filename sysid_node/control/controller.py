@@ -27,6 +27,7 @@ from sysid_node.control.types import Command, IdentifiedDerivative, Measurements
 
 NO_EXCITATION = (0.0, 0.0, 0.0)
 FIRST_STEP = 0.005  # s
+FOREIGN_CLOCK = 3600.0  # s between the stamps of estimates and IMU, beyond which they are of different clocks
 
 
 @dataclass
@@ -101,6 +102,8 @@ def _stale_reason(state: ControllerState, measured: Measurements) -> str:
     if state.tracking.lost:
         return f"the tracking error was over {state.settings.largest_tracking_error:g} rad"
     age = abs(measured.time - state.estimates_time)  # the clock may step back
+    if math.isfinite(age) and age > FOREIGN_CLOCK:
+        return "the stamps of estimates and IMU are of different clocks"
     if age > state.settings.stale_after:
         return f"no estimates for {age:.1f} s" if math.isfinite(age) else "no estimates yet"
     return ""

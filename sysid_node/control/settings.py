@@ -43,7 +43,7 @@ class ControllerSettings:
     tightness: float = 0.4  # half an interval over the derivative's size, beyond which the estimate is not used
     explained: float = 0.9  # least R^2 of a coefficient's equation, for its derivatives to be used
     gain_rate: float = 1.0  # 1/s, rate of change of the gains relative to the baseline's
-    stale_after: float = 0.5  # s without estimates, after which the baseline gains are flown
+    stale_after: float = 0.3  # s without estimates, after which the baseline gains are flown
     command_rate: float = 4.0  # rad/s, of a surface's command
     command_limit: float = 0.35  # rad, of a surface's command where the aircraft file gives no limit
     bandwidth: float = 2.5  # rad/s, of the reference model of the attitude

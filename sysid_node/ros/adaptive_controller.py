@@ -127,7 +127,6 @@ class AdaptiveController(LoopNode):
         self._start_ns = 0
         self._work = Durations()
         self._checked = Counter[str]()  # what the controller's checks had counted at the last report
-        self._present: dict[str, str] = {}  # the conditions of the last report
         self._wrong: dict[str, str] = {}  # what was wrong with set-points and estimates since the last report
         self._steps, self._steps_at_limit = 0, np.zeros(len(CONTROLS), int)  # since the last report
         self._command = self.create_publisher(JointState, COMMAND, 10)
@@ -158,7 +157,7 @@ class AdaptiveController(LoopNode):
         line = "; ".join(f"{axis.axis.name}: {axis.verdict}" for axis in self._state.axes)
         if self._imu.silent() or not self._imu_count:
             return DiagnosticStatus.ERROR, f"{self._imu.topic} silent: surfaces at level flight's; {line}", values
-        troubles += [f"{subject}: {text}" for subject, text in self._present.items()]
+        troubles += [f"{subject}: {text}" for subject, text in self.present.items()]
         line = "; ".join([line, *troubles])
         return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
 
@@ -177,7 +176,6 @@ class AdaptiveController(LoopNode):
         if self._points.expired(time.monotonic()):
             expired = f"none for {self.values['set_points_expire_after']:g} s: level flight is flown"
             present["set-points"] = expired
-        self._present = present
         return present
 
     def states(self) -> Mapping[str, str]:

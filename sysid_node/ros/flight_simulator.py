@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData
 
 from sysid_node.control.allocation import Allocation
@@ -84,20 +85,37 @@ class FlightSimulator(LoopNode):
         values = self.values
         self._simulator = Simulator(self.aircraft, values["rate"])
         self._trim = trim_flight(self._simulator)
-        theta = live.vector(self._simulator, values["effects"].split())
-        air = LiveConditions(values["turbulence"], noise=values["noise"], seed=int(values["seed"]))
-        self._flight = live.start(self._simulator, self._trim, air, theta)
-        self._command: list[float] = self._trim.command.tolist()
+        self._theta = live.vector(self._simulator, values["effects"].split())
+        self._air = LiveConditions(values["turbulence"], noise=values["noise"], seed=int(values["seed"]))
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
         self._steps, self._commands, self._refused = Durations(), 0, 0
-        self._reported_skip = 0.0  # s that were not flown and have been reported
+        self._refusal = ""  # why commands were refused since the last report
         self._commanded = -math.inf  # s, time.monotonic of the last command
         self._open_topics()
+        self._begin()
         live.step(self._simulator, self._flight, self._command)  # the first step compiles the program
         self._start_ns = self.get_clock().now().nanoseconds if values["speed"] == 1.0 else time.time_ns()
         self._pace = Pace(time.monotonic(), self._simulator.step, values["speed"])
+        self.create_service(Trigger, "~/reset", self._on_reset)
         self.every(0.5 / (values["rate"] * values["speed"]), self._on_time)
         self.get_logger().info(f"flies {self.aircraft.name!r} at {values['rate']:g} Hz")
+
+    def _begin(self) -> None:
+        """Begin a flight in trim, with the present effects."""
+        self._flight = live.start(self._simulator, self._trim, self._air, self._theta)
+        self._command: list[float] = self._trim.command.tolist()
+        self._diverged = ""  # why the flight is none any more
+        self._reported_skip = 0.0  # s that were not flown and have been reported
+
+    def _on_reset(self, _: Any, response: Any) -> Any:
+        """Begin anew; the stamps go on."""
+        gone = time.monotonic() - self._pace.begun
+        self._start_ns += round(NANOSECONDS * gone * self.values["speed"])
+        self._begin()
+        self._pace = Pace(time.monotonic(), self._simulator.step, self.values["speed"])
+        self.get_logger().warning("flies again from level flight, on request")
+        response.success, response.message = True, "flies again from level flight"
+        return response
 
     def _open_topics(self) -> None:
         self._imu = self.create_publisher(Imu, IMU, 50)
@@ -105,18 +123,18 @@ class FlightSimulator(LoopNode):
         self._actuators = self.create_publisher(JointState, ACTUATORS, 50)
         self._pose = self.create_publisher(PoseStamped, "pose", 10)
         self._sim_time = self.create_publisher(ClockMessage, "/clock", 10) if self.values["speed"] != 1.0 else None
-        self.create_subscription(JointState, COMMAND, self._on_command, LATEST)
+        self.hear(JointState, COMMAND, self._on_command, LATEST, needed=False)
 
     def changed(self, values: Mapping[str, Any]) -> None:
         """Take new effects; they act from the next sample on."""
         if "effects" in values:
             if not isinstance(values["effects"], str):
                 raise InputError(f"effects {values['effects']!r}: expected a string")
-            self._flight.theta = live.vector(self._simulator, values["effects"].split())
+            self._theta = self._flight.theta = live.vector(self._simulator, values["effects"].split())
             self.get_logger().info(f"effects: {values['effects'] or 'none'}")
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """Whether the simulation keeps up with the clock, and the duration of a step."""
+        """Whether it flies, keeps up with the clock, and how long a step takes."""
         p50, p99 = self._steps.percentiles()
         flown = self._flight.samples * self._simulator.step
         behind = self._pace.tell()
@@ -133,16 +151,35 @@ class FlightSimulator(LoopNode):
         troubles = [f"{skipped:.1f} s were not flown, the machine is too slow"] if skipped else []
         if behind > LATE:
             troubles.append(f"up to {1e3 * behind:.0f} ms behind the clock")
+        if self._diverged:
+            return DiagnosticStatus.ERROR, f"{flown:.0f} s flown; {self._diverged_words()}", values
         silence = time.monotonic() - self._commanded
+        if not self._commands:
+            troubles.append(f"nobody flies it: no commands on {self.inputs[COMMAND].name}")
+        troubles += [f"{subject}: {text}" for subject, text in self.present.items()]
         if self._commands and silence > COMMAND_AGE:
             troubles.append(f"no commands for {silence:.1f} s: the last one is held")
         line = "; ".join([f"{flown:.0f} s flown", *troubles])
         return DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK, line, values
 
+    def conditions(self) -> Mapping[str, str]:
+        """A flight that has diverged, and commands that are refused."""
+        refusal, self._refusal = self._refusal, ""
+        present = {"flight": self._diverged_words()} if self._diverged else {}
+        return present | ({self.inputs[COMMAND].name: refusal} if refusal else {})
+
+    def _diverged_words(self) -> str:
+        return f"diverged ({self._diverged}): publishes nothing until {self.get_fully_qualified_name()}/reset is called"
+
     def _on_command(self, message: Any) -> None:
         found = self._actuation.of_message(self._actuation.places(message.name), message.position)
         if isinstance(found, str) or not all(map(math.isfinite, found)):
             self._refused += 1
+            why = found if isinstance(found, str) else "not finite"
+            expected = ", ".join(self._allocation.joints)
+            self._refusal = (
+                f"commands refused: {why}; expected joints {expected}, got {', '.join(message.name) or 'none'}"
+            )
             return
         thrust, *controls = found
         self._command = [*controls, thrust]
@@ -150,9 +187,15 @@ class FlightSimulator(LoopNode):
 
     def _on_time(self) -> None:
         """Simulate and publish the samples that are due."""
+        if self._diverged:
+            return
         for _ in range(self._pace.due(time.monotonic(), self._flight.samples)):
             start = time.perf_counter()
-            self._publish(live.step(self._simulator, self._flight, self._command))
+            now = live.step(self._simulator, self._flight, self._command)
+            self._diverged = live.divergence(now)
+            if self._diverged:
+                return
+            self._publish(now)
             self._steps.add(time.perf_counter() - start)
 
     def _publish(self, now: LiveReading) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 
 from sysid_node.errors import InputError
+from sysid_node.given_values import fits, given_values
 from sysid_node.parameter import Parameter
 
 Check = Callable[[Mapping[str, Any]], None]  # raises InputError on wrong values
@@ -19,6 +21,7 @@ Check = Callable[[Mapping[str, Any]], None]  # raises InputError on wrong values
 
 def declare(node: Node, table: Sequence[Parameter], check: Check) -> None:
     """Declare all parameters. Raises InputError where the user gave one of them a wrong type or value."""
+    refuse_mistyped(sys.argv[1:], node.get_fully_qualified_name(), table)
     for parameter in table:
         try:
             node.declare_parameter(parameter.name, parameter.default, _descriptor(parameter))
@@ -30,6 +33,15 @@ def declare(node: Node, table: Sequence[Parameter], check: Check) -> None:
             ) from None
     check(values_of(node, table))
     _warn_of_unknown(node, table)
+
+
+def refuse_mistyped(arguments: Sequence[str], full_name: str, table: Sequence[Parameter]) -> None:
+    """Raise InputError where a value given in ``arguments`` to the node (``/namespace/name``) has a wrong type."""
+    known = {parameter.name: parameter for parameter in table}
+    for name, value, source in given_values(arguments, full_name):
+        if name in known and not fits(value, known[name].default):
+            kind = "string" if isinstance(value, str) else type(value).__name__.replace("int", "integer")
+            raise InputError(f"parameter {name} = {value!r} ({kind}): expected {known[name].expected}; given {source}")
 
 
 def values_of(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:

@@ -60,6 +60,7 @@ class LoopNode(Node, ABC):
     def __init__(self, name: str, table: Sequence[Parameter], live: frozenset[str] = frozenset()) -> None:
         super().__init__(name)
         self.inputs: dict[str, TopicMonitor] = {}  # by topic; the monitors' names are the resolved ones
+        self.present: Mapping[str, str] = {}  # the conditions that were found last
         self._needed: set[str] = set()  # topics without which the node cannot do its work
         self._unreadable: dict[str, int] = {}  # messages since the last report, by resolved topic
         self._conditions, self._states = Conditions(), States()
@@ -154,7 +155,8 @@ class LoopNode(Node, ABC):
         silent = self._silent()
         unreadable = {name: f"{count} messages are {UNREADABLE}" for name, count in self._unreadable.items()}
         self._unreadable = {}
-        for wrong, line in self._conditions.update({**silent, **unreadable, **self.conditions()}):
+        self.present = self.conditions()
+        for wrong, line in self._conditions.update({**silent, **unreadable, **self.present}):
             if wrong:  # a line each: rclpy knows a call by its line, and wants one severity of each
                 self.get_logger().warning(line)
             else:

@@ -40,6 +40,9 @@ _LONGEST_DELAY = 0.5
 #: Turbulence repeats after the first time; its end is faded into its beginning over the second, s.
 _PERIOD, _FADE = 300.0, 10.0
 
+#: Speed (m/s) and angular rate (rad/s) beyond which a flight has diverged.
+_MOST_SPEED, _MOST_RATE = 1.0e3, 1.0e2
+
 #: Index at which outputs, state and surfaces begin in the row that a step returns.
 _PARTS = (1, 1 + len(OUTPUTS), 1 + len(OUTPUTS) + len(STATES))
 
@@ -113,6 +116,22 @@ def step(simulator: Simulator, live: LiveFlight, commands: Sequence[float]) -> L
     live.samples += 1
     density, outputs, state, surfaces = np.split(np.asarray(reading), _PARTS)
     return LiveReading(time, outputs, state, surfaces, float(density[0]))
+
+
+def divergence(now: LiveReading) -> str:
+    """Why a reading is no flight's any more; empty where it is one.
+
+    A reading that is not finite, or far beyond what the model's equations stand for, comes of a flight that was lost
+    before. Nothing after it means anything.
+    """
+    values = {"outputs": now.outputs, "state": now.state, "surfaces": now.surfaces}
+    for name, row in values.items():
+        if not np.isfinite(row).all():
+            return f"{name} are not finite"
+    speed, rate = float(np.linalg.norm(now.state[3:6])), float(np.abs(now.outputs[3:6]).max())
+    if speed > _MOST_SPEED or rate > _MOST_RATE:
+        return f"speed {speed:.3g} m/s, angular rate {rate:.3g} rad/s"
+    return ""
 
 
 def vector(simulator: Simulator, effects: Sequence[str]) -> Array:
