@@ -1,10 +1,18 @@
-"""The launch files, without `launch` installed: they name executables, files and arguments that exist."""
+"""The launch files, without `launch` installed: they name executables, files and arguments that exist.
+
+They are also run, with classes in the place of `launch`'s that keep what they are given.
+"""
 
 import ast
 import re
+import runpy
+import sys
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = sorted((ROOT / "launch").glob("*.launch.py"))
@@ -29,8 +37,8 @@ def test_it_is_plain_and_uses_what_it_declares(path: Path) -> None:
     assert any(isinstance(n, ast.FunctionDef) and n.name == "generate_launch_description" for n in tree.body)
     modules = {n.module.partition(".")[0] for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
     assert modules <= {"pathlib", "ament_index_python", "launch", "launch_ros"}
-    used, declared = first_words(path, "LaunchConfiguration"), first_words(path, "DeclareLaunchArgument")
-    assert used <= declared | {"imu", "air_data", "actuators"}
+    used = first_words(path, "LaunchConfiguration") | first_words(path, "argument")
+    assert used <= first_words(path, "DeclareLaunchArgument") | {"imu", "air_data", "actuators"}
     for call in calls(path, "DeclareLaunchArgument"):
         assert any(keyword.arg == "description" for keyword in call.keywords)
 
@@ -44,3 +52,63 @@ def test_executables_exist_and_have_a_file_of_parameters() -> None:
     for name in named:
         assert name in PROGRAMS
         assert (ROOT / "config" / f"{name}.yaml").is_file()
+
+
+class Kept:
+    """What stands for a class of `launch`: its name and what it was given."""
+
+    def __init__(self, *words: Any, **given: Any) -> None:
+        self.kind, self.words, self.given = type(self).__name__, words, given
+
+
+MODULES = {
+    "ament_index_python.packages": (),
+    "launch": ("LaunchDescription",),
+    "launch.actions": ("DeclareLaunchArgument", "ExecuteProcess", "Shutdown"),
+    "launch.conditions": ("IfCondition",),
+    "launch.substitutions": ("LaunchConfiguration", "PythonExpression"),
+    "launch_ros.actions": ("LifecycleNode", "Node"),
+    "launch_ros.parameter_descriptions": ("ParameterValue",),
+}
+
+
+@pytest.fixture(params=FILES, ids=lambda path: path.name)
+def actions(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> list[Kept]:
+    """The actions of a launch file."""
+    for name, kinds in MODULES.items():
+        module: Any = ModuleType(name)
+        for kind in kinds:
+            setattr(module, kind, type(kind, (Kept,), {}))
+        module.get_package_share_directory = lambda _: str(ROOT)
+        monkeypatch.setitem(sys.modules, name, module)
+    described: Kept = runpy.run_path(str(request.param))["generate_launch_description"]()
+    return list(described.words[0])
+
+
+def test_a_node_that_ends_takes_the_others_along(actions: list[Kept]) -> None:
+    """launch's ``on_exit``; without it four nodes flew on after the simulator could not start."""
+    nodes = [one for one in actions if one.kind in ("Node", "LifecycleNode")]
+    assert nodes
+    for node in nodes:
+        assert node.given["on_exit"].kind == "Shutdown"
+        assert node.given["namespace"].words == ("namespace",)
+
+
+def test_arguments_with_few_values_have_choices(actions: list[Kept]) -> None:
+    declared = {one.words[0]: one.given for one in actions if one.kind == "DeclareLaunchArgument"}
+    for name, given in declared.items():
+        closed = name in ("adapt", "method", "turbulence", "use_sim_time", "autopilot")
+        assert ("choices" in given) == closed, name
+        if closed:
+            assert given["default_value"] in given["choices"]
+
+
+def test_values_have_the_types_of_the_nodes_tables(actions: list[Kept]) -> None:
+    """A LaunchConfiguration is a text, which launch_ros would read as YAML: `speed:=2` would be an integer."""
+    for node in (one for one in actions if one.kind in ("Node", "LifecycleNode")):
+        file = ROOT / "config" / f"{node.given['executable']}.yaml"
+        defaults = yaml.safe_load(file.read_text(encoding="utf-8"))["/**"]["ros__parameters"] | {"use_sim_time": False}
+        for block in (one for one in node.given["parameters"] if isinstance(one, dict)):
+            for name, value in block.items():
+                kind = value.given["value_type"] if isinstance(value, Kept) else type(value)
+                assert kind is type(defaults[name]), (node.given["executable"], name)

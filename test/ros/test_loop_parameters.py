@@ -11,15 +11,16 @@ from sysid_node.control.settings import ControllerSettings as Control
 from sysid_node.excite.exciter_settings import ExcitationSettings
 from sysid_node.faults.settings import FaultMonitorSettings as Faults
 from sysid_node.parameter import annotated_yaml, check_each
-from sysid_node.ros import adaptive_controller, exciter, fault_monitor, flight_simulator
+from sysid_node.ros import adaptive_controller, exciter, fault_monitor
+from sysid_node.ros.support import simulated_flight
 from sysid_node.ros.support.loop_node import EFFECT
 
-NODES = [adaptive_controller, exciter, fault_monitor, flight_simulator]
+NODES = [adaptive_controller, exciter, fault_monitor, simulated_flight]
 
 
 @pytest.mark.parametrize("node", NODES, ids=lambda node: node.__name__)
 def test_shipped_file_is_the_table(node: ModuleType) -> None:
-    name = node.__name__.rpartition(".")[2]
+    name = node.__name__.rpartition(".")[2].replace("simulated_flight", "flight_simulator")
     text = (ROOT / "config" / f"{name}.yaml").read_text(encoding="utf-8")
     assert text == annotated_yaml(name, node.PARAMETERS, EFFECT)
     values = yaml.safe_load(text)["/**"]["ros__parameters"]

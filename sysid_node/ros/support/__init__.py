@@ -2,5 +2,6 @@
 
 ``spin`` runs a program, ``lifecycle`` and ``loop_node`` are the nodes' base classes, and ``declaring`` declares their
 parameters. ``message_types`` and ``conversion`` stand between ROS's messages and plain numbers, ``diagnostics`` writes
-the identifier's /diagnostics. ``follower`` and ``loop_watch`` listen to running nodes for the command line.
+the identifier's /diagnostics, and ``simulated_flight`` is the simulator's node. ``follower`` and ``loop_watch`` listen
+to running nodes for the command line.
 """

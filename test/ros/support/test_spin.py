@@ -55,3 +55,13 @@ def test_arguments_that_ros_cannot_read_are_one_line() -> None:
     assert done.returncode == 2
     lines = done.stderr.splitlines()  # the first is rcl's own
     assert len(lines) == 2 and "arguments after --ros-args" in lines[1]
+
+
+def test_a_simulator_without_its_libraries_ends_with_one_line() -> None:
+    """It was a traceback of 18 lines."""
+    hidden = "import sys; sys.modules['jax'] = None; from sysid_node.ros.flight_simulator import main; main()"
+    done = ended(hidden)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "flight_simulator needs jax" in line
+    assert "pip install -r requirements/desk.txt" in line
