@@ -4,40 +4,102 @@ from __future__ import annotations
 
 import csv
 import math
+import os
+import stat
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
+from sysid_node.flight.csv_checks import check_names, check_time, implausible
 from sysid_node.flight.record import FlightRecord
 
 TIME = "t"
+SIZE_LIMIT = 2 * 10**9  # bytes: a day at 200 Hz has 1.5e9
+LINE_LIMIT = 2**17  # characters
 
 
 def read_csv(path: str | Path) -> FlightRecord:
     """The flight in a CSV file; a column with another name is taken as a further control.
 
-    Raises InputError that names file and line where a cell is no number, a row is incomplete or time does not increase.
+    Samples with values that no aircraft measures are left out and counted in ``rejected``. Raises InputError that names
+    file and line where a cell is no number, a row is incomplete or time does not increase, and where units are wrong.
+    Warns (InputWarning) where a column is missing.
     """
     path = Path(path)
+    with _naming(path), _lines(path) as lines:
+        reader = csv.reader(lines)
+        names = [name.strip() for name in next(reader, [])]
+        check_names(names, TIME)
+        table = np.array([_numbers(names, reader.line_num, row) for row in reader if row])
+        if len(table) < 2:
+            raise InputError(f"{len(table)} samples; at least 2 are needed")
+        columns = dict(zip(names, np.ascontiguousarray(table.T), strict=True))
+        time = columns.pop(TIME)
+        whole = FlightRecord(time, columns, path.stem)
+        check_time(time)
+        return _plausible(whole)
+
+
+def _plausible(flight: FlightRecord) -> FlightRecord:
+    """The flight without the samples that no aircraft measures."""
+    faults = implausible(flight.time, flight.columns)
+    reasons = Counter(reason for reason in faults.tolist() if reason is not None)
+    if not reasons:
+        return flight
+    kept = np.array([reason is None for reason in faults.tolist()], bool)
+    if np.count_nonzero(kept) < 2:
+        worst, count = reasons.most_common(1)[0]
+        raise InputError(f"no two samples are plausible: {count} x {worst}; correct the columns")
+    columns = {name: values[kept] for name, values in flight.columns.items()}
+    return FlightRecord(flight.time[kept], columns, flight.name, flight.start_ns, dict(reasons))
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """A context in which errors and warnings about a file's content name the file."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file))
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            yield
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV: {error}") from error
-    names = [name.strip() for name in rows[0]] if rows else []
-    _check_names(path, names)
-    table = np.array([_numbers(path, names, line, row) for line, row in enumerate(rows[1:], start=2) if row])
-    if len(table) < 2:
-        raise InputError(f"{path}: {len(table)} samples; at least 2 are needed")
-    columns = dict(zip(names, np.ascontiguousarray(table.T), strict=True))
-    try:
-        return FlightRecord(columns.pop(TIME), columns, path.stem)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
+    for warning in said:
+        warnings.warn(f"{path}: {warning.message}", warning.category, stacklevel=4)
+
+
+@contextmanager
+def _lines(path: Path) -> Iterator[Iterator[str]]:
+    """The lines of a file, up to its size when it was opened. Raises InputError where it is no file, or too large."""
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError("is no file but a device or pipe; save it to a file first")
+        if status.st_size > SIZE_LIMIT:
+            raise InputError(
+                f"{status.st_size / 1e9:.1f} GB, over {SIZE_LIMIT / 1e9:g} GB; cut it, or make a bag of it"
+            )
+        yield _bounded(file, status.st_size)
+
+
+def _bounded(file: TextIO, size: int) -> Iterator[str]:
+    """Lines until ``size`` characters are read: a file that grows faster than it is read ends all the same."""
+    read, number = 0, 0
+    while read < size and (line := file.readline(LINE_LIMIT)):
+        read, number = read + len(line), number + 1
+        if len(line) == LINE_LIMIT:
+            raise InputError(f"line {number} is longer than {LINE_LIMIT} characters; is it a CSV file?")
+        yield line
 
 
 def write_csv(path: str | Path, flight: FlightRecord) -> None:
@@ -47,18 +109,10 @@ def write_csv(path: str | Path, flight: FlightRecord) -> None:
     write_table(Path(path), [TIME, *flight.columns], rows, blank_nan=True)
 
 
-def _check_names(path: Path, names: list[str]) -> None:
-    if TIME not in names:
-        raise InputError(f"{path}: no column {TIME!r} (time in s); the first line must name the columns")
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"{path}: column {twice[0]!r} is there twice; leave one out")
-
-
-def _numbers(path: Path, names: list[str], line: int, row: list[str]) -> list[float]:
+def _numbers(names: list[str], line: int, row: list[str]) -> list[float]:
     """One row; an empty cell is NaN."""
     if len(row) != len(names):
-        raise InputError(f"{path}: line {line} has {len(row)} cells, expected {len(names)}; was the file cut short?")
+        raise InputError(f"line {line} has {len(row)} cells, expected {len(names)}; was the file cut short?")
     values = []
     for name, cell in zip(names, row, strict=True):
         try:
@@ -66,6 +120,6 @@ def _numbers(path: Path, names: list[str], line: int, row: list[str]) -> list[fl
         except ValueError:
             value = math.inf
         if math.isinf(value) or (name == TIME and math.isnan(value)):
-            raise InputError(f"{path}: line {line}, column {name!r}: got {cell!r}, expected a number")
+            raise InputError(f"line {line}, column {name!r}: got {cell!r}, expected a number")
         values.append(value)
     return values
