@@ -6,6 +6,7 @@ import argparse
 import json
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +17,15 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import STORAGES, write_streams
+from sysid_node.flight.commands import COMMANDS, POSITIONS
 from sysid_node.flight.frames import BODY_FRAMES
-from sysid_node.flight.streams import Streams
+from sysid_node.flight.streams import JointStream, Streams
 from sysid_node.flight.truth import truth_path
 from sysid_node.report.files.output_file import output_bag
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
+    from sysid_node.sim.flying.recording import Recorder
     from sysid_node.sim.flying.sortie import Sortie
     from sysid_node.sim.simulator import Simulator
 
@@ -72,15 +75,15 @@ def run(args: argparse.Namespace) -> None:
     """Flies, then writes the bag and the truth."""
     inputs = options.inputs_of([], args.aircraft)
     with output_bag(args.out, inputs, force=args.force, truth=True) as bag:
-        sortie, streams = _fly(args)
-        write_streams(bag, streams, args.storage, args.body_frame)
+        sortie, streams, beside = _fly(args)
+        write_streams(bag, streams, args.storage, args.body_frame, beside)
         truth_path(bag).write_text(json.dumps(_truth(args, sortie), indent=2) + "\n", encoding="utf-8")
     if not args.quiet:
         print(_summary(args.out, sortie, streams))
 
 
-def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams]:
-    """The flight and its messages."""
+def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStream]]:
+    """The flight and its messages, with those of ``_beside``."""
     from sysid_node.sim.flying.recording import Recorder  # noqa: PLC0415  # JAX takes its time
     from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
@@ -100,7 +103,14 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams]:
         command_rate=held,
     )
     sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
-    return sortie, recorder.record(sortie)
+    return sortie, recorder.record(sortie), _beside(recorder, sortie)
+
+
+def _beside(recorder: Recorder, sortie: Sortie) -> dict[str, JointStream]:
+    """What the topic ``actuators`` does not carry, positions or commands, by its own topic."""
+    if recorder.surfaces == "measured":
+        return {COMMANDS: recorder.commands(sortie)}
+    return {POSITIONS: replace(recorder, surfaces="measured").record(sortie).actuators}
 
 
 def _deflections(simulator: Simulator, specs: list[str], duration: float | None) -> NDArray[np.float64]:

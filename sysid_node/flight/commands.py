@@ -11,6 +11,8 @@ from sysid_node.flight.bag.reader import open_bag, reading
 from sysid_node.flight.cdr.decoding import decode
 from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS
 
+#: Where positions are recorded by ``sysid simulate``, if the topic ``actuators`` carries commands.
+POSITIONS = "/actuators/position"
 #: Where commands are recorded (``docs/reference/bags.md``), and their type: that of the positions.
 COMMANDS, COMMANDS_TYPE = "/actuators/command", INPUT_TOPICS[ACTUATORS]
 

@@ -11,6 +11,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.logs import load_flight_record
+from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,6 +54,24 @@ def test_a_bag_and_its_truth(tmp_path, capsys):
     assert truth["effects"]["turbulence"]["intensity"] == pytest.approx(0.77, abs=0.01)
     assert read_truth(bag)["Cm_alpha"] == pytest.approx(aircraft.derivatives["Cm_alpha"].value - 0.05)
     assert str(tmp_path) not in truth["command"]
+
+
+@pytest.mark.parametrize("surfaces", ["commanded", "measured"])
+def test_commands_and_positions_are_both_recorded(tmp_path, surfaces):
+    """Each command jumps once in the manoeuvre and is held; its position comes later by the servo's time constant."""
+    options = ["--manoeuvre", "doublet:elevator:amplitude=0.1:width=1:start=1", "--open-loop", "--noise", "0"]
+    bag = fly(tmp_path, "both", *options, "--effect", "actuator_lag:time_constant=0.05", "--surfaces", surfaces)
+    other = {"commanded": "/actuators/position", "measured": "/actuators/command"}[surfaces]
+    streams = [read_streams(bag), read_streams(bag, topic_names([f"actuators:={other}"]))]
+    commands, positions = (s.actuators for s in (streams if surfaces == "commanded" else streams[::-1]))
+    column = commands.names.index("elevator")
+    steps = np.flatnonzero(np.diff(commands.positions[:, column]) > 0.05)
+    assert steps.size == 2
+    begin = commands.arrival.stamp_ns[steps[0] + 1]
+    after = (positions.arrival.stamp_ns - begin) / 1e9
+    moved = positions.positions[:, column] - positions.positions[0, column]
+    rising = (after > 0.01) & (after < 0.9)
+    np.testing.assert_allclose(moved[rising], 0.1 * (1.0 - np.exp(-after[rising] / 0.05)), atol=1e-4)
 
 
 def test_the_truths_command_flies_it_again(tmp_path):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from heapq import merge
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -43,10 +45,17 @@ def new_bag(path: str | Path, storage: str = "mcap") -> Iterator[Writer]:
         raise InputError(f"bag {path}: cannot be written: {error}") from error
 
 
-def write_streams(path: str | Path, streams: Streams, storage: str = "mcap", frame: BodyFrame = "flu") -> None:
+def write_streams(
+    path: str | Path,
+    streams: Streams,
+    storage: str = "mcap",
+    frame: BodyFrame = "flu",
+    joints: Mapping[str, JointStream] | None = None,
+) -> None:
     """Write a bag of the three input topics, in log order; ``frame`` is that of its IMU messages.
 
-    Raises InputError where the bag exists or cannot be written.
+    ``joints`` are further joint states by topic, such as commands beside positions. Raises InputError where the bag
+    exists or cannot be written.
     """
     topics = topic_names()
     messages = {
@@ -56,13 +65,19 @@ def write_streams(path: str | Path, streams: Streams, storage: str = "mcap", fra
     }
     with new_bag(path, storage) as writer:
         connections = {topic: add_topic(writer, topics[topic], INPUT_TOPICS[topic]) for topic in messages}
-        recorded = (
+        recorded = [
             (int(order), int(log_ns), topic, data)
             for topic, stream in streams.by_topic.items()
             for order, log_ns, data in zip(stream.arrival.order, stream.arrival.log_ns, messages[topic], strict=True)
-        )
-        for _, log_ns, topic, data in sorted(recorded, key=lambda message: message[0]):
-            writer.write(connections[topic], log_ns, data)
+        ]
+        recorded.sort(key=lambda message: message[0])
+        for topic, stream in (joints or {}).items():
+            connections[topic] = add_topic(writer, topic, INPUT_TOPICS[ACTUATORS])
+            log_ns = stream.arrival.log_ns.tolist()
+            further = zip(repeat(-1), log_ns, repeat(topic), joint_messages(stream), strict=False)
+            recorded = list(merge(recorded, further, key=lambda message: message[1]))
+        for _, at, topic, data in recorded:
+            writer.write(connections[topic], at, data)
 
 
 def add_topic(writer: Writer, topic: str, msgtype: str) -> Connection:
