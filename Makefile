@@ -40,7 +40,7 @@ docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out
 	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
 	@echo "out/docs/index.html"
 
-test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs  ## run all tests; ARGS="test/online -x" runs some
+test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
 	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## ruff and mypy --strict
@@ -78,7 +78,7 @@ $(DONE)/ros: requirements/ros.txt requirements/constraints.txt | $(DONE)/venv
 	$(PIP) -r requirements/ros.txt
 	touch $@
 
-$(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
+$(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs $(DONE)/view: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
 	@echo "==> $< into $(VENV)"
 	$(PIP) -r $<
 	touch $@

@@ -215,7 +215,7 @@ def layers() -> str:
     """The layers of the source: imports point downwards only."""
     rows = (
         (("cli", "commands"),),
-        (("api", "the Python interface: load, replay, identify, diagnose"),),
+        (("api", "Python: load, replay, identify, diagnose"), ("view", "flights in 3-D, in the viewer Rerun")),
         (("report", "pages, figures, tables and files of a run"),),
         (("ros", "nodes: messages in and out, no mathematics"),),
         (("gap", "flight data, residuals, estimation, instruments, selection, validation, verdict"),),

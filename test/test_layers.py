@@ -29,7 +29,8 @@ BELOW = {
 }
 BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["api"] = {*BELOW["report"], "report"}
-BELOW["cli"] = {*BELOW["api"], "api"}
+BELOW["view"] = {*BELOW["report"], "report"}
+BELOW["cli"] = {*BELOW["api"], "api", "view"}
 
 #: The rooms of a layer (sub-packages and modules), lowest first: a room may import itself and those before it.
 ROOMS = {

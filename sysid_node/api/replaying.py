@@ -21,6 +21,7 @@ from sysid_node.flight.align import counts_by_reason, why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.commands import read_commands
+from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
 from sysid_node.online.alignment import flow_angle_filter
@@ -83,7 +84,18 @@ class Replay(EstimatedRun):
             remarks=[*flow_angle_filter.remarks(flow), *([carried] if carried else [])],
         )
         said = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
-        return replace(result, settings={**result.settings, **said})
+        signals = replace(result.signals, flight=self._with_attitude(result.signals.flight))
+        return replace(result, settings={**result.settings, **said}, signals=signals)
+
+    def _with_attitude(self, flight: FlightRecord | None) -> FlightRecord | None:
+        """The flight with roll, pitch and heading, of which the estimator takes none, where they were recorded."""
+        stamps, angles = self.streams.imu.arrival.stamp_ns, self.streams.imu.attitude
+        if flight is None or not np.isfinite(angles).any():
+            return flight
+        order = np.argsort(stamps, kind="stable")
+        rows = order[np.searchsorted(stamps[order], self.aligned.stamps)]
+        columns = dict(zip(("phi", "theta", "psi"), angles[rows].T, strict=True))
+        return replace(flight, columns={**flight.columns, **columns})
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write what ``sysid replay`` writes; returns the path of the report.

@@ -6,7 +6,6 @@ Simulator, identifier, exciter, fault monitor and controller run in processes of
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from contextlib import ExitStack
 from pathlib import Path
@@ -24,8 +23,8 @@ from sysid_node.cli.live.ros_domain import own_domain
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
+from sysid_node.report.files.loop_folder import write_loop_folder
 from sysid_node.report.files.output_folder import output_folder
-from sysid_node.report.pages.closed_loop_page import write_loop
 from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 
 if TYPE_CHECKING:
@@ -64,14 +63,8 @@ def run(args: argparse.Namespace) -> None:
     inputs, logs = options.inputs_of([], args.aircraft), [f"{node}.log" for node in NODES]
     with output_folder(args.out, "loop", inputs=inputs, force=args.force, working=logs) as out:
         flight = _fly(scenario)
-        out.publish(lambda folder: _write(folder, flight))
+        out.publish(lambda folder: write_loop_folder(folder, flight))
     print(_summary(scenario, flight))
-
-
-def _write(folder: Path, flight: ClosedLoopFlight) -> None:
-    """Write the report and the summary."""
-    write_loop(folder, flight)
-    (folder / "summary.json").write_text(json.dumps(flight.summary(), indent=2) + "\n", encoding="utf-8")
 
 
 def _fly(scenario: LoopScenario) -> ClosedLoopFlight:

@@ -29,6 +29,7 @@ COMMANDS = {
     "convert": "turn a flight log into a bag",
     "export": "write an estimate as another simulator's model",
     "report": "write report.html again from the files of a run",
+    "view": "show a flight in 3-D and against time",
     "demo": "identify a recorded flight live, over DDS",
     "loop": "an adaptive controller in closed loop, over DDS",
 }

@@ -85,7 +85,7 @@ def test_the_gap_is_that_of_short_flights_with_its_interval(found: Path) -> None
 
 
 def test_nothing_unfinished_is_left(found: Path) -> None:
-    files = {"gap.json", "where.csv", "candidates.csv", "corrected.yaml", "effects.txt", "report.html"}
+    files = {"gap.json", "where.csv", "candidates.csv", "corrected.yaml", "effects.txt", "flights.csv", "report.html"}
     assert {path.name for path in (found / "out").iterdir()} == files
 
 

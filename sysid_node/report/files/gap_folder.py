@@ -12,6 +12,7 @@ from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
+from sysid_node.report.files.gap_flights import FLIGHTS, write_flights
 from sysid_node.report.pages.gap_page import write_gap_report
 
 #: Folder in the results' that holds the finished steps of an interrupted diagnosis.
@@ -19,7 +20,7 @@ UNFINISHED = "unfinished"
 
 
 def write_gap(folder: Path, found: Diagnosis) -> None:
-    """Writes gap.json, where.csv, candidates.csv, corrected.yaml, effects.txt and report.html. Raises InputError."""
+    """Writes gap.json, the tables, corrected.yaml, effects.txt and report.html. Raises InputError."""
     content = document(found)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -31,6 +32,7 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
                    [list(candidate.values()) for candidate in content["candidates"]])  # fmt: skip
         (folder / "corrected.yaml").write_text(dump_aircraft(corrected_aircraft(found)), encoding="utf-8")
         (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
+        write_flights(folder / FLIGHTS, found)
         write_gap_report(folder / "report.html", found)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder as --out") from None

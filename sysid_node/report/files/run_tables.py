@@ -107,7 +107,7 @@ def write_signals(path: Path, flight: FlightRecord | None) -> None:
 
 def read_signals(path: Path) -> FlightRecord | None:
     """What ``write_signals`` wrote; None where there is no such file."""
-    columns = _read_columns(path, "time")
+    columns = read_columns(path, "time")
     if not columns:
         return None
     try:
@@ -128,7 +128,7 @@ def write_spectra(path: Path, spectra: Spectra | None) -> None:
 
 def read_spectra(path: Path) -> Spectra | None:
     """What ``write_spectra`` wrote; None where there is no such file."""
-    columns = _read_columns(path, "frequency")
+    columns = read_columns(path, "frequency")
     if not columns:
         return None
     groups: dict[str, dict[str, Array]] = {"input": {}, "measured": {}, "residual": {}}
@@ -205,7 +205,7 @@ def _read(path: Path, header: Sequence[str], parse: Callable[[list[str]], T]) ->
                 raise InputError(f"{path}, line {reader.line_num}: {error}; run the command again") from None
 
 
-def _read_columns(path: Path, axis: str) -> dict[str, Array]:
+def read_columns(path: Path, axis: str) -> dict[str, Array]:
     """A table of numbers by column, the first being ``axis``; empty where there is no file or no row."""
     if not path.exists():
         return {}

@@ -69,6 +69,7 @@ class ClosedLoopFlight:
         return {
             "aircraft": self.aircraft,
             "failure": self.failure,
+            "onset": self.onset,
             "adapted": self.adapted,
             "tracking_error": parts,
             "derivatives": derivatives,
