@@ -33,6 +33,9 @@ TIMELINE, APPLICATION = "flight", "sysid"
 #: Where entities of each kind stand.
 WORLD, LANES, NOTES, ABOUT = "world", "lanes", "notes", "about"
 
+#: How a recording begins.
+_MAGIC = b"RRF"
+
 #: Radius of the line of a way, m.
 _WAY = 0.01
 
@@ -55,22 +58,41 @@ def new_recording(title: str) -> rerun.RecordingStream:
 
 
 def save(scene: Scene, path: Path) -> None:
-    """Write a scene as an ``.rrd`` file. Raises InputError where the file cannot be written."""
+    """Write a scene as an ``.rrd`` file, aside and then moved into place, over an earlier recording of that name.
+
+    Raises InputError where the file cannot be written, or is there and holds something else.
+    """
     from sysid_node.view.layout import blueprint  # noqa: PLC0415  # imports Rerun
 
-    stream = new_recording(scene.title)
+    check_recording(path)
+    stream, aside = new_recording(scene.title), path.with_name(f".{path.name}.unfinished")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("wb"):
-            pass
-        stream.save(path, default_blueprint=blueprint(scene))
-    except (OSError, RuntimeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else " ".join(str(error).split())
-        raise InputError(f"--save {path}: cannot be written ({reason}); give another file") from None
-    declare(stream, scene)
-    append(stream, scene)
-    stream.flush()
-    stream.disconnect()
+        with aside.open("wb"):
+            pass  # Rerun would only log that it cannot write
+        stream.save(aside, default_blueprint=blueprint(scene))
+        declare(stream, scene)
+        append(stream, scene)
+        stream.flush()
+        stream.disconnect()
+        aside.replace(path)
+    except OSError as error:
+        raise InputError(f"--save {path}: cannot be written ({error.strerror}); give another file") from None
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def check_recording(path: Path) -> None:
+    """Raises InputError where a path is not to be written as a recording: another suffix, folder, or kind of file."""
+    if path.suffix != ".rrd":
+        raise InputError(f"--save {path}: expected the name of a file that ends in .rrd")
+    try:
+        other = path.is_file() and path.read_bytes()[: len(_MAGIC)] != _MAGIC
+    except OSError as error:
+        raise InputError(f"--save {path}: cannot be read ({error.strerror}); give another file") from None
+    if path.is_dir() or not path.parent.is_dir():
+        raise InputError(f"--save {path}: {path if path.is_dir() else path.parent} is no place for a file")
+    if other:
+        raise InputError(f"--save {path}: exists and holds something else; give another file")
 
 
 def show(scene: Scene) -> None:

@@ -213,11 +213,21 @@ def test_a_closed_loop_is_shown(tmp_path: Path) -> None:
     assert recorded.texts("/notes", "level") == ["INFO", "INFO", "ERROR"]
 
 
-def test_a_file_that_cannot_be_written_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_file_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "run").mkdir()
     write_run(tmp_path / "run", synthetic.run(seconds=12.0))
-    assert main(["view", str(tmp_path / "run"), "--save", str(tmp_path)]) == BAD_INPUT
-    assert "cannot be written" in capsys.readouterr().err
+    taken = tmp_path / "mine.rrd"
+    for name, content, complaint in (
+        ("notes.txt", None, "ends in .rrd"),
+        ("mine.rrd", "my notes", "holds something else"),
+        ("nowhere/a.rrd", None, "no place for a file"),
+    ):
+        if content:
+            taken.write_text(content)
+        assert main(["view", str(tmp_path / "run"), "--save", str(tmp_path / name)]) == BAD_INPUT
+        assert complaint in capsys.readouterr().err
+    assert taken.read_text() == "my notes"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.rrd", "run"]
 
 
 @pytest.mark.parametrize("command", ["replay", "report", "gap", "view"])
