@@ -7,7 +7,7 @@ from math import ceil, sqrt
 
 import rerun.blueprint as rrb
 
-from sysid_node.view.recording import ABOUT, LANES, NOTES, TIMELINE, WORLD, curve_path, place_path
+from sysid_node.view.entities import ABOUT, LANES, NOTES, TIMELINE, WORLD, curve_path, place_path
 from sysid_node.view.scene import Panel, Scene
 
 #: Panels of a tab up to which each has a legend; more are too small for one, and alike.

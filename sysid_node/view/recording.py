@@ -22,16 +22,11 @@ import numpy as np
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.view.aircraft_mesh import Surface, airframe, surfaces
+from sysid_node.view.entities import ABOUT, APPLICATION, NOTES, TIMELINE, WORLD, curve_path, lane_path, part, place_path
 from sysid_node.view.scene import GREY, NOTHING, Arrow, Body, Curve, Scene, Shape
 
 if TYPE_CHECKING:
     import rerun
-
-#: The time line of all data, and the name under which the viewer lists our recordings.
-TIMELINE, APPLICATION = "flight", "sysid"
-
-#: Where entities of each kind stand.
-WORLD, LANES, NOTES, ABOUT = "world", "lanes", "notes", "about"
 
 #: How a recording begins.
 _MAGIC = b"RRF"
@@ -164,26 +159,6 @@ def append(stream: rerun.RecordingStream, scene: Scene) -> None:
     for note in sorted(scene.notes):
         _at(stream, note.time)
         stream.log(NOTES, rr.TextLog(note.text, level=note.level))
-
-
-def part(name: str) -> str:
-    """A name as a part of an entity's path: lower case, with underscores for what is neither letter nor digit."""
-    return re.sub(r"[^0-9a-zA-Z]+", "_", name).strip("_").lower() or "_"
-
-
-def curve_path(tab: str, panel: str, curve: str) -> str:
-    """The entity of a curve. Derivatives keep their names, as in ``/derivatives/Cm_alpha/estimate``."""
-    return f"{part(tab)}/{panel if re.fullmatch(r'[A-Za-z]+_[A-Za-z0-9_]+', panel) else part(panel)}/{part(curve)}"
-
-
-def place_path(body: str) -> str:
-    """The entity of an aircraft's place: its attitude is of the entity ``body`` below it."""
-    return f"{WORLD}/{part(body)}"
-
-
-def lane_path(lane: str) -> str:
-    """The entity of a lane."""
-    return f"{LANES}/{part(lane)}"
 
 
 def _static(stream: rerun.RecordingStream, path: str, archetype: Any) -> None:
