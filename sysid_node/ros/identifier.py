@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -23,10 +23,12 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
-from sysid_node.flight.cdr.message_reader import MessageReader
+from sysid_node.flight.cdr.message_reader import MessageReader, Text
 from sysid_node.flight.live import messages
+from sysid_node.flight.live.conditions import Conditions
 from sysid_node.flight.live.messages import UNREADABLE, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
+from sysid_node.flight.live.recent_counts import FEW, RecentCounts, RecentTopic
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.online.estimates.saving import save_estimates
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
@@ -35,9 +37,9 @@ from sysid_node.online.session import Due, Session
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, refusal, values_of
-from sysid_node.ros.support.diagnostics import Source
+from sysid_node.ros.support.diagnostics import Source, lag_level, lag_words, rejections
 from sysid_node.ros.support.lifecycle import CarefulNode
-from sysid_node.ros.support.loop_node import SENSOR_QOS
+from sysid_node.ros.support.loop_node import SENSOR_QOS, UNHEARD, expected_joints, full_name, say
 from sysid_node.ros.support.message_types import fields_of
 from sysid_node.ros.support.spin import run_program, serve
 
@@ -78,7 +80,7 @@ class Identifier(CarefulNode):
         """Load the aircraft file; make the estimator, the subscriptions and the publishers."""
         values = values_of(self, PARAMETERS)
         if not values["aircraft"]:
-            raise InputError("parameter aircraft is empty: give a name or a file, e.g. -p aircraft:=cdrw")
+            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
         aircraft = load_aircraft(values["aircraft"])
         self._session = self._make_session(aircraft, estimation_settings(values), values["publish_rate"])
         self._sign = conversion.axes_sign(values["body_frame"])
@@ -88,6 +90,8 @@ class Identifier(CarefulNode):
         self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
         self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
+        self._recent, self._conditions = RecentCounts(), Conditions()
+        self._joints: Text = ()  # the names of the last message about actuators
         self._serialiser = EstimatesSerialiser(fields_of, aircraft.name, self._session.settings.method)
         self._inputs = [
             self._listen(Imu, IMU, self._on_imu),
@@ -129,9 +133,11 @@ class Identifier(CarefulNode):
             self._session.use_pause()
 
         overrides = QoSOverridingOptions.with_default_policies()
-        return self.create_subscription(
+        subscription = self.create_subscription(
             kind, topic, self.guarded(on_message), SENSOR_QOS, qos_overriding_options=overrides, raw=True
         )
+        monitor.resolved = subscription.topic_name
+        return subscription
 
     def _on_imu(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
         self._frame_id = str(texts[0])
@@ -141,6 +147,7 @@ class Identifier(CarefulNode):
         return session.air_data(*messages.air_data(numbers))
 
     def _on_actuators(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
+        self._joints = texts[0]
         return session.actuators(*messages.actuators(numbers, texts))
 
     def _publish(self, session: Session, due: Due) -> None:
@@ -199,7 +206,7 @@ class Identifier(CarefulNode):
     def _report(self, due: Due | None = None) -> None:
         """Publish diagnostics; ``due`` are the estimates of this moment, where they were just made."""
         self._reported = time.monotonic()
-        source = Source(self.get_name(), self._session.aircraft.name if self._session else "")
+        source = Source(full_name(self), self._session.aircraft.name if self._session else "")
         message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
         message.header.stamp = self.get_clock().now().to_msg()
         self.guarded(self._report_flight)(message, due)
@@ -209,15 +216,39 @@ class Identifier(CarefulNode):
         session = self._session
         if session is None:
             return
-        source, stale_after = Source(self.get_name(), session.aircraft.name), self.get_parameter("stale_after").value
-        message.status.append(source.input(list(self._monitors.values()), session.rejected, stale_after))
-        if session.samples:
-            due = due or session.now(session.silence)
-            if session.silence > stale_after:
-                self._publish(session, due)  # without data no estimate falls due, but users must see that they are old
-            message.status.append(source.estimate(due.estimates, session.samples))
-            work = {"update": session.update_times, "publication": self._publish_times}
-            message.status.append(source.computation(work, self._lag))
+        source, stale_after = Source(full_name(self), session.aircraft.name), self.get_parameter("stale_after").value
+        monitors, rejected = list(self._monitors.values()), session.rejected
+        recent = self._recent.update(monitors, rejected)
+        message.status.append(source.input(monitors, rejected, stale_after, recent))
+        self._warn(session, monitors, recent)
+        if not session.samples:
+            message.status += [source.waits("estimate"), source.waits("computation")]
+            return
+        due = due or session.now(session.silence)
+        silence = session.silence if session.silence > stale_after else 0.0
+        if silence:
+            lag = self._lag
+            self._publish(session, due)  # without data no estimate falls due, but users must see that they are old
+            self._lag = lag
+        message.status.append(source.estimate(due.estimates, session.samples, self._lag))
+        work = {"update": session.update_times, "publication": self._publish_times}
+        message.status.append(source.computation(work, self._lag, silence))
+
+    def _warn(self, session: Session, monitors: Sequence[TopicMonitor], recent: Sequence[RecentTopic]) -> None:
+        """Say in the log which inputs are silent, rejected or late."""
+        present = {
+            monitor.resolved: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
+            for monitor in monitors
+            if monitor.waited() > UNHEARD
+        }
+        present |= rejections([t for t in recent if t.share > FEW], {m.name: m.resolved for m in monitors})
+        joints, here = expected_joints(session.aircraft), self._monitors[ACTUATORS].resolved
+        missing = [joint for joint in joints if joint not in self._joints]
+        if missing and here in present and self._joints:
+            present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
+        if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
+            present["estimates"] = lag_words(self._lag)
+        say(self, self._conditions.update(present))
 
 
 def main() -> None:

@@ -159,13 +159,14 @@ def ended(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
             process.communicate()
 
 
-def start_identifier(*parameters: str, lossless: bool = True) -> subprocess.Popen[str]:
+def start_identifier(*parameters: str, lossless: bool = True, namespace: str = "/") -> subprocess.Popen[str]:
     """The identifier with ``name:=value`` parameters; of the cdrw where none of them says otherwise.
 
     ``lossless``: no message is lost, however busy the machine is; else the quality of service is the default's.
     """
     pairs = ("aircraft:=cdrw", *(LOSSLESS if lossless else ()), *parameters)
-    return start("identifier", "--ros-args", *(word for pair in pairs for word in ("-p", pair)))
+    inside = () if namespace == "/" else ("-r", f"__ns:={namespace}")
+    return start("identifier", "--ros-args", *inside, *(word for pair in pairs for word in ("-p", pair)))
 
 
 def identifier(*parameters: str, lossless: bool = True) -> AbstractContextManager[subprocess.Popen[str]]:

@@ -10,7 +10,9 @@ from harness import ROOT, START_NS, Probe, identifier, made_up_streams, start_id
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import DescribeParameters, SetParameters
+from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
+from sysid_msgs.msg import AirData
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
@@ -21,6 +23,7 @@ from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
+from sysid_node.ros.support import conversion
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
 
@@ -156,6 +159,38 @@ def test_a_missing_topic_is_named(probe: Probe) -> None:
         probe.speak(flight, air_data=False)
         assert "air_data never received" in probe.until(lambda: words(probe, "input", level=3))
         assert not probe.estimates
+
+
+def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe) -> None:
+    """In a namespace: its names carry it, on /diagnostics and in the log."""
+    process = start_identifier(namespace="/uav1")
+    name = "uav1/identifier: input"
+    imu, air, joints = (
+        probe.node.create_publisher(kind, f"/uav1/{topic}", 100)
+        for kind, topic in ((Imu, "imu/data"), (AirData, "air_data"), (JointState, "actuators"))
+    )
+    probe.until(lambda: name in probe.diagnostics and joints.get_subscription_count())
+    assert "/uav1/imu/data never received" in probe.diagnostics[name].message
+    assert "no estimate yet" in probe.diagnostics["uav1/identifier: estimate"].message
+
+    def said() -> bool:
+        header = conversion.header(probe.node.get_clock().now().nanoseconds, "")
+        joints.publish(JointState(header=header, name=["flaps", "throttle"], position=[0.1, 0.5]))
+        air.publish(AirData(header=header, true_airspeed=float("nan")))
+        imu.publish(Imu(header=header))
+        message = probe.diagnostics[name].message
+        return "/uav1/actuators: all of" in message and "/uav1/air_data: all of" in message
+
+    probe.until(said)
+    assert probe.diagnostics[name].level == b"\x02"
+    probe.spin(1.0)
+    process.send_signal(signal.SIGINT)
+    text, _ = process.communicate(timeout=10.0)
+    assert "expected joints elevator, aileron, rudder, throttle, got flaps, throttle" in text
+    assert "/uav1/air_data: all of" in text
+    assert "true_airspeed not measured" in text
+    for publisher in (imu, air, joints):
+        probe.node.destroy_publisher(publisher)
 
 
 def test_reset_and_save(probe: Probe, tmp_path: Path) -> None:

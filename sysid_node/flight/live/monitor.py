@@ -14,6 +14,7 @@ class TopicMonitor:
 
     name: str
     clock: Callable[[], float] = time.monotonic  # s
+    resolved: str = ""  # the topic's name after remaps and with its namespace; empty: ``name`` is that
     received: int = 0
     last: float = float("nan")  # s, by ``clock``, of the last message
     _counted: int = 0  # messages at the last call of ``rate``

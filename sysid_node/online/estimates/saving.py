@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,9 @@ def save_estimates(
     samples: int,
     rejected: Mapping[str, int],
 ) -> Path:
-    """Write ``<aircraft>-<stamp_ns>.json`` into ``folder``, completely or not at all, and return its path.
+    """Write ``<aircraft>-<stamp_ns>.json`` into ``folder``, completely or not at all, and return its absolute path.
+
+    Characters of the aircraft's name that could lead out of the folder become underscores in the file's name.
 
     ``stamp_ns`` is the header stamp of the last sample, ``samples`` the number of all samples, ``rejected`` the number
     of messages left out by reason. NaN becomes null. Raises InputError where the folder cannot be written.
@@ -40,7 +43,8 @@ def save_estimates(
         "fits": {name: _plain(f._asdict(), without="coefficient") for name, f in estimates.fits.items()},
         "holdout": {},
     }
-    path = folder / f"{aircraft}-{stamp_ns}.json"
+    folder = folder.absolute()
+    path = folder / f"{_file_name(aircraft)}-{stamp_ns}.json"
     partial = path.with_suffix(".part")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -49,6 +53,11 @@ def save_estimates(
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); set the parameter save_directory") from None
     return path
+
+
+def _file_name(name: str) -> str:
+    """A name as the beginning of a file's name, at most 100 characters."""
+    return re.sub(r"[^\w.+ -]", "_", name)[:100].lstrip(". ") or "aircraft"
 
 
 def _plain(values: Mapping[str, Any], without: str = "") -> dict[str, Any]:

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
+from sysid_node.flight.live.recent_counts import ALL, FEW, RecentTopic
 from sysid_node.online.types import Estimates
 
 OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 
+LATE, TOO_LATE = 0.5, 2.0  # s of lag, from which estimates are late, and too late to fly by
 FOREIGN_CLOCK = 60.0  # s of lag, beyond which the stamps are taken to be of another clock, as in a replay
 
 
@@ -30,26 +32,41 @@ class Source:
         return self._status("state", ERROR if fault else OK, message, values)
 
     def input(
-        self, topics: Sequence[TopicMonitor], rejected: Mapping[str, int], stale_after: float
+        self,
+        topics: Sequence[TopicMonitor],
+        rejected: Mapping[str, int],
+        stale_after: float,
+        recent: Sequence[RecentTopic] = (),
     ) -> DiagnosticStatus:
-        """Rates, silence beyond ``stale_after`` s, and rejected messages (``"<topic>: <reason>"`` -> count)."""
+        """Rates, silence beyond ``stale_after`` s, and rejected messages (``"<topic>: <reason>"`` -> count).
+
+        The level is that of the ``recent`` messages: ERROR where as good as all of a topic are rejected, WARN where
+        more than a few are.
+        """
         values: dict[str, object] = {}
         for topic in topics:
+            values |= {f"{topic.name}: topic": topic.resolved} if topic.resolved else {}
             values[f"{topic.name}: received"] = topic.received
             values[f"{topic.name}: rate (Hz)"] = topic.rate()
             values[f"{topic.name}: silent for (s)"] = topic.silence()
         values |= {f"rejected, {reason}": count for reason, count in rejected.items()}
-        faults = [f"{t.name} never received" for t in topics if not t.received]
-        faults += [f"{t.name} silent for {t.silence():.1f} s" for t in topics if t.silence() > stale_after]
-        if rejected:
-            most = max(rejected, key=lambda reason: rejected[reason])
-            faults.append(f"{sum(rejected.values())} messages rejected, most as {most}")
-        silent = any(not t.received or t.silence() > stale_after for t in topics)
-        level = STALE if silent else WARN if rejected else OK
+        silent = [t for t in topics if not t.received or t.silence() > stale_after]
+        faults = [
+            f"{t.resolved or t.name} {f'silent for {t.silence():.1f} s' if t.received else 'never received'}"
+            for t in silent
+        ]
+        wrong = rejections(recent, {t.name: t.resolved for t in topics if t.resolved})
+        faults += [f"{name}: {text}" for name, text in wrong.items()]
+        worst = max((topic.share for topic in recent if topic.rejected), default=0.0)
+        level = STALE if silent else ERROR if worst >= ALL else WARN if worst > FEW else OK
         return self._status("input", level, "; ".join(faults) or "all topics arrive", values)
 
-    def estimate(self, estimates: Estimates, samples: int) -> DiagnosticStatus:
-        """How many derivatives are valid, and why the others are not."""
+    def waits(self, part: str) -> DiagnosticStatus:
+        """The status of ``estimate`` or ``computation`` before the first estimate."""
+        return self._status(part, WARN, "no estimate yet: no sample with all inputs has come", {})
+
+    def estimate(self, estimates: Estimates, samples: int, lag: float = 0.0) -> DiagnosticStatus:
+        """How many derivatives are valid, why the others are not, and whether they come too late (``lag``, s)."""
         by_status: defaultdict[str, list[str]] = defaultdict(list)
         for derivative in estimates.derivatives.values():
             by_status[derivative.status].append(derivative.name)
@@ -58,17 +75,23 @@ class Source:
         values |= {reason: " ".join(names) for reason, names in by_status.items()}
         values |= {f"R^2 of {fit.coefficient}": fit.r_squared for fit in estimates.fits.values()}
         message = f"{valid} of {len(estimates.derivatives)} derivatives valid"
-        return self._status("estimate", OK if valid else WARN, message, values)
+        late = lag_level(lag)
+        message += f", {lag_words(lag)}" if late != OK else ""
+        return self._status("estimate", max(late, OK if valid else WARN), message, values)
 
-    def computation(self, work: Mapping[str, Durations], lag: float) -> DiagnosticStatus:
-        """Durations (p50, p99), and the lag (s) from a sample's stamp to the publication of its estimate."""
+    def computation(self, work: Mapping[str, Durations], lag: float, silence: float = 0.0) -> DiagnosticStatus:
+        """Durations (p50, p99), and the lag (s) from a sample's stamp to the publication of its estimate.
+
+        ``silence``: s since the last sample where that is too long ago, else 0.
+        """
         values: dict[str, object] = {"lag (s)": lag}
         for kind, durations in work.items():
             p50, p99 = durations.percentiles()
             values[f"{kind} p50 (us)"] = 1e6 * p50
             values[f"{kind} p99 (us)"] = 1e6 * p99
-        late = f"{1e3 * lag:.1f} ms after its sample" if abs(lag) < FOREIGN_CLOCK else "of another clock's stamps"
-        return self._status("computation", OK, f"last estimate {late}", values)
+        message = f"no sample for {silence:.1f} s; before, " if silence else ""
+        message += f"last estimate {lag_words(lag)}"
+        return self._status("computation", max(lag_level(lag), WARN if silence else OK), message, values)
 
     def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         pairs = [
@@ -78,3 +101,30 @@ class Source:
         return DiagnosticStatus(
             level=level, name=f"{self.node}: {part}", message=message, hardware_id=self.aircraft, values=pairs
         )
+
+
+def lag_level(lag: float) -> bytes:
+    """The level of a lag (s): stamps of another clock, as in a replay, have none."""
+    level: bytes = OK
+    if abs(lag) < FOREIGN_CLOCK:
+        level = ERROR if lag > TOO_LATE else WARN if abs(lag) > LATE else OK
+    return level
+
+
+def lag_words(lag: float) -> str:
+    """How late (s) an estimate was published, in words."""
+    if not abs(lag) < FOREIGN_CLOCK:
+        return "of another clock's stamps"
+    return f"{1e3 * lag:.1f} ms after its sample" if lag > -LATE else f"{-lag:.1f} s before the stamp of its sample"
+
+
+def rejections(recent: Sequence[RecentTopic], resolved: Mapping[str, str]) -> dict[str, str]:
+    """What was rejected of each topic lately, by its resolved name."""
+    words = {}
+    for topic in recent:
+        if topic.rejected:
+            count = sum(topic.rejected.values())
+            words[resolved.get(topic.topic, topic.topic)] = (
+                f"{'all' if topic.share >= ALL else count} of {topic.received} messages rejected, most as {topic.most}"
+            )
+    return words

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,6 +14,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
@@ -156,11 +157,7 @@ class LoopNode(Node, ABC):
         unreadable = {name: f"{count} messages are {UNREADABLE}" for name, count in self._unreadable.items()}
         self._unreadable = {}
         self.present = self.conditions()
-        for wrong, line in self._conditions.update({**silent, **unreadable, **self.present}):
-            if wrong:  # a line each: rclpy knows a call by its line, and wants one severity of each
-                self.get_logger().warning(line)
-            else:
-                self.get_logger().info(line)
+        say(self, self._conditions.update({**silent, **unreadable, **self.present}))
         for line in self._states.update(self.states()):
             self.get_logger().warning(line)
         level, line, values = self.words()
@@ -184,6 +181,21 @@ class LoopNode(Node, ABC):
             for topic, monitor in self.inputs.items()
             if topic in self._needed and monitor.waited() > UNHEARD
         }
+
+
+def say(node: Node, lines: Iterable[tuple[bool, str]]) -> None:
+    """Log lines, as warnings where they are."""
+    for wrong, line in lines:
+        if wrong:  # a line each: rclpy knows a call by its line, and wants one severity of each
+            node.get_logger().warning(line)
+        else:
+            node.get_logger().info(line)
+
+
+def expected_joints(aircraft: Aircraft) -> list[str]:
+    """The joints that messages about actuators must name."""
+    joints = [joint for control in aircraft.controls.values() for joint in control.joints]
+    return list(dict.fromkeys([*joints, *([aircraft.throttle.joint] if aircraft.throttle else [])]))
 
 
 def full_name(node: Node) -> str:

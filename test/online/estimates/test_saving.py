@@ -18,11 +18,11 @@ ESTIMATES = Estimates(
 )
 
 
-def save(folder: Path) -> Path:
+def save(folder: Path, aircraft: str = "cdrw") -> Path:
     return save_estimates(
         folder,
         ESTIMATES,
-        aircraft="cdrw",
+        aircraft=aircraft,
         settings=OnlineSettings(),
         stamp_ns=7,
         samples=99,
@@ -49,3 +49,16 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"file.*save_directory"):
         save(tmp_path / "file")
+
+
+@pytest.mark.parametrize("name", ["../../outside", "/tmp/outside", "a/b", "..", "", "x" * 400, "new\nline", "nul\0"])
+def test_whatever_the_aircraft_is_called_the_file_is_in_the_folder(tmp_path: Path, name: str) -> None:
+    path = save(tmp_path / "here", name)
+    assert path.parent == tmp_path / "here"
+    assert list(tmp_path.rglob("*.json")) == [path]
+    assert json.loads(path.read_text(encoding="utf-8"))["aircraft"] == name
+
+
+def test_the_path_is_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert save(Path()) == tmp_path / "cdrw-7.json"

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
+from sysid_node.flight.live.recent_counts import RecentCounts
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.ros.support.diagnostics import ERROR, OK, STALE, WARN, Source
 
@@ -41,11 +42,56 @@ def test_silence_is_named() -> None:
 
 
 def test_rejected_messages_are_counted_by_reason() -> None:
-    rejected = {"imu/data: duplicate stamp": 2, "air_data: sideslip over pi/2 rad (degrees?)": 7}
-    status = SOURCE.input([heard("imu/data")], rejected, 60.0)
+    rejected = {"imu/data: duplicate stamp": 2, "imu/data: no stamp": 7}
+    imu = heard("imu/data", 100)
+    status = SOURCE.input([imu], rejected, 60.0, RecentCounts().update([imu], rejected))
     assert status.level == WARN
-    assert "9 messages rejected, most as air_data: sideslip over pi/2 rad (degrees?)" in status.message
+    assert "imu/data: 9 of 100 messages rejected, most as no stamp" in status.message
     assert values(status)["rejected, imu/data: duplicate stamp"] == "2"
+
+
+@pytest.mark.parametrize(("count", "level"), [(1, OK), (30, WARN), (200, ERROR)])
+def test_one_bad_message_is_not_the_same_as_all(count: int, level: bytes) -> None:
+    imu, rejected = heard("imu/data", 200), {"imu/data: not finite": count}
+    imu.resolved = "/uav1/imu/data"
+    status = SOURCE.input([imu], rejected, 60.0, RecentCounts().update([imu], rejected))
+    assert status.level == level
+    assert status.message.startswith("/uav1/imu/data: ")
+
+
+def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None:
+    now = [0.0]
+    imu, recent, levels = TopicMonitor("imu/data"), RecentCounts(lambda: now[0]), []
+    for second in range(15):
+        now[0] = float(second)
+        for _ in range(20):
+            imu.arrived()
+        rejected = {"imu/data: no stamp": 20}  # all of the first second's
+        levels.append(SOURCE.input([imu], rejected, 60.0, recent.update([imu], rejected)).level)
+    assert levels[0] == ERROR
+    assert levels[5] == WARN
+    assert levels[12:] == [OK, OK, OK]
+
+
+@pytest.mark.parametrize(("lag", "level"), [(0.02, OK), (0.8, WARN), (4.0, ERROR), (-1.0, WARN), (1e8, OK)])
+def test_lateness_has_a_level(lag: float, level: bytes) -> None:
+    """It said OK at 4 s."""
+    estimates = Estimates(3.0, {"CL_q": DerivativeEstimate("CL_q", 3.0, 0.1, 2.8, 3.2, True, "ok")}, {})
+    assert SOURCE.computation({}, lag).level == level
+    assert SOURCE.estimate(estimates, 600, lag).level == level
+
+
+def test_a_silence_is_no_lateness_and_no_other_clock() -> None:
+    status = SOURCE.computation({}, 0.02, silence=70.0)
+    assert (status.level, status.message) == (
+        WARN,
+        "no sample for 70.0 s; before, last estimate 20.0 ms after its sample",
+    )
+
+
+def test_before_the_first_estimate_it_says_so() -> None:
+    assert (SOURCE.waits("estimate").level, SOURCE.waits("estimate").name) == (WARN, "identifier: estimate")
+    assert "no estimate yet" in SOURCE.waits("estimate").message
 
 
 @pytest.mark.parametrize(("fault", "level", "message"), [("", OK, "active"), ("boom", ERROR, "active: boom")])
