@@ -40,10 +40,10 @@ docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out
 	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
 	@echo "out/docs/index.html"
 
-test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
+test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
 	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
-lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## ruff and mypy --strict
+lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
@@ -54,7 +54,7 @@ format: $(DONE)/dev  ## lay the source out by ruff
 
 build: $(DONE)/build  ## sysid_msgs and sysid_node into $(VENV), by colcon
 
-bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/dev  ## all benches; BENCH=live runs bench/live.py alone
+bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## all benches; BENCH=live runs bench/live.py alone
 	@for bench in $(or $(BENCH:%=bench/%.py),$(sort $(wildcard bench/*.py))); do
 	    echo "==> $$bench"
 	    $(BIN)/python $$bench $(ARGS)
@@ -78,7 +78,7 @@ $(DONE)/ros: requirements/ros.txt requirements/constraints.txt | $(DONE)/venv
 	$(PIP) -r requirements/ros.txt
 	touch $@
 
-$(DONE)/run $(DONE)/desk $(DONE)/dev $(DONE)/docs $(DONE)/view: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
+$(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev $(DONE)/docs $(DONE)/view: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
 	@echo "==> $< into $(VENV)"
 	$(PIP) -r $<
 	touch $@

@@ -112,7 +112,7 @@ def _without_vanes(bag: Path, log: Path) -> None:
 
     from sysid_node.aircraft.load import load_aircraft  # noqa: PLC0415
     from sysid_node.flight.csv import write_csv  # noqa: PLC0415
-    from sysid_node.flight.logs import load_flight_record  # noqa: PLC0415
+    from sysid_node.flight.logs.opening import load_flight_record  # noqa: PLC0415
 
     record = load_flight_record(bag, load_aircraft("cdrw"))
     for name in ("alpha", "beta"):

@@ -36,6 +36,7 @@ def dump_aircraft(aircraft: Aircraft) -> str:
     lines += [f"  {_text(name)}: {{{_control(control, stated)}}}" for name, control in aircraft.controls.items()]
     if aircraft.throttle is not None:
         lines += [f"  throttle: {{{_throttle(aircraft.throttle, stated)}}}"]
+    lines += [f"outputs: {_text(aircraft.outputs)}"] if aircraft.outputs else []
     lines += [*_sensors(aircraft.sensors, stated), _noise(aircraft), *_delays(aircraft.delays)]
     lines += _effects(aircraft.effects)
     lines += ["tables:", *map(_table, aircraft.tables)] if aircraft.tables else []
@@ -95,6 +96,8 @@ def _control(control: Control, stated: Mapping[str, float]) -> str:
     parts.append(f"offset: {_quantity(control.offset, f'{key}.offset', stated)}")
     if control.limit is not None:
         parts.append(f"limit: {_quantity(control.limit, f'{key}.limit', stated)}")
+    if control.full_deflection is not None:
+        parts.append(f"full_deflection: {_number(control.full_deflection)}")
     if control.name not in CONTROL_SYMBOLS:
         parts.append(f"symbol: {control.symbol}")
     return ", ".join(parts)

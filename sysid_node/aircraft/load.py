@@ -32,7 +32,7 @@ _REQUIRED = {
     "derivatives": "the derivatives of the model, e.g. Cm_alpha: {value: -0.5}",
 }
 
-_OPTIONAL = ("source", "inertia", "noise", "sensors", "ideal", "delays", "effects", "tables")
+_OPTIONAL = ("source", "inertia", "noise", "sensors", "ideal", "delays", "effects", "tables", "outputs")
 
 
 def load_aircraft(name_or_path: str | Path) -> Aircraft:
@@ -80,6 +80,7 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
         effects=read_effects(fields.get("effects"), controls, throttle, derivatives, delays),
         tables=read_tables(fields.get("tables"), controls),
         stated_tolerances=quantities.stated,
+        outputs=fields["outputs"].text('text, e.g. "elevator=out2:1500:0.001"') if "outputs" in fields else "",
     )
 
 

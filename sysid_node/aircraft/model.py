@@ -51,6 +51,7 @@ class Control:
     joints: Mapping[str, float]  # joint name -> scale
     offset: float = 0.0  # rad
     limit: float | None = None  # rad, both ways
+    full_deflection: float | None = None  # rad at the autopilot's full command, for logs of autopilots
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,7 @@ class Aircraft:
     effects: Mapping[str, Mapping[str, UncertainValue]] = field(default_factory=dict)  # by effect and parameter
     tables: tuple[Table, ...] = ()
     stated_tolerances: Mapping[str, float] = field(default_factory=dict)  # those of the file, by dotted key
+    outputs: str = ""  # which output of an autopilot moves which joint, as in ``flight.autopilots.joints``
 
     @property
     def control_symbols(self) -> tuple[str, ...]:

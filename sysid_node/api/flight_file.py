@@ -12,7 +12,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.data_frames import data_frame
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.logs import load_flight_record
+from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.topics import topic_names
 
@@ -76,9 +76,9 @@ def load(
 ) -> FlightFile:
     """A flight's file with its aircraft; its samples are read when they are first needed.
 
-    ``path``: a rosbag2 folder, an ``.mcap`` or ``.db3`` file, or a ``.csv`` log. ``aircraft``: an aircraft file, the
-    name of one that is shipped, or an ``Aircraft``. ``topics``: names in the bag, as ``"imu/data:=/mavros/imu/data"``.
-    ``body_frame``: axes of the IMU messages, ``"flu"`` (REP-103) or ``"frd"``.
+    ``path``: whatever is a flight, told by its content: a bag (ROS 1 or 2), a PX4 or ArduPilot log, a CSV table.
+    ``aircraft``: an aircraft file, the name of one that is shipped, or an ``Aircraft``. ``topics``: names in the bag,
+    as ``"imu/data:=/mavros/imu/data"``. ``body_frame``: axes of the IMU messages, ``"flu"`` (REP-103) or ``"frd"``.
 
     Raises InputError where the aircraft file or a topic's name is wrong.
     """

@@ -18,9 +18,8 @@ from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, j
 from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, why_nothing_aligned
-from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commanded import carried_in_words
-from sysid_node.flight.commands import read_commands
+from sysid_node.flight.logs.opening import carried_by, commands_of, open_streams
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
@@ -153,9 +152,10 @@ def _estimated(
     flight: FlightFile, settings: OnlineSettings, publish_rate: float, truth: Truth, progress: Callable[[float], None]
 ) -> Replay:
     """Decodes, aligns and identifies."""
-    streams = read_streams(flight.path, flight.topics, flight.body_frame)
+    streams = open_streams(flight.path, flight.aircraft, flight.topics, flight.body_frame)
     Actuation.of(flight.aircraft).require(streams.actuators.names, streams.name)
-    aligned = align_streams(flight.aircraft, streams, settings.max_gap, settings.actuators)
+    carried = carried_by(streams, settings.actuators)
+    aligned = align_streams(flight.aircraft, streams, settings.max_gap, carried)
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
     time = aligned.time
@@ -179,7 +179,7 @@ def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> Faul
     """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
     pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
     heard = (RecordedEstimates(stamp, identifier_estimates(estimates)) for stamp, estimates in pairs)
-    return judge(found.aircraft, FaultSettings(), found.streams, read_commands(bag), heard, progress)
+    return judge(found.aircraft, FaultSettings(), found.streams, commands_of(bag), heard, progress)
 
 
 def replay_settings(values: Mapping[str, object]) -> tuple[OnlineSettings, float]:

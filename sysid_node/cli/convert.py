@@ -1,20 +1,30 @@
-"""``sysid convert``: turns a log, or a bag of an autopilot's own topics, into a bag of the identifier's topics."""
+"""``sysid convert``: turns any flight, an autopilot's log or a table, into a bag of the identifier's topics."""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.shared import options
+from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.base import AdapterSettings, adapter_for
 from sysid_node.flight.autopilots.known import ADAPTERS
 from sysid_node.flight.autopilots.recorded import read_recorded
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import STORAGES, write_streams
+from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BODY_FRAMES
-from sysid_node.flight.logs import READERS, read_log, streams_from_record
-from sysid_node.flight.streams import Streams
+from sysid_node.flight.logs.content import Content, content_of
+from sysid_node.flight.logs.fractions import joints_of_fractions
+from sysid_node.flight.logs.log_streams import LogFlight
+from sysid_node.flight.logs.opening import open_log
+from sysid_node.flight.logs.rates import slow_topics
+from sysid_node.flight.logs.record_streams import streams_from_record
+from sysid_node.flight.streams import COMMAND_FRACTIONS
 from sysid_node.report.files.output_file import output_bag
 
 if TYPE_CHECKING:
@@ -24,22 +34,21 @@ if TYPE_CHECKING:
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
     parser = commands.add_parser("convert", help="turn a flight log into a bag", description=__doc__)
-    parser.add_argument("log", metavar="LOG", type=Path, help=f"a flight log ({', '.join(READERS)}), or a bag")
+    parser.add_argument("log", metavar="LOG", type=Path, help=options.LOG_HELP)
     parser.add_argument(
         "--out", metavar="BAG", type=Path, required=True, help="folder of the bag, which must not exist"
     )
     options.add_force(parser)
     parser.add_argument("--aircraft", help="file or name: its joints carry the controls; else elevator, aileron, ...")
     parser.add_argument("--autopilot", choices=list(ADAPTERS), help="LOG is a bag of this autopilot's own topics")
-    parser.add_argument("--joints", default="", help="with --autopilot: NAME=OUTPUT:TRIM:SCALE ... in one argument")
     parser.add_argument(
-        "--air-temperature",
-        type=float,
-        default=AdapterSettings.air_temperature,
-        help="with --autopilot: degC (default: 15)",
+        "--joints", default="", help="which output moves which joint, NAME=OUTPUT:TRIM:SCALE ... in one argument"
     )
     parser.add_argument(
-        "--air-data-delay", type=float, default=AdapterSettings.air_data_delay, help="with --autopilot: s (default: 0)"
+        "--air-temperature", type=float, default=AdapterSettings.air_temperature, help="of a bag: degC (default: 15)"
+    )
+    parser.add_argument(
+        "--air-data-delay", type=float, default=AdapterSettings.air_data_delay, help="of a bag: s (default: 0)"
     )
     parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
     parser.add_argument(
@@ -51,21 +60,41 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Converts the log and prints what was written."""
-    inputs = options.inputs_of([args.log], args.aircraft)
-    with output_bag(args.out, inputs, force=args.force) as bag:
-        streams = _recorded(args) if args.autopilot else _logged(args)
+    aircraft = load_aircraft(args.aircraft) if args.aircraft else None
+    with output_bag(args.out, options.inputs_of([args.log], args.aircraft), force=args.force) as bag:
+        flight = _opened(args, aircraft)
+        streams = flight.streams
+        if aircraft is not None and streams.actuators.content == COMMAND_FRACTIONS:
+            streams = replace(streams, actuators=joints_of_fractions(streams.actuators, aircraft, streams.name))
         write_streams(bag, streams, args.storage, args.body_frame)
     if not args.quiet:
-        stamps = streams.imu.arrival.stamp_ns
-        seconds = (stamps[-1] - stamps[0]) / 1e9
-        print(f"{args.out}: {seconds:.1f} s, {stamps.size} samples; joints {', '.join(streams.actuators.names)}")
+        _show(args.out, LogFlight(streams, flight.remarks))
 
 
-def _logged(args: argparse.Namespace) -> Streams:
-    aircraft = load_aircraft(args.aircraft) if args.aircraft else None
-    return streams_from_record(read_log(args.log), aircraft)
+def _show(out: Path, flight: LogFlight) -> None:
+    streams = flight.streams
+    stamps = streams.imu.arrival.stamp_ns
+    seconds = (stamps[-1] - stamps[0]) / 1e9
+    print(f"{out}: {seconds:.1f} s, {stamps.size} samples; joints {', '.join(streams.actuators.names)}")
+    for remark in (*flight.remarks, *slow_topics(streams)):
+        print(f"  {remark}")
+    if streams.actuators.content == COMMAND_FRACTIONS:
+        print(
+            "  the joints are fractions of full command; the aircraft file's full_deflection (rad) of each control "
+            "turns them into angles"
+        )
 
 
-def _recorded(args: argparse.Namespace) -> Streams:
+def _opened(args: argparse.Namespace, aircraft: Aircraft | None) -> LogFlight:
+    """The flight as streams: of an autopilot's log or bag, of a table, or of a bag of our own topics."""
     settings = AdapterSettings(args.joints, args.air_temperature, args.air_data_delay)
-    return read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings))
+    content = content_of(args.log)
+    if args.autopilot and content is Content.ROSBAG2:
+        return LogFlight(read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings)), ())
+    if content is Content.TABLE:
+        return LogFlight(streams_from_record(read_csv(args.log), aircraft), ())
+    outputs = args.joints or (aircraft.outputs if aircraft is not None else "")
+    flight = open_log(args.log, settings, outputs)
+    if flight is None and args.joints:
+        raise InputError(f"{args.log}: --joints is for a log or a bag of an autopilot")
+    return flight or LogFlight(read_streams(args.log, frame=args.body_frame), ())

@@ -20,7 +20,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
     parser = commands.add_parser("replay", help="identify an aircraft from a bag, as the live node does")
     parser.description = "Identify an aircraft from a bag; writes summary.json, tables, report.html and estimates/."
-    parser.add_argument("bag", metavar="BAG", type=Path, help=options.BAG_HELP)
+    parser.add_argument("bag", metavar="BAG", type=Path, help=options.LOG_HELP)
     options.add_aircraft(parser)
     options.add_out(parser)
     options.add_settings(parser, "any node parameter", "the transform")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,13 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 Stamps = NDArray[np.int64]
+
+#: The joints carry commands to servos and motors, not measured positions.
+COMMANDS = "commands"
+
+#: As ``COMMANDS``, but one "joint" a control, as a fraction of the full command: -1..1 with the sign of the aircraft
+#: file's control (trailing edge down, right trailing edge down, trailing edge left), and the throttle 0..1.
+COMMAND_FRACTIONS = "command_fractions"
 
 
 @dataclass(frozen=True)
@@ -28,9 +35,14 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Stream:
-    """The messages of one topic."""
+    """The messages of one topic.
+
+    ``source`` is the topic's own name in the log, and ``remedy`` the setting of the autopilot that raises its rate.
+    """
 
     arrival: Arrival
+    source: str = field(default="", kw_only=True)
+    remedy: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -51,10 +63,15 @@ class AirDataStream(Stream):
 
 @dataclass(frozen=True)
 class JointStream(Stream):
-    """Joint state messages; NaN where a message lacks a joint that others have."""
+    """Joint state messages; NaN where a message lacks a joint that others have.
+
+    ``content`` is the ``frame_id`` of the messages in a bag: ``COMMANDS`` or ``COMMAND_FRACTIONS`` where a log of an
+    autopilot was converted, otherwise empty.
+    """
 
     names: tuple[str, ...]
     positions: Array  # (N, J) rad; throttle 0..1 or N
+    content: str = ""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv, write_csv
-from sysid_node.flight.logs import load_flight_record
+from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.record import FlightRecord
 
 

@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.excite.spec import parse_manoeuvre
-from sysid_node.flight.logs import load_flight_record
+from sysid_node.flight.logs.opening import load_flight_record
 
 SPEC = "doublet:elevator:amplitude=0.03:start=1+doublet:rudder:amplitude=0.05:start=4"
 FAST = ["--rate", "50", "--quiet"]

@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.reader import read_streams
-from sysid_node.flight.logs import load_flight_record
+from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
 

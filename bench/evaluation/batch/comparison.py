@@ -21,7 +21,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.identify import identify, predicted_coefficients
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
-from sysid_node.flight.logs import load_flight_record
+from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.truth import read_truth
 from sysid_node.online.replay import run

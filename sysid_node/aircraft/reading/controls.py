@@ -25,7 +25,7 @@ def read_controls(entry: Entry, quantities: Quantities) -> tuple[dict[str, Contr
 
 
 def _control(name: str, entry: Entry, quantities: Quantities) -> Control:
-    fields = entry.fields({}, optional=("joint", "scale", "joints", "offset", "limit", "symbol"))
+    fields = entry.fields({}, optional=("joint", "scale", "joints", "offset", "limit", "full_deflection", "symbol"))
     key = f"controls.{name}"
     return Control(
         name=name,
@@ -33,7 +33,13 @@ def _control(name: str, entry: Entry, quantities: Quantities) -> Control:
         joints=_joints(entry, fields, key, quantities),
         offset=quantities.read(fields["offset"], f"{key}.offset", angle) if "offset" in fields else 0.0,
         limit=quantities.read(fields["limit"], f"{key}.limit", _limit) if "limit" in fields else None,
+        full_deflection=_full_deflection(fields["full_deflection"]) if "full_deflection" in fields else None,
     )
+
+
+def _full_deflection(entry: Entry) -> float:
+    expected = "an angle in rad other than zero, at most pi/2 (is it in degrees?)"
+    return entry.number(expected, lambda x: 0 < abs(x) <= math.pi / 2)
 
 
 def _limit(entry: Entry) -> float:

@@ -9,8 +9,7 @@ from pathlib import Path
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BODY_FRAMES
 
-BAG_HELP = "rosbag2 folder, .mcap or .db3 file"
-LOG_HELP = "rosbag2 folder, .mcap, .db3 or .csv file"
+LOG_HELP = "a flight, told by its content: bag (ROS 1 or 2), PX4 .ulg, ArduPilot .bin or .tlog, CSV"
 
 
 def add_aircraft(parser: argparse.ArgumentParser) -> None:

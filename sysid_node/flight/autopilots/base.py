@@ -78,6 +78,7 @@ class Adapter(ABC):
     """
 
     topics: ClassVar[Mapping[str, str]]  # name -> message type
+    aliases: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})  # other names in recordings
     outputs: ClassVar[tuple[str, ...]]  # names of servo and motor outputs
     example: ClassVar[str]  # a value of the parameter joints
     package: ClassVar[str]  # that defines its messages

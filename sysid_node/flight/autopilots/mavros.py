@@ -32,7 +32,7 @@ PULSES = (400.0, 2600.0)
 
 
 class Mavros(FiveTopics):
-    """ArduPlane with MAVROS 2."""
+    """ArduPlane with MAVROS 2; from recordings also with MAVROS 1, whose topics and types have other names."""
 
     parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
@@ -43,6 +43,9 @@ class Mavros(FiveTopics):
             AIRSPEED: "mavros_msgs/msg/VfrHud",
             OUTPUTS: "mavros_msgs/msg/RCOut",
         }
+    )
+    aliases = MappingProxyType(
+        {PRESSURE: ("/mavros/imu/atm_pressure",), AIRSPEED: ("/mavros/nav_info/airspeed",)}  # MAVROS 0.x; its forks
     )
     outputs = tuple(f"out{i}" for i in range(1, 33))
     example = "aileron=out1:1500:0.001 elevator=out2:1500:0.001 throttle=out3:1000:0.001 rudder=out4:1500:0.001"
@@ -69,8 +72,12 @@ class Mavros(FiveTopics):
         self.air_density = self.density(float(message.fluid_pressure))
 
     def _air(self, message: Any) -> AirSample:
-        """Air data with the true airspeed: ArduPlane's equivalent airspeed times the root of the ratio of densities."""
-        true_airspeed = float(message.airspeed) * math.sqrt(SEA_LEVEL_DENSITY / self.air_density)
+        """Air data with the true airspeed: ArduPlane's equivalent airspeed times the root of the ratio of densities.
+
+        A NavDataPair, which forks of MAVROS publish faster than VfrHud, has the commanded and the measured airspeed.
+        """
+        equivalent = message.measured if hasattr(message, "measured") else message.airspeed
+        true_airspeed = float(equivalent) * math.sqrt(SEA_LEVEL_DENSITY / self.air_density)
         return self.air(header_ns(message), true_airspeed, self.air_density)
 
     def _joints(self, message: Any) -> JointSample:

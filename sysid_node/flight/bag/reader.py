@@ -20,7 +20,16 @@ from sysid_node.flight.bag.storage_files import checked_files
 from sysid_node.flight.cdr.decoding import DecodedMessages, decode
 from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
 from sysid_node.flight.record import Array
-from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Stamps, Streams
+from sysid_node.flight.streams import (
+    COMMAND_FRACTIONS,
+    COMMANDS,
+    AirDataStream,
+    Arrival,
+    ImuStream,
+    JointStream,
+    Stamps,
+    Streams,
+)
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS, topic_names
 
 RECORDER_JUMP = 300.0  # s; a larger step of the recorder's clock means that it was set or that it paused
@@ -197,9 +206,12 @@ def _air_data_stream(raw: RawMessages) -> AirDataStream:
 def _joint_stream(raw: RawMessages) -> JointStream:
     stamps = np.empty(len(raw.data), np.int64)
     parts: list[tuple[NDArray[np.intp], Sequence[str], NDArray[Any]]] = []
+    content = ""
     for at, fields in decode(definitions_of(type_store()), INPUT_TOPICS[ACTUATORS], raw.data):
         stamps[at] = _stamps(fields)
         parts.append((at, fields.strings("name"), fields.numbers("position")))
+        frame_id = fields.strings("header.frame_id")[0]
+        content = frame_id if frame_id in (COMMANDS, COMMAND_FRACTIONS) else content
     names = tuple(dict.fromkeys(name for _, part_names, _ in parts for name in part_names))
     if len(names) > JOINT_LIMIT:
         raise InputError(f"{len(names)} different joints in the messages, over {JOINT_LIMIT}; names must not change")
@@ -209,4 +221,4 @@ def _joint_stream(raw: RawMessages) -> JointStream:
         # The first position of a name that is given twice counts; a name without a position stays NaN.
         for i in reversed(range(min(len(part_names), values.shape[1]))):
             positions[at, place[part_names[i]]] = values[:, i]
-    return JointStream(_arrival(raw, stamps), names, positions)
+    return JointStream(_arrival(raw, stamps), names, positions, content)

@@ -109,7 +109,9 @@ def air_data_messages(stream: AirDataStream) -> list[bytes]:
 
 def joint_messages(stream: JointStream) -> list[bytes]:
     """sensor_msgs/JointState with positions alone."""
-    return _stamped(ACTUATORS, stream, "", (stream.names, (0.0,) * len(stream.names), (), ()), stream.positions)
+    return _stamped(
+        ACTUATORS, stream, stream.content, (stream.names, (0.0,) * len(stream.names), (), ()), stream.positions
+    )
 
 
 def _stamped(topic: str, stream: Stream, frame_id: str, body: Values, columns: Array) -> list[bytes]:

@@ -14,9 +14,9 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import flight_record
-from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.logs import READERS, read_log
+from sysid_node.flight.logs.opening import is_table, open_streams
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import flow_angles as inferred
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
@@ -52,11 +52,11 @@ class GapFlight:
 
 def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
     """The flight of a bag or a log. Raises InputError where it is unreadable, lacks a signal or is too short."""
-    if path.suffix.lower() in READERS:
-        record = read_log(path)
+    if is_table(path):
+        record = read_csv(path)
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
-    streams = read_streams(path, topics, frame)
+    streams = open_streams(path, aircraft, topics, frame)
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     record = flight_record(aircraft, streams, 0.2)
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]

@@ -12,7 +12,7 @@ import numpy as np
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.flight.logs import streams_from_record
+from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.report.pages.manoeuvre_page import write_manoeuvre_report
 from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
 

@@ -1,26 +1,15 @@
-"""Loads flights from bags and logs, chosen by suffix, and converts a log's samples to streams of messages."""
+"""The samples of a flight, aligned already, as streams of messages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.align import flight_record
-from sysid_node.flight.bag.reader import read_streams
-from sysid_node.flight.commanded import commands_of, deflections, known_from, take_command
-from sysid_node.flight.csv import read_csv
-from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
-
-#: Readers of logs, whose samples are already aligned, by suffix.
-READERS: Mapping[str, Callable[[Path], FlightRecord]] = MappingProxyType({".csv": read_csv})
 
 #: Joints for the controls of a log -> the controls' symbols; thrust is in N.
 STANDARD_JOINTS = MappingProxyType({"elevator": "de", "aileron": "da", "rudder": "dr"})
@@ -28,52 +17,6 @@ THROTTLE_JOINT = "throttle"
 
 _START_NS = 1_000_000_000  # first stamp of a log without a date, as a stamp of zero means that there is none
 _NEEDED = ("ax", "ay", "az", "p", "q", "r", "V")
-
-
-def read_log(path: str | Path) -> FlightRecord:
-    """The flight in a log. Raises InputError where the suffix is unknown or the log cannot be read."""
-    path = Path(path)
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(f"{path}: not a log that can be read; known: {', '.join(READERS)}")
-    return reader(path)
-
-
-def load_flight_record(
-    path: str | Path,
-    aircraft: Aircraft,
-    *,
-    topics: Mapping[str, str] | None = None,
-    frame: BodyFrame = "flu",
-    max_gap: float = 0.2,
-    carried: str = "positions",
-) -> FlightRecord:
-    """The flight in a log, or in a bag, aligned with ``max_gap`` (s) as in ``align``. Raises InputError.
-
-    ``carried``: what the actuators' messages, or the log's columns, are ("commands", "positions", or "auto").
-    """
-    if Path(path).suffix.lower() in READERS:
-        return with_commands(aircraft, read_log(path), carried)
-    return flight_record(aircraft, read_streams(path, topics, frame), max_gap, carried)
-
-
-def with_commands(aircraft: Aircraft, flight: FlightRecord, carried: str) -> FlightRecord:
-    """The flight with the deflections that follow from its controls where these are commands, held between samples."""
-    symbols = [symbol for symbol in aircraft.control_symbols if flight.measured(symbol)]
-    stamps = np.round(flight.time * 1e9).astype(np.int64)
-    if carried == "auto" and symbols:
-        known = known_from(stamps, np.nan_to_num(np.column_stack([flight[symbol] for symbol in symbols])))
-        carried = "positions" if known is None else "commands"
-    commands = commands_of(aircraft, carried)
-    if commands is None:
-        return flight
-    names = ("thrust", *aircraft.control_symbols)
-    rows = np.column_stack([flight[name] for name in names])
-    for i, (stamp, row) in enumerate(zip(stamps.tolist(), rows.tolist(), strict=True)):
-        take_command(commands, 0, stamp, row)
-        rows[i] = deflections(commands, 0, stamp, row)
-    followed = {name: column for name, column in zip(names, rows.T, strict=True) if name in flight.columns}
-    return replace(flight, columns={**flight.columns, **followed}, commanded=True)
 
 
 def streams_from_record(flight: FlightRecord, aircraft: Aircraft | None = None) -> Streams:

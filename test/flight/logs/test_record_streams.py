@@ -8,8 +8,9 @@ from made_flights import made_aircraft
 
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.flight.csv import read_csv, write_csv
-from sysid_node.flight.logs import load_flight_record, read_log, streams_from_record
+from sysid_node.flight.csv import read_csv
+from sysid_node.flight.logs.opening import load_flight_record
+from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.record import FlightRecord
 
 AIRCRAFT = made_aircraft()
@@ -71,14 +72,6 @@ def test_lack_of_what_a_bag_needs_is_named():
         streams_from_record(FlightRecord(flight.time, no_controls))
     with pytest.raises(InputError, match="no values in de, da, dr, which made has"):
         streams_from_record(FlightRecord(flight.time, no_controls), AIRCRAFT)
-
-
-def test_suffix_chooses_the_reader(tmp_path):
-    write_csv(tmp_path / "log.CSV", made_flight())
-    assert len(read_log(tmp_path / "log.CSV")) == 60
-    assert len(load_flight_record(tmp_path / "log.CSV", AIRCRAFT)) == 60
-    with pytest.raises(InputError, match=r"log\.ulg: not a log.*\.csv"):
-        read_log(tmp_path / "log.ulg")
 
 
 def test_real_flights_through_bags(tmp_path, flights):

@@ -1,0 +1,62 @@
+"""``AutopilotLog``: what a log of an autopilot holds, before a part of it is chosen and turned into streams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sysid_node.flight.logs.flown import Mask, Spans
+from sysid_node.flight.record import Array
+from sysid_node.flight.streams import Stamps
+
+#: The roles of the signals that a flight needs.
+IMU, AIRSPEED, CONTROLS = "imu", "airspeed", "controls"
+
+
+@dataclass(frozen=True)
+class Signal:
+    """The N samples of one message type, in the log's order; ``source`` is the message's name in the log."""
+
+    source: str
+    stamp_ns: Stamps  # (N,)
+    values: Array  # (N, K), NaN = not measured
+
+    def __len__(self) -> int:
+        return int(self.stamp_ns.size)
+
+    def selected(self, keep: Mask) -> Signal:
+        """The samples for which ``keep`` (N,) is true."""
+        return Signal(self.source, self.stamp_ns[keep], self.values[keep])
+
+
+def absent(source: str, width: int) -> Signal:
+    """A signal without samples."""
+    return Signal(source, np.empty(0, np.int64), np.empty((0, width)))
+
+
+@dataclass(frozen=True)
+class Commands:
+    """Commands to the controls, or the raw outputs from which the aircraft file's ``outputs`` makes joints."""
+
+    names: tuple[str, ...]  # one a column of the signal
+    signal: Signal
+
+
+@dataclass(frozen=True)
+class AutopilotLog:
+    """The signals of a log. Axes are forward-right-down, units SI and rad."""
+
+    name: str
+    autopilot: str  # its name and version
+    imu: Signal  # (N, 6) specific force, rates
+    attitude: Signal  # (N, 4) w x y z, which rotates body axes to north-east-down
+    airspeed: Signal  # (N, 1) true airspeed
+    density: Signal  # (N, 1)
+    controls: Commands  # fractions of the full command, as in ``streams.COMMAND_FRACTIONS``
+    outputs: Commands  # in the unit of the log: us of pulse, or -1..1
+    vanes: Signal | None = None  # (N, 2) angle of attack, sideslip; None: no vane was logged
+    flown: Spans | None = None  # in the air as a fixed wing; None: the log does not say
+    remarks: tuple[str, ...] = ()
+    remedies: Mapping[str, str] = field(default_factory=dict)  # role -> the setting that raises its rate

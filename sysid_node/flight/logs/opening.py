@@ -1,0 +1,119 @@
+"""Opens whatever is a flight, told by its content, for the commands and the Python interface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.align import flight_record
+from sysid_node.flight.autopilots.base import AdapterSettings
+from sysid_node.flight.bag.reader import open_bag, read_streams, reading
+from sysid_node.flight.commands import JointMessage, read_commands
+from sysid_node.flight.csv import read_csv
+from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.logs.autopilot_log import AutopilotLog
+from sysid_node.flight.logs.content import Content, content_of
+from sysid_node.flight.logs.fractions import joints_of_fractions
+from sysid_node.flight.logs.log_streams import LogFlight, flight_of_log
+from sysid_node.flight.logs.rates import require_rates, require_rates_of_log
+from sysid_node.flight.logs.readers.autopilot_bag import autopilot_of, read_autopilot_bag
+from sysid_node.flight.logs.readers.dataflash import read_dataflash
+from sysid_node.flight.logs.readers.telemetry import read_telemetry
+from sysid_node.flight.logs.readers.ulog import read_ulog
+from sysid_node.flight.logs.record_streams import streams_from_record
+from sysid_node.flight.logs.tables import with_commands
+from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.streams import COMMAND_FRACTIONS, COMMANDS, Streams
+from sysid_node.flight.topics import topic_names
+
+
+def read_autopilot_log(path: str | Path, settings: AdapterSettings | None = None) -> AutopilotLog | None:
+    """What an autopilot's log or a bag of its topics holds; None for a bag of ``topics`` and for a table.
+
+    ``settings`` are those of the adapter, for bags. Raises InputError where the file is damaged or no flight.
+    """
+    content = content_of(path)
+    if content is Content.ULOG:
+        return read_ulog(path)
+    if content in (Content.DATAFLASH, Content.DATAFLASH_TEXT):
+        return read_dataflash(path, text=content is Content.DATAFLASH_TEXT)
+    if content is Content.TELEMETRY:
+        return read_telemetry(path)
+    if content is Content.ROSBAG1 or (content is Content.ROSBAG2 and _recorded_topics(Path(path))):
+        return read_autopilot_bag(path, settings)
+    return None
+
+
+def _recorded_topics(path: Path) -> bool:
+    """Whether a rosbag2 recording holds an autopilot's topics and no air data of ours."""
+    if not path.exists():
+        return False
+    with open_bag(path) as reader, reading(path):
+        topics = {c.topic: c.msgtype for c in reader.connections}
+    return "sysid_msgs/msg/AirData" not in topics.values() and autopilot_of(topics) is not None
+
+
+def open_log(path: str | Path, settings: AdapterSettings | None = None, outputs: str = "") -> LogFlight | None:
+    """The flight in an autopilot's log, before its commands become joints; None for other bags and tables."""
+    log = read_autopilot_log(path, settings)
+    return None if log is None else flight_of_log(log, outputs)
+
+
+def open_streams(
+    path: str | Path, aircraft: Aircraft, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu"
+) -> Streams:
+    """The messages of any flight, with the aircraft's joints.
+
+    ``topics`` and ``frame`` are for bags of our own topics. Raises InputError where the flight cannot be read, lacks
+    a signal, or was logged at too low a rate.
+    """
+    remapped = topics is not None and dict(topics) != topic_names()
+    log = None if remapped else read_autopilot_log(path)
+    if log is not None:
+        require_rates_of_log(log, raw_outputs=bool(aircraft.outputs))
+        streams = flight_of_log(log, aircraft.outputs).streams
+    elif not remapped and content_of(path) is Content.TABLE:
+        return streams_from_record(read_csv(path), aircraft)
+    else:
+        streams = read_streams(path, topics, frame)
+    if streams.actuators.content == COMMAND_FRACTIONS:
+        streams = replace(streams, actuators=joints_of_fractions(streams.actuators, aircraft, streams.name))
+    if streams.actuators.content:
+        require_rates(streams)
+    return streams
+
+
+def carried_by(streams: Streams, setting: str) -> str:
+    """What the actuators' messages are: where the ``setting`` is "auto", commands if the flight says so."""
+    return "commands" if setting == "auto" and streams.actuators.content == COMMANDS else setting
+
+
+def load_flight_record(
+    path: str | Path,
+    aircraft: Aircraft,
+    *,
+    topics: Mapping[str, str] | None = None,
+    frame: BodyFrame = "flu",
+    max_gap: float = 0.2,
+    carried: str = "positions",
+) -> FlightRecord:
+    """Any flight as aligned columns, with ``max_gap`` (s) as in ``align``. Raises InputError.
+
+    ``carried``: what the actuators' messages, or a table's columns, are ("commands", "positions", or "auto").
+    """
+    if is_table(path):
+        return with_commands(aircraft, read_csv(path), carried)
+    streams = open_streams(path, aircraft, topics, frame)
+    return flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
+
+
+def is_table(path: str | Path) -> bool:
+    """Whether a flight is a table, whose samples are aligned already. Raises InputError where it is no flight."""
+    return content_of(path) is Content.TABLE
+
+
+def commands_of(path: str | Path) -> list[JointMessage]:
+    """The commands that a bag of our own topics holds beside the positions; of other flights an empty list."""
+    return read_commands(path) if content_of(path) is Content.ROSBAG2 else []

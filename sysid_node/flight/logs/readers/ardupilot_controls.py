@@ -1,0 +1,80 @@
+"""Commands of the controls from ArduPilot's servo outputs, by ``SERVOn_FUNCTION``, ``_MIN``, ``_MAX``, ``_TRIM`` and
+``_REVERSED``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sysid_node.flight.logs.autopilot_log import Commands, Signal, absent
+from sysid_node.flight.logs.readers.mixing import SIGNS, unmixed
+from sysid_node.flight.record import Array
+
+#: Kinds of surfaces by SERVOn_FUNCTION (ArduPilot, ``SRV_Channel.h``). A flaperon moves as a single aileron command.
+_KINDS = {
+    4: "aileron",
+    19: "elevator",
+    21: "rudder",
+    24: "aileron",
+    25: "aileron",
+    77: "left elevon",
+    78: "right elevon",
+    79: "left V-tail",
+    80: "right V-tail",
+}
+_FLAPS = (2, 3)
+_THROTTLES = (70, 73, 74)
+
+#: Pulses (us) outside this range are no positions: 0 and 65535 mean that an output is not used.
+_SHORTEST, _LONGEST = 400.0, 2600.0
+
+
+def control_commands(outputs: Commands, parameters: Mapping[str, float]) -> tuple[Commands, tuple[str, ...]]:
+    """The controls' fractions of full command, and remarks, from the pulses (us) of the outputs out1, out2, ..."""
+    pulses = np.where((outputs.signal.values >= _SHORTEST) & (outputs.signal.values <= _LONGEST), 1.0, np.nan)
+    pulses = pulses * outputs.signal.values
+    functions = {i: int(parameters.get(f"SERVO{i + 1}_FUNCTION", 0)) for i in range(len(outputs.names))}
+    surfaces = [i for i, function in functions.items() if function in _KINDS and np.isfinite(pulses[:, i]).any()]
+    if not surfaces:
+        return Commands((), absent(outputs.signal.source, 0)), _without_surfaces(parameters)
+    commands = np.column_stack([_angle(pulses[:, i], i + 1, parameters) for i in surfaces])
+    names, fractions = unmixed([SIGNS[_KINDS[functions[i]]] for i in surfaces], commands)
+    columns = [fractions]
+    for name, wanted in (("flap", _FLAPS), ("throttle", _THROTTLES)):
+        places = [i for i, function in functions.items() if function in wanted and np.isfinite(pulses[:, i]).any()]
+        if places:
+            names = (*names, name)
+            columns.append(np.mean([_range(pulses[:, i], i + 1, parameters) for i in places], axis=0)[:, np.newaxis])
+    signal = Signal(outputs.signal.source, outputs.signal.stamp_ns, np.hstack(columns))
+    return Commands(names, signal), ()
+
+
+def _without_surfaces(parameters: Mapping[str, float]) -> tuple[str, ...]:
+    if any(name.startswith("SERVO") and name.endswith("_FUNCTION") for name in parameters):
+        return ("no SERVOn_FUNCTION is an aileron, elevator, rudder, elevon or V-tail",)
+    return ("the log holds no parameters SERVOn_FUNCTION",)
+
+
+def _limits(output: int, parameters: Mapping[str, float]) -> tuple[float, float, float, float]:
+    """Shortest and longest pulse and trim (us), and the sign, of an output."""
+    low, high, trim, turned = (
+        parameters.get(f"SERVO{output}_{key}", value)
+        for key, value in (("MIN", 1100.0), ("MAX", 1900.0), ("TRIM", 1500.0), ("REVERSED", 0.0))
+    )
+    return low, high, trim, -1.0 if turned else 1.0
+
+
+def _angle(pulses: Array, output: int, parameters: Mapping[str, float]) -> Array:
+    """Fractions -1..1 of the travel from the trim to either end."""
+    low, high, trim, sign = _limits(output, parameters)
+    travel = np.where(pulses >= trim, max(high - trim, 1.0), max(trim - low, 1.0))
+    fraction: Array = sign * (pulses - trim) / travel
+    return np.clip(fraction, -1.0, 1.0)
+
+
+def _range(pulses: Array, output: int, parameters: Mapping[str, float]) -> Array:
+    """Fractions 0..1 of the travel from one end to the other."""
+    low, high, _, sign = _limits(output, parameters)
+    fraction = (pulses - low) / max(high - low, 1.0)
+    return np.clip(fraction if sign > 0 else 1.0 - fraction, 0.0, 1.0)

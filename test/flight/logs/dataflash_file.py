@@ -1,0 +1,54 @@
+"""Writes small DataFlash files, by the format's description (ardupilot.org, binary log format; FMT is message 128)."""
+
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+_CODES = {"Q": "Q", "f": "f", "B": "B", "H": "H", "M": "B", "N": "16s", "Z": "64s", "n": "4s"}
+
+
+class Kind(NamedTuple):
+    """A message type: the letters of its fields, and their names."""
+
+    letters: str
+    columns: tuple[str, ...]
+
+
+KINDS = {
+    "FMT": Kind("BBnNZ", ("Type", "Length", "Name", "Format", "Columns")),
+    "MSG": Kind("QZ", ("TimeUS", "Message")),
+    "PARM": Kind("QNf", ("TimeUS", "Name", "Value")),
+    "IMU": Kind("QBffffff", ("TimeUS", "I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")),
+    "ATT": Kind("Qfff", ("TimeUS", "Roll", "Pitch", "Yaw")),
+    "ARSP": Kind("QBfBB", ("TimeUS", "I", "Airspeed", "H", "Pri")),
+    "BARO": Kind("QBffff", ("TimeUS", "I", "Alt", "Press", "Temp", "GndTemp")),
+    "RCOU": Kind("QHHHHHH", ("TimeUS", "C1", "C2", "C3", "C4", "C5", "C6")),
+    "STAT": Kind("QBB", ("TimeUS", "isFlying", "Armed")),
+    "MODE": Kind("QMB", ("TimeUS", "Mode", "ModeNum")),
+    "XKF4": Kind("QBB", ("TimeUS", "C", "PI")),
+    "AOA": Kind("Qff", ("TimeUS", "AOA", "SSA")),
+}
+
+
+def write_dataflash(path: Path, rows: Mapping[str, Sequence[Sequence[Any]]]) -> None:
+    """A binary DataFlash file with the rows of each kind in the order of their times, after all FMT messages."""
+    numbers = {name: 128 + i for i, name in enumerate(KINDS)}
+    body = bytearray()
+    for name, kind in KINDS.items():
+        length = struct.calcsize(_layout(kind.letters)) + 3
+        formats = (numbers[name], length, name, kind.letters, ",".join(kind.columns))
+        body += _row(128, KINDS["FMT"].letters, formats)
+    every = [(row[0], name, row) for name, of_kind in rows.items() for row in of_kind]
+    for _, name, row in sorted(every, key=lambda one: one[0]):
+        body += _row(numbers[name], KINDS[name].letters, row)
+    path.write_bytes(body)
+
+
+def _layout(letters: str) -> str:
+    return "<" + "".join(_CODES[letter] for letter in letters)
+
+
+def _row(number: int, letters: str, row: Sequence[Any]) -> bytes:
+    cells = [cell.encode() if isinstance(cell, str) else cell for cell in row]
+    return b"\xa3\x95" + bytes([number]) + struct.pack(_layout(letters), *cells)

@@ -1,0 +1,187 @@
+"""The same simulated flight as PX4 and as ArduPilot would log it, at the rates that a test asks for."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from dataflash_file import write_dataflash
+from ulog_file import Topic, write_ulog
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.frames import quaternion_from_euler
+from sysid_node.flight.logs.opening import load_flight_record
+from sysid_node.flight.record import FlightRecord
+
+BAG = Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep"
+
+#: Deflection at full command, rad, and the pulses of ArduPilot's outputs for aileron, elevator, throttle, rudder.
+FULL = {"elevator": 0.4, "aileron": 0.35, "rudder": -0.5}
+SERVOS = {
+    1: (4, 1100, 1900, 1500, 0),
+    2: (19, 1000, 2000, 1480, 1),
+    3: (70, 1000, 2000, 1500, 0),
+    4: (21, 900, 2100, 1500, 0),
+}
+MAX_THRUST = 30.0
+
+Rates = Mapping[str, float]
+FULL_RATES = {"imu": 100.0, "attitude": 100.0, "airspeed": 50.0, "air": 20.0, "controls": 100.0}
+PX4_DEFAULT = {"imu": 100.0, "attitude": 20.0, "airspeed": 5.0, "air": 5.0, "controls": 10.0}
+
+
+def aircraft() -> Aircraft:
+    """The flight's aircraft, with the deflections at full command."""
+    made = load_aircraft("cdrw")
+    controls = {name: replace(control, full_deflection=FULL[name]) for name, control in made.controls.items()}
+    return replace(made, controls=controls)
+
+
+@cache
+def flight() -> FlightRecord:
+    """20 s of the bundled flight, with its attitude."""
+    return load_flight_record(BAG, load_aircraft("cdrw")).between(2.0, 22.0)
+
+
+def fractions(record: FlightRecord) -> np.ndarray:
+    """Torque-like commands (N, 4): roll, pitch, yaw and throttle, as an autopilot has them."""
+    surfaces = zip(("da", "de", "dr"), ("aileron", "elevator", "rudder"), strict=True)
+    return np.column_stack(
+        [*(-record[symbol] / FULL[name] for symbol, name in surfaces), record["thrust"] / MAX_THRUST]
+    )
+
+
+def picked(record: FlightRecord, rate: float) -> np.ndarray:
+    """Places of the samples that a logger keeps at a rate."""
+    step = max(round(1.0 / rate / float(np.median(np.diff(record.time)))), 1)
+    return np.arange(0, len(record), step)
+
+
+def microseconds(record: FlightRecord) -> np.ndarray:
+    return np.round((record.time + 100.0) * 1e6).astype(np.int64)
+
+
+def px4_log(
+    path: Path,
+    rates: Rates = FULL_RATES,
+    *,
+    old: bool = False,
+    elevons: bool = False,
+    drop: tuple[str, ...] = (),
+    vehicle_type: int = 2,
+    jump: float = 0.0,
+) -> FlightRecord:
+    """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway."""
+    record = flight()
+    us = microseconds(record)
+    middle = int(us[us.size // 2])
+    at = {name: picked(record, rate) for name, rate in rates.items()}
+    motion = np.column_stack([record[name] for name in ("p", "q", "r", "ax", "ay", "az")])[at["imu"]]
+    euler = np.column_stack([record[name] for name in ("phi", "theta", "psi")])[at["attitude"]]
+    wxyz = np.roll(quaternion_from_euler(euler, "frd"), 1, axis=1)
+    commands = fractions(record)[at["controls"]]
+    speed, rho = record["V"][at["airspeed"]], record["rho"][at["air"]]
+    topics = [
+        Topic("sensor_combined", us[at["imu"]], {
+            "gyro_rad[3]": ("float", motion[:, :3]),
+            "accelerometer_timestamp_relative": ("int32_t", np.zeros(len(motion), int)),
+            "accelerometer_m_s2[3]": ("float", motion[:, 3:]),
+        }),
+        Topic("vehicle_attitude", us[at["attitude"]], {"q[4]": ("float", wxyz)}),
+        Topic("airspeed_validated", us[at["airspeed"]], {
+            "true_airspeed_m_s": ("float", speed),
+            "selected_airspeed_index" if old else "airspeed_source": ("int8_t", np.ones(speed.size, int)),
+        }),
+        Topic("vehicle_air_data", us[at["air"]], {"rho": ("float", rho)}),
+        Topic("vehicle_status", us[:1], {
+            "arming_state": ("uint8_t", np.array([2])), "vehicle_type": ("uint8_t", np.array([vehicle_type])),
+            "is_vtol": ("bool", np.array([False])), "in_transition_mode": ("bool", np.array([False])),
+        }),
+        Topic("vehicle_land_detected", us[:1], {"landed": ("bool", np.array([False]))}),
+        *_px4_controls(us[at["controls"]], commands, old=old, elevons=elevons),
+    ]  # fmt: skip
+    parameters = {} if old else _px4_parameters(elevons=elevons)
+    kept = [topic for topic in topics if topic.name not in drop]
+    release = 0x010B0200 if old else 0x010E0000
+    jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
+    write_ulog(path, kept, parameters, release, jumping)
+    return record
+
+
+def _px4_controls(us: np.ndarray, commands: np.ndarray, *, old: bool, elevons: bool) -> list[Topic]:
+    roll, pitch, yaw, thrust = commands.T
+    if old:
+        return [Topic("actuator_controls_0", us, {"control[8]": ("float", np.pad(commands, ((0, 0), (0, 4))))})]
+    surfaces = [pitch - roll, pitch + roll, yaw] if elevons else [-roll, roll, pitch, yaw]
+    servos = np.column_stack([*surfaces, *[np.full(roll.size, np.nan)] * (8 - len(surfaces))])
+    motors = np.column_stack([thrust, *[np.full(roll.size, np.nan)] * 11])
+    return [
+        Topic("actuator_servos", us, {"control[8]": ("float", servos)}),
+        Topic("actuator_motors", us, {"control[12]": ("float", motors)}),
+    ]
+
+
+def _px4_parameters(*, elevons: bool) -> dict[str, float]:
+    kinds = (5, 6, 4) if elevons else (1, 2, 3, 4)
+    torques = {
+        1: (-0.5, 0.0, 0.0), 2: (0.5, 0.0, 0.0), 3: (0.0, 1.0, 0.0), 4: (0.0, 0.0, 1.0),
+        5: (-0.5, 0.5, 0.0), 6: (0.5, 0.5, 0.0),
+    }  # fmt: skip
+    parameters: dict[str, float] = {"CA_AIRFRAME": 1, "CA_ROTOR_COUNT": 1, "CA_SV_CS_COUNT": len(kinds)}
+    for i, kind in enumerate(kinds):
+        parameters[f"CA_SV_CS{i}_TYPE"] = kind
+        parameters |= {f"CA_SV_CS{i}_TRQ_{axis}": value for axis, value in zip("RPY", torques[kind], strict=True)}
+    return parameters
+
+
+def dataflash_log(
+    path: Path, rates: Rates = FULL_RATES, *, firmware: str = "ArduPlane V4.5.0", flying: int = 1
+) -> FlightRecord:
+    """A DataFlash log of the flight, with a second IMU that is wrong and not the primary."""
+    record = flight()
+    us = microseconds(record).tolist()
+    at = {name: picked(record, rate) for name, rate in rates.items()}
+    motion = np.column_stack([record[name] for name in ("p", "q", "r", "ax", "ay", "az")])
+    degrees = np.degrees(np.column_stack([record[name] for name in ("phi", "theta", "psi")]))
+    equivalent = record["V"] * np.sqrt(record["rho"] / 1.225)
+    pulses = _pulses(fractions(record))
+    kelvin = 288.15
+    rows = {
+        "MSG": [(us[0], f"{firmware} (abcd)")],
+        "PARM": [(us[0], name, value) for name, value in _ardupilot_parameters().items()],
+        "STAT": [(us[0], flying, 1)],
+        "MODE": [(us[0], 5, 5)],
+        "XKF4": [(us[0], 0, 1)],
+        "IMU": [
+            row
+            for i in at["imu"]
+            for row in ((us[i], 0, *(5.0 * motion[i])), (us[i], 1, *motion[i]))
+        ],
+        "ATT": [(us[i], *degrees[i]) for i in at["attitude"]],
+        "ARSP": [(us[i], 0, equivalent[i], 1, 0) for i in at["airspeed"]],
+        "BARO": [(us[i], 0, 0.0, record["rho"][i] * 287.05287 * kelvin, 45.0, kelvin - 273.15) for i in at["air"]],
+        "RCOU": [(us[i], *pulses[i].tolist(), 0, 0) for i in at["controls"]],
+        "AOA": [(us[i], 3.0, 0.1) for i in at["airspeed"]],
+    }  # fmt: skip
+    write_dataflash(path, rows)
+    return record
+
+
+def _pulses(commands: np.ndarray) -> np.ndarray:
+    """Pulses (N, 4), us, of the outputs 1 to 4, as ArduPilot computes them from roll, pitch, throttle and yaw."""
+    columns = []
+    for number, command in zip((1, 2, 3, 4), commands[:, [0, 1, 3, 2]].T, strict=True):
+        function, low, high, trim, turned = SERVOS[number]
+        if function == 70:
+            columns.append(low + command * (high - low))
+        else:
+            signed = -command if turned else command
+            columns.append(trim + signed * np.where(signed > 0, high - trim, trim - low))
+    return np.round(np.column_stack(columns)).astype(int)
+
+
+def _ardupilot_parameters() -> dict[str, float]:
+    keys = ("FUNCTION", "MIN", "MAX", "TRIM", "REVERSED")
+    return {f"SERVO{n}_{key}": float(value) for n, row in SERVOS.items() for key, value in zip(keys, row, strict=True)}

@@ -1,0 +1,100 @@
+"""PX4's logs, of before and after 1.14: the flight that was written comes back, with the commands of its controls."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulated_logs import FULL_RATES, PX4_DEFAULT, aircraft, px4_log
+
+from sysid_node.errors import InputError
+from sysid_node.flight.align import flight_record
+from sysid_node.flight.logs.opening import load_flight_record, open_log, open_streams
+from sysid_node.flight.streams import COMMANDS
+
+
+@pytest.mark.parametrize("kind", ["ailerons", "elevons", "before 1.14"])
+def test_the_flight_comes_back(tmp_path, kind):
+    """Truth: the record that was written. ULog holds single precision; pulses and fractions are exact to that."""
+    record = px4_log(tmp_path / "renamed.dat", old=kind == "before 1.14", elevons=kind == "elevons")
+    streams = open_streams(tmp_path / "renamed.dat", aircraft())
+    assert streams.actuators.content == COMMANDS
+    back = flight_record(aircraft(), streams, 0.2)
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    for name, tolerance in {
+        "ax": 1e-4,
+        "q": 1e-5,
+        "theta": 1e-5,
+        "de": 1e-5,
+        "da": 1e-5,
+        "dr": 1e-5,
+        "thrust": 1e-3,
+    }.items():
+        np.testing.assert_allclose(back[name], record[name][at], atol=tolerance, err_msg=name)
+    np.testing.assert_allclose(back["V"][::2], record["V"][at][::2], atol=1e-4)
+    np.testing.assert_allclose(back["rho"], record["rho"][at], atol=1e-4)
+    assert not back.measured("alpha")
+
+
+def test_slow_airspeed_moves_as_the_imu_says(tmp_path):
+    """Completed by the IMU, the airspeed is as near to the measured one as a line between the samples, or nearer."""
+    record = px4_log(tmp_path / "flight.ulg", {**FULL_RATES, "airspeed": 2.0, "attitude": 20.0})
+    back = load_flight_record(tmp_path / "flight.ulg", aircraft())
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    every = np.arange(0, len(record), 50)
+    line = np.interp(record.time[at], record.time[every], record["V"][every])
+    completed, straight = (np.std(v - record["V"][at]) for v in (back["V"], line))
+    assert completed <= straight * 1.02
+    remarks = open_log(tmp_path / "flight.ulg").remarks
+    assert any("airspeed_validated comes at 2 Hz" in remark for remark in remarks)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"vehicle_type": 1}, "never flew as a fixed wing"),
+        ({"drop": ("airspeed_validated",)}, "no airspeed in it; connect an airspeed sensor"),
+        ({"drop": ("sensor_combined",)}, "no sensor_combined in it; SDLOG_PROFILE = 27"),
+        ({"drop": ("actuator_servos",)}, "which output moves which surface is not known"),
+        ({"rates": PX4_DEFAULT}, "actuator_servos comes at 10 Hz; 20 Hz are needed; SDLOG_PROFILE = 27"),
+        ({"jump": -30.0}, "the stamps of sensor_combined go back by 30.0 s after 10.0 s"),
+    ],
+)
+def test_what_a_log_lacks_is_one_line(tmp_path, options, said):
+    px4_log(tmp_path / "flight.ulg", **options)
+    with pytest.raises(InputError, match=said):
+        load_flight_record(tmp_path / "flight.ulg", aircraft())
+
+
+def test_a_clock_that_jumps_ahead_leaves_a_gap(tmp_path):
+    record = px4_log(tmp_path / "flight.ulg", jump=40.0)
+    back = load_flight_record(tmp_path / "flight.ulg", aircraft())
+    assert back.duration == pytest.approx(record.duration + 40.0, abs=0.1)
+    assert np.diff(back.time).max() > 39.0
+
+
+def test_truncated_and_damaged_logs(tmp_path):
+    """A log that was cut short is used as far as it goes; one without content is one line."""
+    record = px4_log(tmp_path / "flight.ulg")
+    whole = (tmp_path / "flight.ulg").read_bytes()
+    (tmp_path / "short.ulg").write_bytes(whole[: len(whole) // 2])
+    assert load_flight_record(tmp_path / "short.ulg", aircraft()).duration == pytest.approx(
+        record.duration / 2, rel=0.1
+    )
+    (tmp_path / "head.ulg").write_bytes(whole[:400])
+    with pytest.raises(InputError, match=r"head\.ulg"):
+        load_flight_record(tmp_path / "head.ulg", aircraft())
+    middle = bytearray(whole)
+    middle[len(whole) // 3 : len(whole) // 3 + 200] = bytes(200)
+    (tmp_path / "damaged.ulg").write_bytes(middle)
+    try:
+        assert load_flight_record(tmp_path / "damaged.ulg", aircraft()).duration > 0.2 * record.duration
+    except InputError as error:
+        assert "\n" not in str(error)
+
+
+def test_the_deflection_at_full_command_is_asked_for(tmp_path):
+    px4_log(tmp_path / "flight.ulg")
+    made = aircraft()
+    controls = {**made.controls, "rudder": replace(made.controls["rudder"], full_deflection=None)}
+    with pytest.raises(InputError, match=r"controls\.rudder\.full_deflection: missing"):
+        load_flight_record(tmp_path / "flight.ulg", replace(made, controls=controls))
