@@ -19,7 +19,7 @@ from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
-from sysid_node.flight.logs.opening import carried_by, commands_of, open_streams
+from sysid_node.flight.logs.opening import carried_by, open_streams, recorded_commands
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
@@ -179,7 +179,7 @@ def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> Faul
     """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
     pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
     heard = (RecordedEstimates(stamp, identifier_estimates(estimates)) for stamp, estimates in pairs)
-    return judge(found.aircraft, FaultSettings(), found.streams, commands_of(bag), heard, progress)
+    return judge(found.aircraft, FaultSettings(), found.streams, recorded_commands(bag), heard, progress)
 
 
 def replay_settings(values: Mapping[str, object]) -> tuple[OnlineSettings, float]:

@@ -17,7 +17,7 @@ from sysid_node.csv_table import write_table
 from sysid_node.faults.recorded_flight import Episode, FaultVerdict
 from sysid_node.faults.types import LOSS, Fault
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.flight.logs import streams_from_record
+from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.report.files.loop_folder import write_loop_folder
 from sysid_node.report.files.run_folder import write_run

@@ -1,12 +1,14 @@
-"""The aircraft's joints from commands that are fractions of the full command."""
+"""The aircraft's joints from a log's commands: from fractions of the full command, and between their samples."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.streams import COMMANDS, JointStream
+from sysid_node.flight.streams import COMMANDS, Arrival, JointStream
 
 
 def joints_of_fractions(joints: JointStream, aircraft: Aircraft, flight: str) -> JointStream:
@@ -45,3 +47,29 @@ def joints_of_fractions(joints: JointStream, aircraft: Aircraft, flight: str) ->
     return JointStream(
         joints.arrival, tuple(names), np.column_stack(columns), COMMANDS, source=joints.source, remedy=joints.remedy
     )
+
+
+#: Commands are held from message to message. Between samples of a slower log than this, Hz, they are interpolated.
+_FINE = 200.0
+_LONGEST_BRIDGE_NS = 500_000_000
+
+
+def between_commands(joints: JointStream) -> JointStream:
+    """Commands at 200 Hz on the lines between a log's samples, where these are fewer.
+
+    An autopilot computes commands at 100 to 400 Hz, of which a log holds some. To hold a sample until the next would
+    delay them by half of the log's period on average.
+    """
+    stamps = joints.arrival.stamp_ns
+    steps = np.diff(stamps)
+    if stamps.size < 2 or int(steps.min()) <= 0 or float(np.median(steps)) <= 1e9 / _FINE * 1.5:
+        return joints
+    parts = np.minimum(np.ceil(steps * _FINE / 1e9), 1e3).astype(np.int64)
+    parts[steps > _LONGEST_BRIDGE_NS] = 1
+    place = np.repeat(np.arange(parts.size), parts)
+    share = np.concatenate([np.arange(count) / count for count in parts.tolist()])
+    fine = np.append(stamps[place] + np.round(share * steps[place]).astype(np.int64), stamps[-1])
+    moved = share[:, np.newaxis] * np.diff(joints.positions, axis=0)[place]
+    positions = np.vstack([joints.positions[place] + moved, joints.positions[-1:]])
+    arrival = Arrival(fine, fine, np.arange(fine.size, dtype=np.int64))
+    return replace(joints, arrival=arrival, positions=positions)

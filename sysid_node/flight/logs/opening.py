@@ -15,7 +15,7 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.autopilot_log import AutopilotLog
 from sysid_node.flight.logs.content import Content, content_of
-from sysid_node.flight.logs.fractions import joints_of_fractions
+from sysid_node.flight.logs.fractions import between_commands, joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight, flight_of_log
 from sysid_node.flight.logs.rates import require_rates, require_rates_of_log
 from sysid_node.flight.logs.readers.autopilot_bag import autopilot_of, read_autopilot_bag
@@ -82,6 +82,7 @@ def open_streams(
         streams = replace(streams, actuators=joints_of_fractions(streams.actuators, aircraft, streams.name))
     if streams.actuators.content:
         require_rates(streams)
+        streams = replace(streams, actuators=between_commands(streams.actuators))
     return streams
 
 
@@ -114,6 +115,6 @@ def is_table(path: str | Path) -> bool:
     return content_of(path) is Content.TABLE
 
 
-def commands_of(path: str | Path) -> list[JointMessage]:
+def recorded_commands(path: str | Path) -> list[JointMessage]:
     """The commands that a bag of our own topics holds beside the positions; of other flights an empty list."""
     return read_commands(path) if content_of(path) is Content.ROSBAG2 else []
