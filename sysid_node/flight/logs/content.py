@@ -43,6 +43,8 @@ def content_of(path: str | Path) -> Content:
         return Content.ROSBAG2
     if not path.exists():
         return Content.TABLE if path.suffix.lower() == ".csv" else Content.ROSBAG2
+    if not path.is_file():  # a pipe or a device, which the table's reader refuses
+        return Content.TABLE
     try:
         with path.open("rb") as file:
             head = file.read(4096)
