@@ -58,7 +58,8 @@ def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | 
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     streams = open_streams(path, aircraft, topics, frame)
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
-    record = flight_record(aircraft, streams, 0.2)
+    # commands are held, but the servos are the simulator's own
+    record = flight_record(aircraft, streams, 0.2, "auto", servos=False)
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     return completed_flight(aircraft, GapFlight(record, rates[0], rates[1], rates[2], source=str(path)))
 
