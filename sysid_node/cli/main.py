@@ -83,8 +83,13 @@ def _run(command: str, arguments: Sequence[str]) -> int:
         return BAD_INPUT
     with warnings.catch_warnings():
         warnings.simplefilter("always", InputWarning)
-        warnings.showwarning = _show_warning(command, warnings.showwarning)
+        if not args.debug:  # of NumPy, about numbers that are checked where they matter
+            warnings.simplefilter("ignore", RuntimeWarning)
+        later: list[str] = []
+        warnings.showwarning = _show_warning(command, warnings.showwarning, later)
         import_module(f"sysid_node.cli.{command}").run(args)
+    for line in dict.fromkeys(later):
+        print(line, file=sys.stderr)
     return DONE
 
 
@@ -131,12 +136,18 @@ def _one_thread_for_linear_algebra() -> None:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-def _show_warning(command: str, usual: Callable[..., None]) -> Callable[..., None]:
-    """A ``warnings.showwarning``: a warning about a model or an input is one line, any other is as usual."""
+def _show_warning(command: str, usual: Callable[..., None], later: list[str]) -> Callable[..., None]:
+    """A ``warnings.showwarning``: a warning about a model is one line, any of another kind is as usual.
+
+    One about an input is put into ``later``, to be shown after the results; an error is then one line.
+    """
 
     def show(message: Warning | str, category: type[Warning], *place: object) -> None:
-        if issubclass(category, ModelWarning | InputWarning):
-            print(f"sysid {command}: warning: {' '.join(str(message).split())}", file=sys.stderr)
+        line = f"sysid {command}: warning: {' '.join(str(message).split())}"
+        if issubclass(category, InputWarning):
+            later.append(line)
+        elif issubclass(category, ModelWarning):
+            print(line, file=sys.stderr)
         else:
             usual(message, category, *place)
 
