@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import yaml
 
 from sysid_node.errors import InputError
+from sysid_node.suggestion import did_you_mean
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,6 @@ class Entry:
         if self._is_plain():
             return str(self.node.value) or "nothing"
         return f"the text {self.node.value!r}"
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """``"; did you mean cbar?"`` or nothing."""
-    names = list(known)
-    matches = [name for name in names if name.casefold() == word.casefold()]
-    matches = matches or get_close_matches(word, names, n=1, cutoff=0.5)
-    return f"; did you mean {matches[0]!r}?" if matches else ""
 
 
 def parse_document(text: str, file: str) -> Entry:

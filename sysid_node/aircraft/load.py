@@ -22,6 +22,7 @@ from sysid_node.aircraft.reading.effects import read_delays, read_effects
 from sysid_node.aircraft.reading.quantities import Quantities, positive
 from sysid_node.aircraft.reading.tables import read_tables
 from sysid_node.errors import InputError
+from sysid_node.suggestion import did_you_mean
 
 _REQUIRED = {
     "name": "the aircraft's name",
@@ -49,6 +50,14 @@ def load_aircraft(name_or_path: str | Path) -> Aircraft:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"aircraft file {path}: cannot be read: {error}") from error
     return parse_aircraft(text, str(path))
+
+
+def named_aircraft(name: str) -> Aircraft:
+    """The aircraft that comes with the package, by its name, which is never taken for a path.
+
+    Raises InputError where there is none.
+    """
+    return load_aircraft(_shipped(name))
 
 
 def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
@@ -96,10 +105,16 @@ def _find(name_or_path: str | Path) -> Path:
     name = str(name_or_path)
     if isinstance(name_or_path, Path) or name.endswith((".yaml", ".yml")) or os.sep in name:
         return Path(name_or_path)
-    for folder in aircraft_folders():
-        if name and (folder / f"{name}.yaml").is_file():
-            return folder / f"{name}.yaml"
-    raise InputError(f"aircraft {name!r} is not known; give a .yaml file or one of {_known_names()}")
+    return _shipped(name)
+
+
+def _shipped(name: str) -> Path:
+    """The file of an aircraft that comes with the package."""
+    known = {path.stem: path for folder in reversed(aircraft_folders()) for path in folder.glob("*.yaml")}
+    if name in known:
+        return known[name]
+    meant = did_you_mean(name, sorted(known))
+    raise InputError(f"aircraft {name!r} is not known; give a .yaml file or one of {_known_names()}{meant}")
 
 
 def _known_names() -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
-from sysid_node.batch.identify import Identification
+from sysid_node.batch.identify import Identification, refuse_unused
 from sysid_node.batch.identify import identify as identify_records
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
@@ -63,6 +63,7 @@ def identify(
     if not flights:
         raise InputError("no flight to identify from; give at least one")
     chosen = BatchSettings.from_mapping(settings or {})
+    refuse_unused(method, settings or {})
     tell = progress or (lambda share, doing: None)
     tell(0.0, "reading the flights")
     records, held_out = (

@@ -102,6 +102,21 @@ def identify(
     )
 
 
+def refuse_unused(method: str, settings: Mapping[str, object]) -> None:
+    """Raise InputError where a setting is given, as of ``BatchSettings``, that the method does not use."""
+    unused = [] if method == "frequency_equation_error" else ["frequencies"]
+    if method in _REGRESSIONS:
+        unused += ["rate", "states", "biases", "use_prior"]
+    if method not in KALMAN_FILTERS:
+        unused.append("process_noise")
+    cut = _ESTIMATIONS.get(method) is MaximumLikelihoodEstimation
+    if not cut and not BatchSettings.from_mapping(settings).correct_sensors:
+        unused.append("segment")
+    given = [key for key in settings if key in unused]
+    if given and method in METHODS:
+        raise InputError(f"setting {given[0]!r} is not used by {method}; leave it out, or choose another method")
+
+
 def _fitted(
     method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
 ) -> tuple[BatchFit, Callable[[FlightRecord], Sequence[ModelResponse]]]:

@@ -10,6 +10,7 @@ from typing import Any, get_type_hints
 from sysid_node.errors import InputError
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.setting import check_frequencies, parse_setting
+from sysid_node.suggestion import did_you_mean
 
 #: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
 DEFAULT_LOW_PASS = 3.0
@@ -55,7 +56,8 @@ class BatchSettings:
         kinds = get_type_hints(cls)
         for key in values:
             if key not in kinds:
-                raise InputError(f"setting {key!r} is not one of a batch method; those are {', '.join(kinds)}")
+                meant = did_you_mean(key, kinds)
+                raise InputError(f"setting {key!r} is not one of a batch method; those are {', '.join(kinds)}{meant}")
         return cls(**{key: parse_setting(key, kinds[key], value) for key, value in values.items()})
 
     def as_dict(self, method: str) -> dict[str, Any]:

@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
 from sysid_node.errors import InputError
 from sysid_node.report.files.output_folder import output_folder
+from sysid_node.suggestion import did_you_mean
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre

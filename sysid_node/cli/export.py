@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.load import load_aircraft, named_aircraft
 from sysid_node.aircraft.model import Aircraft, Derivative
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
@@ -49,7 +50,10 @@ def run(args: argparse.Namespace) -> None:
     inputs = options.inputs_of([args.estimate], args.aircraft)
     check_file(args.out, inputs, MARK, force=args.force)
     summary = _summary(args.estimate)
-    aircraft = load_aircraft(args.aircraft or (summary["aircraft"] if summary else args.estimate))
+    if args.aircraft or not summary:
+        aircraft = load_aircraft(args.aircraft or args.estimate)
+    else:
+        aircraft = named_aircraft(summary["aircraft"])
     left: list[str] = []
     if summary:
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
@@ -64,11 +68,25 @@ def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]
     """The aircraft with the valid estimates for its derivatives, and the names of those that are not valid."""
     derivatives, left = dict(aircraft.derivatives), []
     for name, estimate in estimates.items():
-        if estimate.get("valid") and estimate.get("value") is not None:
-            derivatives[name] = Derivative(float(estimate["value"]), estimate.get("standard_error"))
+        if name not in derivatives:
+            raise InputError(
+                f"estimate of {name!r}: the aircraft {aircraft.name!r} has no such derivative; is it its file?"
+            )
+        value, error = (_number(name, key, estimate.get(key)) for key in ("value", "standard_error"))
+        if estimate.get("valid") is True and value is not None:
+            derivatives[name] = Derivative(value, error or None)
         else:
             left.append(name)
     return replace(aircraft, derivatives=derivatives), left
+
+
+def _number(name: str, key: str, value: object) -> float | None:
+    """A number of an estimate; None where it is null. Raises InputError where it is neither, or not finite."""
+    if value is None:
+        return None
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        raise InputError(f"estimate of {name!r}: {key} is {value!r}, expected a finite number or null")
+    return float(value)
 
 
 def _summary(estimate: str) -> dict[str, Any] | None:
@@ -79,11 +97,11 @@ def _summary(estimate: str) -> dict[str, Any] | None:
         return None
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(found["aircraft"], str) and isinstance(found["derivatives"], dict):
+        if isinstance(found["aircraft"], str) and all(isinstance(d, dict) for d in found["derivatives"].values()):
             return dict(found)
     except FileNotFoundError:
         raise InputError(f"{path}: not found; give the folder of a run, its summary.json, or an aircraft") from None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
     raise InputError(f"{path}: not the summary.json of a run (it needs aircraft and derivatives)")
 

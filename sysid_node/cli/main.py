@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import signal
 import sys
 import traceback
@@ -19,6 +20,7 @@ from typing import NoReturn
 
 from sysid_node.errors import InputError, InputWarning, ModelWarning
 from sysid_node.interruption import end_on_signals
+from sysid_node.suggestion import did_you_mean
 
 COMMANDS = {
     "replay": "identify an aircraft from a bag, as the live node does",
@@ -43,6 +45,9 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and how to get help, and exit with code 2."""
+        choice = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if choice:
+            message += did_you_mean(choice[1], re.findall(r"[\w-]+", choice[2]))
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

@@ -88,6 +88,10 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
     from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
+    if not 0.0 < args.height <= 20_000.0:
+        raise InputError(f"--height {args.height:g}: expected more than 0 and at most 20000 m above the ground")
+    if not 0 <= args.seed < 2**63:
+        raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     held = args.actuator_rate if args.surfaces == "commanded" else None
     simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate, held or 0.0))

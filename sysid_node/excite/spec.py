@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.document import did_you_mean
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.kinds import COMMON_KEYS, KINDS, ManoeuvreKey
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, control_limits
 from sysid_node.excite.segment import Segment, draw_manoeuvre
+from sysid_node.suggestion import did_you_mean
 
 Array = NDArray[np.float64]
 

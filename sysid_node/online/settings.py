@@ -10,6 +10,7 @@ from typing import Any, get_type_hints
 from sysid_node.errors import InputError
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.setting import check_frequencies, parse_setting
+from sysid_node.suggestion import did_you_mean
 
 METHODS = ("sls_rft", "iv_rft")
 MOST_LINES = 1000
@@ -60,7 +61,7 @@ class OnlineSettings:
         types = get_type_hints(cls)
         for key in values:
             if key not in types:
-                raise InputError(f"setting {key!r} is not known; known: {', '.join(types)}")
+                raise InputError(f"setting {key!r} is not known; known: {', '.join(types)}{did_you_mean(key, types)}")
         return cls(**{key: parse_setting(key, types[key], value) for key, value in values.items()})
 
     def as_dict(self) -> dict[str, Any]:

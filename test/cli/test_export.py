@@ -1,13 +1,19 @@
 """``sysid export``: what it reads, what it keeps, what it says."""
 
 import json
-from xml.etree.ElementTree import parse
+from dataclasses import replace
+from xml.etree.ElementTree import fromstring, parse
 
 import pytest
 import yaml
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Derivative
 from sysid_node.cli.main import main
+from sysid_node.errors import InputError
+from sysid_node.sim.export.gazebo import gazebo_plugin
+from sysid_node.sim.export.jsbsim import jsbsim_model
+from sysid_node.sim.export.rosflight import rosflight_parameters
 
 SUMMARY = {
     "aircraft": "cdrw",
@@ -58,10 +64,13 @@ def test_effects_go_into_jsbsim(run):
         ),
         (["{run}/broken.json", "--format", "gazebo"], "not the summary.json of a run"),
         (["cdrw", "--format", "jsbsim", "--out", "{run}/none/model.xml"], "cannot be written"),
+        (["{run}", "--format", "jsbsim", "--out", "{run}/summary.json"], "holds something else; give --force"),
+        (["{run}/own.yaml", "--format", "jsbsim", "--out", "{run}/own.yaml", "--force"], "is the input"),
     ],
 )
 def test_bad_input_is_one_line(run, capsys, arguments, said):
     (run / "broken.json").write_text("{")
+    (run / "own.yaml").write_text("name: mine")
     words = [word.replace("{run}", str(run)) for word in arguments]
     if "--out" not in words:
         words += ["--out", str(run / "model")]
@@ -69,3 +78,48 @@ def test_bad_input_is_one_line(run, capsys, arguments, said):
     message = capsys.readouterr().err
     assert said in message
     assert message.count("\n") == 1
+
+
+ODD = [
+    ({"aircraft": "../secret.yaml"}, "aircraft '../secret.yaml' is not known"),
+    ({"aircraft": "{run}/secret.yaml"}, "is not known"),
+    ({"derivatives": [1]}, "not the summary.json of a run"),
+    ({"derivatives": {"Cm_alpha": 3.0}}, "not the summary.json of a run"),
+    ({"derivatives": {"Cm_alpha": {"value": "-0.3", "valid": True}}}, "value is '-0.3', expected a finite number"),
+    ({"derivatives": {"Cm_alpha": {"value": 1e999, "valid": True}}}, "value is inf, expected a finite number"),
+    ({"derivatives": {"Cm_alpha": {"value": -0.3, "standard_error": [1], "valid": True}}}, "standard_error is [1]"),
+    ({"derivatives": {"Cm_alhpa": {"value": -0.3, "valid": True}}}, "has no such derivative"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), ODD)
+def test_odd_summaries_are_one_line(run, capsys, change, said):
+    """The aircraft of a summary is a name: a file that it leads to is not read."""
+    (run / "secret.yaml").write_text("secret")
+    changed = json.dumps({**SUMMARY, **change}).replace("{run}", str(run))
+    (run / "summary.json").write_text(changed)
+    assert main(["export", str(run), "--format", "jsbsim", "--out", str(run / "m.xml")]) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize("form", ["jsbsim", "gazebo", "rosflight"])
+def test_a_name_with_a_newline_and_marks_injects_nothing(form):
+    """The name of the aircraft file is text of the user's: in YAML a second line of it would be a key."""
+    name = 'a\n/**:\n  ros__parameters:\n    mass: 99.0\n"><evil/>\x00'
+    aircraft = replace(load_aircraft("cdrw"), name=name, source=name)
+    text = {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form](aircraft)
+    if form == "rosflight":
+        assert yaml.safe_load(text)["/**"]["ros__parameters"]["mass"] == load_aircraft("cdrw").mass
+    else:
+        assert not list(fromstring(text).iter("evil"))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+@pytest.mark.parametrize("writer", [jsbsim_model, gazebo_plugin, rosflight_parameters])
+def test_a_value_that_is_not_finite_is_refused(writer, value):
+    aircraft = load_aircraft("cdrw")
+    derivatives = {**aircraft.derivatives, "CL_q": Derivative(value)}
+    with pytest.raises(InputError, match="correct the estimate"):
+        writer(replace(aircraft, derivatives=derivatives))

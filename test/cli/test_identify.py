@@ -96,6 +96,12 @@ def test_output_error_on_a_bag(tmp_path, capsys):
     ("change", "said"),
     [
         (["--set", "window=20"], "setting 'window' is not one of a batch method"),
+        (["--set", "low_pas=20"], "did you mean 'low_pass'?"),
+        (["--set", "low_pass=2", "--set", "low_pass=3"], "low_pass is given twice"),
+        (["--frequencies", "0.1:0.1:1", "--set", "frequencies=0.1:0.1:2"], "both are given"),
+        (["--set", "process_noise=2"], "'process_noise' is not used by frequency_equation_error"),
+        (["--set", "segment=5"], "'segment' is not used by frequency_equation_error"),
+        (["--set", "segment=1e-9", "--set", "correct_sensors=true"], "cannot be cut into segments of 1e-09 s"),
         (["--set", "segment"], "--set 'segment': expected KEY=VALUE"),
         (["--set", "states=alpha,speed"], "state 'speed' is not known"),
         (["--frequencies", "2:1"], "expected START:STEP:STOP in Hz"),

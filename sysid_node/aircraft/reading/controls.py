@@ -8,10 +8,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sysid_node.aircraft.document import Entry, did_you_mean
+from sysid_node.aircraft.document import Entry
 from sysid_node.aircraft.model import Control, Throttle
 from sysid_node.aircraft.names import CONTROL_SYMBOLS, RESERVED_SYMBOLS
 from sysid_node.aircraft.reading.quantities import Quantities, ReadNumber, angle, any_number, positive
+from sysid_node.suggestion import did_you_mean
 
 
 def read_controls(entry: Entry, quantities: Quantities) -> tuple[dict[str, Control], Throttle | None]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sysid_node.aircraft.document import Entry, did_you_mean
+from sysid_node.aircraft.document import Entry
 from sysid_node.aircraft.model import Control, Derivative
 from sysid_node.aircraft.names import COEFFICIENTS, STATE_REGRESSORS, split_derivative
+from sysid_node.suggestion import did_you_mean
 
 
 def read_derivatives(entry: Entry, controls: Mapping[str, Control]) -> dict[str, Derivative]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sysid_node.aircraft.document import Entry, did_you_mean
+from sysid_node.aircraft.document import Entry
 from sysid_node.aircraft.effect_names import EFFECT_NAMES, EffectNames, EffectParameter
 from sysid_node.aircraft.model import DELAY_EFFECTS, NO_DELAYS, Control, Derivative, Throttle, UncertainValue
 from sysid_node.aircraft.reading.quantities import ReadNumber, uncertain
+from sysid_node.suggestion import did_you_mean
 
 Effects = dict[str, dict[str, UncertainValue]]
 

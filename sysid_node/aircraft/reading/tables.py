@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from sysid_node.aircraft.document import Entry, did_you_mean
+from sysid_node.aircraft.document import Entry
 from sysid_node.aircraft.model import Control, Table
 from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.suggestion import did_you_mean
 
 #: What a table may be over besides the controls' symbols, with units.
 TABLE_VARIABLES = {

@@ -75,14 +75,15 @@ def cut_into_segments(record: FlightRecord, seconds: float) -> list[FlightRecord
         raise InputError(f"flight {record.name!r}: {len(record)} samples; give at least {_FEWEST}, better some seconds")
     if not seconds > 0.0:
         return [record]
-    pieces = max(1, int(np.ceil(record.duration / seconds - 1e-9)))
-    edges = len(record) // pieces * np.arange(pieces + 1)
-    if edges[1] < _FEWEST:
+    pieces = max(1.0, np.ceil(record.duration / seconds - 1e-9))
+    if len(record) // pieces < _FEWEST:
         raise InputError(
             f"flight {record.name!r}: {len(record)} samples in {record.duration:.1f} s cannot be cut into segments of "
             f"{seconds:g} s; give longer segments"
         )
-    return [_piece(record, first, last, k, pieces) for k, (first, last) in enumerate(pairwise(edges.tolist()))]
+    count = int(pieces)
+    edges = len(record) // count * np.arange(count + 1)
+    return [_piece(record, first, last, k, count) for k, (first, last) in enumerate(pairwise(edges.tolist()))]
 
 
 def _piece(record: FlightRecord, first: int, last: int, index: int, pieces: int) -> FlightRecord:

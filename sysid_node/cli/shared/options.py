@@ -66,7 +66,11 @@ def settings_of(texts: Iterable[str], frequencies: str | None, example: str) -> 
         key, separator, value = text.partition("=")
         if not separator:
             raise InputError(f"--set {text!r}: expected KEY=VALUE, e.g. {example}")
+        if key.strip() in values:
+            raise InputError(f"--set {text!r}: {key.strip()} is given twice; keep one")
         values[key.strip()] = value.strip()
     if frequencies is not None:
+        if "frequencies" in values:
+            raise InputError("--frequencies and --set frequencies: both are given; keep one")
         values["frequencies"] = frequencies
     return values

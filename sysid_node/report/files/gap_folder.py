@@ -53,10 +53,10 @@ def effect_options(found: Diagnosis) -> list[str]:
     """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
     fit = found.attribution.corrected
     simulator = fit.simulator
-    options = []
+    options: dict[str, list[str]] = {}
     for cause in found.attribution.causes:
         indices = cause.candidate.entries
         pairs = [f"{simulator.parameters[i][1].name}={fit.flights[0].point[i]:.6g}" for i in indices]
         if cause.candidate.effect != "derivative_error":
-            options.append(":".join([cause.candidate.effect, *pairs]))
-    return options
+            options.setdefault(cause.candidate.effect, []).extend(pairs)
+    return [":".join([effect, *dict.fromkeys(pairs)]) for effect, pairs in options.items()]

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
+from sysid_node.sim.export.cells import finite, plain
 from sysid_node.sim.export.polar import polar_of
 
 #: The plugin's name of each coefficient.
@@ -33,20 +34,20 @@ def gazebo_plugin(aircraft: Aircraft, effects: Mapping[str, Mapping[str, float]]
         raise InputError(
             f"effect {next(iter(effects))!r} cannot be exported to gazebo: its plugin has derivatives only"
         )
-    root = Element("model", name=aircraft.name)
+    root = Element("model", name=plain(aircraft.name))
     root.append(Comment(_NOTE))
     _inertial(SubElement(root, "link", name="base_link"), aircraft)
     name = "gz::sim::systems::AdvancedLiftDrag"
     plugin = SubElement(root, "plugin", filename="gz-sim-advanced-lift-drag-system", name=name)
     for tag, value in (_airframe(aircraft) | _stability(aircraft)).items():
-        SubElement(plugin, tag).text = value if isinstance(value, str) else f"{value:.9g}"
+        SubElement(plugin, tag).text = value if isinstance(value, str) else f"{finite(value):.9g}"
     surfaces = _surfaces(aircraft)
     SubElement(plugin, "num_ctrl_surfaces").text = str(len(surfaces))
     for joint, values in surfaces.items():
         surface = SubElement(plugin, "control_surface")
-        SubElement(surface, "name").text = joint
+        SubElement(surface, "name").text = plain(joint)
         for tag, number in {"direction": 1.0, **values}.items():
-            SubElement(surface, tag).text = f"{number:.9g}"
+            SubElement(surface, tag).text = f"{finite(number):.9g}"
     indent(root, "  ")
     return tostring(root, encoding="unicode") + "\n"
 
@@ -54,11 +55,11 @@ def gazebo_plugin(aircraft: Aircraft, effects: Mapping[str, Mapping[str, float]]
 def _inertial(link: Element, aircraft: Aircraft) -> None:
     """Mass and inertia, forward-left-up: there the tensor's xz entry is the usual Ixz itself."""
     inertial, inertia = SubElement(link, "inertial"), aircraft.inertia
-    SubElement(inertial, "mass").text = f"{aircraft.mass:.9g}"
+    SubElement(inertial, "mass").text = f"{finite(aircraft.mass):.9g}"
     tensor = SubElement(inertial, "inertia")
     entries = {"ixx": inertia.Ixx, "ixy": 0.0, "ixz": inertia.Ixz, "iyy": inertia.Iyy, "iyz": 0.0, "izz": inertia.Izz}
     for tag, value in entries.items():
-        SubElement(tensor, tag).text = f"{value:.9g}"
+        SubElement(tensor, tag).text = f"{finite(value):.9g}"
 
 
 def _airframe(aircraft: Aircraft) -> dict[str, str | float]:

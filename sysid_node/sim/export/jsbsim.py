@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS, split_derivative
 from sysid_node.errors import InputError
+from sysid_node.sim.export.cells import finite, plain
 
 #: Effects that JSBSim's own blocks can express.
 EFFECTS = (
@@ -47,7 +48,7 @@ def jsbsim_model(aircraft: Aircraft, effects: Effects | None = None) -> str:
         raise InputError(
             f"effect {unsupported[0]!r} cannot be exported to jsbsim; those that can: {', '.join(EFFECTS)}"
         )
-    root = Element("fdm_config", name=aircraft.name, version="2.0", release="BETA")
+    root = Element("fdm_config", name=plain(aircraft.name), version="2.0", release="BETA")
     header = SubElement(root, "fileheader")
     _text(header, "author", "sysid export")
     _text(header, "description", aircraft.source or aircraft.name)
@@ -64,7 +65,7 @@ def jsbsim_model(aircraft: Aircraft, effects: Effects | None = None) -> str:
 
 def _text(parent: Element, tag: str, text: str | float, **attributes: str) -> Element:
     element = SubElement(parent, tag, attributes)
-    element.text = text if isinstance(text, str) else repr(float(text))
+    element.text = plain(text) if isinstance(text, str) else repr(finite(text))
     return element
 
 

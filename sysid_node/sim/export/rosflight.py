@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
+from sysid_node.sim.export.cells import finite, plain
 from sysid_node.sim.export.polar import polar_of
 
 _NAMES = {"CL": "C_L", "CD": "C_D", "CY": "C_Y", "Cl": "C_ell", "Cm": "C_m", "Cn": "C_n"}
@@ -36,7 +37,7 @@ def rosflight_parameters(aircraft: Aircraft, effects: Mapping[str, Mapping[str, 
         raise InputError(f"control {unsupported[0]!r}: rosflight_sim knows elevator, aileron and rudder only")
     travel = {control.symbol: control.limit or 1.0 for control in aircraft.controls.values()}
     limits = ", ".join(f"{control.symbol} {travel[control.symbol]:g} rad" for control in aircraft.controls.values())
-    lines = [_HEADER.format(name=aircraft.name, limits=limits, mass=aircraft.mass, inertia=aircraft.inertia)]
+    lines = [_HEADER.format(name=plain(aircraft.name), limits=limits, mass=aircraft.mass, inertia=aircraft.inertia)]
     lines += ["/**:", "  ros__parameters:"]
     lines += [f"    {name}: {_number(value)}" for name, value in _parameters(aircraft, travel).items()]
     return "\n".join(lines) + "\n"
@@ -76,5 +77,5 @@ def _parasitic(aircraft: Aircraft, value: Mapping[str, float]) -> float:
 
 def _number(value: float) -> str:
     """A YAML float; ROS would take 1 for an integer and refuse it."""
-    text = f"{value:.9g}"
+    text = f"{finite(value):.9g}"
     return text if any(mark in text for mark in ".en") else f"{text}.0"

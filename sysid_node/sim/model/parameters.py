@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysid_node.errors import InputError
 from sysid_node.sim.effects import EFFECTS, Parameter
 from sysid_node.sim.model.layout import Layout, Scalar, Values
+from sysid_node.suggestion import did_you_mean
 
 
 @cache
@@ -56,8 +57,12 @@ def vector(layout: Layout, effects: Mapping[str, Mapping[str, float]]) -> NDArra
     index = {name: i for i, name in enumerate(names(layout))}
     for effect, values in effects.items():
         known = {p.name: p for p in _parameters(layout, effect)}
+        given: set[str] = set()
         for key, value in values.items():
             parameter, inner = _resolve(effect, known, key, value)
+            if parameter.name in given:
+                raise InputError(f"effect {effect}: {parameter.name!r} is given twice, also as {key!r}; keep one")
+            given.add(parameter.name)
             theta[index[f"{effect}.{parameter.name}"]] = inner
         switches = [p for p in known.values() if p.switch]
         if all(theta[index[f"{effect}.{p.name}"]] == p.neutral for p in switches):
@@ -71,10 +76,16 @@ def parse(specs: Sequence[str]) -> dict[str, dict[str, float]]:
     for spec in specs:
         name, *pairs = spec.split(":")
         _known_effect(name)
+        if name in effects:
+            raise InputError(
+                f"effect {name!r} is given twice; give one with all of its keys, as {name}:key=value:key=value"
+            )
         for pair in pairs:
             key, _, text = pair.partition("=")
+            if key in effects.setdefault(name, {}):
+                raise InputError(f"effect {spec!r}: {key!r} is given twice; keep one")
             try:
-                effects.setdefault(name, {})[key] = float(text)
+                effects[name][key] = float(text)
             except ValueError:
                 raise InputError(
                     f"effect {spec!r}: {pair!r}: expected key=number, e.g. actuator_lag:time_constant=0.05"
@@ -85,7 +96,7 @@ def parse(specs: Sequence[str]) -> dict[str, dict[str, float]]:
 
 def _known_effect(name: str) -> None:
     if name not in EFFECTS:
-        raise InputError(f"effect {name!r} is not known; known: {', '.join(EFFECTS)}")
+        raise InputError(f"effect {name!r} is not known; known: {', '.join(EFFECTS)}{did_you_mean(name, EFFECTS)}")
 
 
 def _parameters(layout: Layout, effect: str) -> tuple[Parameter, ...]:
@@ -98,7 +109,8 @@ def _resolve(effect: str, known: Mapping[str, Parameter], key: str, value: float
     by_everyday_name = {p.reciprocal: p for p in known.values() if p.reciprocal}
     parameter = known.get(key) or by_everyday_name.get(key)
     if parameter is None:
-        raise InputError(f"effect {effect}: {key!r} is not known; known: {', '.join([*known, *by_everyday_name])}")
+        keys = [*known, *by_everyday_name]
+        raise InputError(f"effect {effect}: {key!r} is not known; known: {', '.join(keys)}{did_you_mean(key, keys)}")
     inner = value if key in known else (1.0 / value if value else math.inf)
     if not (math.isfinite(inner) and parameter.lower <= inner <= parameter.upper):
         raise InputError(f"effect {effect}: {key}={value:g} is impossible; expected {_range(parameter, key)}")
