@@ -1,7 +1,8 @@
 """``sysid``: finds the command, runs it, and turns an error into one line and an exit code.
 
-A command is the module of its name beside this one. It has ``add_parser(commands)``, which adds its parser to
-argparse's ``commands`` and returns it, and ``run(args)``. Only the module of the command that is run is imported.
+A command is the module of its name beside this one; that of ``import`` is ``import_model``. It has
+``add_parser(commands)``, which adds its parser to argparse's ``commands`` and returns it, and ``run(args)``. Only the
+module of the command that is run is imported.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ COMMANDS = {
     "gap": "find why the simulator does not fly like the aircraft",
     "convert": "turn a flight log into a bag",
     "export": "write an estimate as another simulator's model",
+    "import": "read another simulator's model as an aircraft file",
     "report": "write report.html again from the files of a run",
     "view": "show a flight in 3-D and against time",
     "demo": "identify a recorded flight live, over DDS",
@@ -92,7 +94,7 @@ def _run(command: str, arguments: Sequence[str]) -> int:
             warnings.simplefilter("ignore", RuntimeWarning)
         later: list[str] = []
         warnings.showwarning = _show_warning(command, warnings.showwarning, later)
-        import_module(f"sysid_node.cli.{command}").run(args)
+        import_module(module_of(command)).run(args)
     for line in dict.fromkeys(later):
         print(line, file=sys.stderr)
     return DONE
@@ -115,16 +117,21 @@ def exit_code(command: str, work: Callable[[], int], *, debug: bool = False) -> 
         return _say(command, f"failed: {type(error).__name__}: {error} (more with --debug)", FAILED)
 
 
+def module_of(command: str) -> str:
+    """The name of a command's module: its own, but for a command that is a word of the language."""
+    return f"sysid_node.cli.{'import_model' if command == 'import' else command}"
+
+
 def build_parser(command: str) -> Parser:
     """The parser of all commands, with the arguments of one."""
     parser = Parser(prog="sysid", description="Identify a fixed-wing aircraft in flight and at the desk.")
     parser.add_argument("--debug", action="store_true", help="print the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, meaning in COMMANDS.items():
-        if find_spec(f"sysid_node.cli.{name}") is None:
+        if find_spec(module_of(name)) is None:
             continue  # this command belongs to a layer that is not installed
         if name == command:
-            one = import_module(f"sysid_node.cli.{name}").add_parser(commands)
+            one = import_module(module_of(name)).add_parser(commands)
             one.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
         else:
             commands.add_parser(name, help=meaning)

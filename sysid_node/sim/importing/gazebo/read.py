@@ -1,0 +1,284 @@
+"""Reads a Gazebo model into an aircraft file's contents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Control, Geometry, Inertia
+from sysid_node.errors import InputError
+from sysid_node.sim.importing.gazebo.advanced_lift_drag import AdvancedLiftDrag
+from sysid_node.sim.importing.gazebo.controls import controls_of, joint_angles
+from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
+from sysid_node.sim.importing.gazebo.sdf import Model, masses, number_in, read_sdf
+from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.plant import Plant, States, aircraft_of, nondimensional
+
+Array = NDArray[np.float64]
+
+#: From forward-left-up to forward-right-down and back.
+_TURN = np.array([1.0, -1.0, -1.0])
+
+_ALPHA = np.deg2rad(np.arange(-16.0, 24.01, 1.0))
+_BETA = np.deg2rad([-15.0, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0])
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """A MulticopterMotorModel: thrust k w^2 along the rotor link's z axis, drag and torques by its coefficients."""
+
+    joint: str
+    place: Array  # from the centre of gravity, m, forward-right-down
+    axis: Array
+    constants: Mapping[str, float]
+    turning: float  # 1 counter-clockwise, -1 clockwise
+
+    @property
+    def full_thrust(self) -> float:
+        """N."""
+        return self.constants["motorConstant"] * self.constants["maxRotVelocity"] ** 2
+
+
+def read_gazebo(path: Path, airspeed: float | None = None) -> Imported:
+    """The aircraft of an SDF with AdvancedLiftDrag or LiftDrag plugins. Raises InputError."""
+    model = read_sdf(path)
+    simple = [LiftDrag.of(p, model.file) for p in model.plugins_named("LiftDrag", "LiftDragPlugin")]
+    advanced = [AdvancedLiftDrag.of(p, model.file) for p in model.plugins_named("AdvancedLiftDrag")]
+    if not simple and not advanced:
+        raise InputError(
+            f"{path}: model {model.name!r} has no plugin LiftDrag or AdvancedLiftDrag; nothing is to be read"
+        )
+    missing = {name for name in (*(w.link for w in simple), *(w.link for w in advanced)) if name not in model.links}
+    if missing:
+        raise InputError(f"{path}: a lift-drag plugin names the link {min(missing)!r}, which the model does not have")
+    mass, centre, inertia = masses(model)
+    geometry, density = _geometry(simple, advanced)
+    loads = _Loads(model, centre, simple, advanced, _rotor(model, centre))
+    controls = controls_of(_power(loads, geometry, density), _limits(model, loads.joints))
+    loads.controls = controls
+    plant = Plant(
+        name=model.name,
+        source=f"Gazebo's model {model.name} in {path.name}",
+        mass=mass,
+        inertia=Inertia(*(float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 2)))),
+        geometry=geometry,
+        density=density,
+        controls=controls,
+        air=loads.air,
+        engine=loads.engine if loads.rotor else None,
+        nodes=_nodes(simple, advanced),
+        effects=_effects(model, controls, loads.rotor),
+        throttle_joint=loads.rotor.joint if loads.rotor else "throttle",
+        full_thrust=loads.rotor.full_thrust if loads.rotor else None,
+    )
+    aircraft, level = aircraft_of(plant, airspeed)
+    return Imported(aircraft, tuple(_notes(model, loads, level.throttle, bool(simple), bool(advanced))))
+
+
+class _Loads:
+    """Sums the loads of all plugins about the centre of gravity, forward-right-down."""
+
+    def __init__(
+        self,
+        model: Model,
+        centre: Array,
+        simple: Sequence[LiftDrag],
+        advanced: Sequence[AdvancedLiftDrag],
+        rotor: Rotor | None,
+    ) -> None:
+        self._simple, self._advanced, self.rotor = simple, advanced, rotor
+        self._origin = {name: body.pose for name, body in model.links.items()}
+        self._centre = centre
+        self.controls: Mapping[str, Control] = {}
+        joints = [wing.joint for wing in simple if wing.joint] + [j for wing in advanced for j in wing.joints]
+        self.joints = tuple(dict.fromkeys(joints))
+
+    def air(self, s: States) -> Array:
+        """Loads (N, 6) of the wings, and of the rotor's drag and torques."""
+        angles = joint_angles(self.controls, s.controls)
+        return self.of_joints(s, angles)
+
+    def of_joints(self, s: States, angles: Mapping[str, Array]) -> Array:
+        """The same by the joints' angles."""
+        velocity, rates = _motion(s)
+        total = np.zeros((len(s.airspeed), 6))
+        for wing in self._simple:
+            pose = self._origin[wing.link]
+            arm = _TURN * (pose.place + pose.axes.apply(wing.place) - self._centre)
+            at = (velocity + np.cross(rates, arm)) * _TURN
+            force = wing.force(pose.axes.inv().apply(at), angles.get(wing.joint, np.zeros(len(at))))
+            total += _about(pose.axes.apply(force) * _TURN, arm)
+        for whole in self._advanced:
+            arm = _TURN * (self._origin[whole.link].place + whole.place - self._centre)
+            force, moment = whole.load(velocity + np.cross(rates, arm), rates, angles)
+            total += _about(force, arm)
+            total[:, 3:] += moment
+        return total + self._rotor_drag(s, velocity, rates)
+
+    def _rotor_drag(self, s: States, velocity: Array, rates: Array) -> Array:
+        if self.rotor is None:
+            return np.zeros((len(velocity), 6))
+        rotor, k = self.rotor, self.rotor.constants
+        speed = k["maxRotVelocity"] * np.sqrt(np.maximum(s.throttle, 0.0))
+        at = velocity + np.cross(rates, rotor.place)
+        across = at - np.outer(at @ rotor.axis, rotor.axis)
+        total = _about(-(speed * k["rotorDragCoefficient"])[:, None] * across, rotor.place)
+        thrust = k["motorConstant"] * speed**2
+        total[:, 3:] -= rotor.turning * np.outer(thrust * k["momentConstant"], rotor.axis)
+        total[:, 3:] -= (speed * k["rollingMomentCoefficient"])[:, None] * across
+        return total
+
+    def engine(self, s: States) -> Array:
+        """Loads (N, 6) of the thrust."""
+        assert self.rotor is not None
+        thrust = self.rotor.full_thrust * s.throttle
+        return _about(np.outer(thrust, self.rotor.axis), self.rotor.place)
+
+
+def _motion(s: States) -> tuple[Array, Array]:
+    forward = s.airspeed * np.cos(s.beta)
+    velocity = [forward * np.cos(s.alpha), s.airspeed * np.sin(s.beta), forward * np.sin(s.alpha)]
+    return np.column_stack(velocity), np.column_stack([s.p, s.q, s.r])
+
+
+def _about(force: Array, arm: Array) -> Array:
+    """Loads (N, 6) of a force (N, 3) at a point (3,)."""
+    return np.hstack([force, np.cross(np.broadcast_to(arm, force.shape), force)])
+
+
+def _geometry(simple: Sequence[LiftDrag], advanced: Sequence[AdvancedLiftDrag]) -> tuple[Geometry, float]:
+    """Reference sizes and density: the plugin's own, or of separate surfaces the sum of the horizontal ones' areas.
+
+    A LiftDrag plugin states neither span nor chord; the span is twice the largest distance of a surface's place from
+    the middle and of its own half width, the chord the area over the span.
+    """
+    if advanced:
+        whole = advanced[0]
+        return Geometry(whole.values["area"], whole.span, whole.chord), whole.values["air_density"]
+    wings = [wing for wing in simple if abs(wing.upward[2]) > 0.7]
+    area = sum(wing.area for wing in wings)
+    places = sorted({round(abs(float(wing.place[1])), 6) for wing in wings})
+    reach = places[-1] + (0.5 * (places[-1] - places[-2]) if len(places) > 1 else 0.0)
+    span = 2.0 * reach if reach > 0.0 else math.sqrt(6.0 * area)
+    return Geometry(area, span, area / span), simple[0].density
+
+
+def _nodes(simple: Sequence[LiftDrag], advanced: Sequence[AdvancedLiftDrag]) -> dict[str, Array]:
+    """Nodes of alpha and beta; alpha has those where the plugins' curves have kinks."""
+    kinks = [sign * whole.values["alpha_stall"] for whole in advanced for sign in (-1.0, 1.0)]
+    for wing in simple:
+        kinks += [-wing.alpha0, wing.alpha_stall - wing.alpha0, -wing.alpha_stall - wing.alpha0]
+    inside = [k for k in kinks if _ALPHA[0] < k < _ALPHA[-1]]
+    return {"alpha": np.unique([*_ALPHA, *inside]), "beta": _BETA}
+
+
+def _power(loads: _Loads, geometry: Geometry, density: float) -> dict[str, Array]:
+    """Each joint's coefficients per rad (6,) at a small angle of attack."""
+    one = np.ones(2)
+    states = States(20.0 * one, 0.05 * one, 0.0 * one, 0.0 * one, 0.0 * one, 0.0 * one, {}, 0.0 * one)
+    power = {}
+    for joint in loads.joints:
+        angles = dict.fromkeys(loads.joints, 0.0 * one) | {joint: np.array([-0.01, 0.01])}
+        found = nondimensional(loads.of_joints(states, angles), density, states, geometry)
+        power[joint] = (found[1] - found[0]) / 0.02
+    return power
+
+
+def _limits(model: Model, joints: Sequence[str]) -> dict[str, float]:
+    """The largest angle of each joint both ways, rad, of those that have limits."""
+    limits = {}
+    for joint in joints:
+        ends = [model.joint_number(joint, f"axis/limit/{end}") for end in ("lower", "upper")]
+        known = [abs(end) for end in ends if end is not None]
+        if known:
+            limits[joint] = min(known)
+    return limits
+
+
+def _effects(model: Model, controls: Mapping[str, Control], rotor: Rotor | None) -> dict[str, dict[str, float]]:
+    """Servos and motor: a position controller against a joint's damping is a lag of damping over gain."""
+    lag = {}
+    servos = {(p.findtext("joint_name") or "").strip(): p for p in model.plugins_named("JointPositionController")}
+    for name, control in controls.items():
+        times = [_servo_lag(model, joint, servos[joint]) for joint in control.joints if joint in servos]
+        if times and max(times) > 0.0:
+            lag[name] = sum(times) / len(times)
+    effects = {"actuator_lag": lag} if lag else {}
+    if rotor is not None:
+        up, down = rotor.constants["timeConstantUp"], rotor.constants["timeConstantDown"]
+        if up + down > 0.0:
+            effects["motor_lag"] = {"time_constant": 0.5 * (up + down)}
+    return effects
+
+
+def _servo_lag(model: Model, joint: str, controller: Element) -> float:
+    """Time constant (s) of P (command - angle) - D rate = (damping) rate; the surfaces' inertia is neglected."""
+    gain, rate_gain = (
+        number_in(controller, tag, value, model.file) for tag, value in (("p_gain", 1.0), ("d_gain", 0.1))
+    )
+    damping = model.joint_number(joint, "axis/dynamics/damping") or 0.0
+    return (damping + (rate_gain if controller.find("d_gain") is not None else 0.0)) / gain if gain > 0.0 else 0.0
+
+
+def _rotor(model: Model, centre: Array) -> Rotor | None:
+    motors = model.plugins_named("MulticopterMotorModel")
+    if not motors:
+        return None
+    plugin = motors[0]
+    link = (plugin.findtext("linkName") or "").strip()
+    if link not in model.links:
+        raise InputError(f"{model.file}: the motor's link {link!r} is not in the model")
+    names = {
+        "motorConstant": 8.54858e-06,
+        "momentConstant": 0.016,
+        "maxRotVelocity": 838.0,
+        "rotorDragCoefficient": 1e-4,
+        "rollingMomentCoefficient": 1e-6,
+        "timeConstantUp": 0.0125,
+        "timeConstantDown": 0.025,
+    }
+    body = model.links[link]
+    return Rotor(
+        joint=(plugin.findtext("jointName") or "throttle").strip(),
+        place=_TURN * (body.centre - centre),
+        axis=_TURN * body.pose.axes.apply(np.array([0.0, 0.0, 1.0])),
+        constants={name: number_in(plugin, name, default, model.file) for name, default in names.items()},
+        turning=-1.0 if (plugin.findtext("turningDirection") or "").strip() == "cw" else 1.0,
+    )
+
+
+def _notes(model: Model, loads: _Loads, throttle: float, simple: bool, advanced: bool) -> list[str]:
+    notes = []
+    if simple:
+        notes.append("LiftDrag states no span and no chord: those of the file only make coefficients non-dimensional.")
+    if advanced:
+        notes.append("The pitching moment has Cem0 and Cema; gz-sim before the fix of pull request 3817 drops them.")
+    notes.append(
+        "At the points of any two variables the tables are exact; between them they are linear (1 degree of alpha), "
+        "and what three variables only do together is left out."
+    )
+    if loads.rotor is not None:
+        notes.append(
+            "The throttle is the share of full thrust, (rotor speed / maxRotVelocity)^2; the rotor's drag and torques "
+            f"are those at {throttle:.2f}."
+        )
+        up, down = loads.rotor.constants["timeConstantUp"], loads.rotor.constants["timeConstantDown"]
+        if up != down:
+            notes.append(f"The motor's lag is the mean of {up:g} s (up) and {down:g} s (down).")
+    motors = model.plugins_named("MulticopterMotorModel")
+    if len(motors) > 1:
+        notes.append(f"Of {len(motors)} motors only the first is held; a file has one throttle.")
+    if any(model.includes):
+        notes.append(f"Masses of included models ({', '.join(filter(None, model.includes))}) are not counted.")
+    if any(
+        (p.findtext("i_gain") or "0").strip() not in ("", "0", "0.0")
+        for p in model.plugins_named("JointPositionController")
+    ):
+        notes.append("Integral gains of the joints' controllers are not held.")
+    return notes

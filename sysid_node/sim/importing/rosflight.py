@@ -1,0 +1,214 @@
+"""Reads the parameters of ROSflight's fixed-wing simulation (rosflight_sim, fixedwing_forces_and_moments).
+
+Its equations are those of Beard & McLain (2012), "Small Unmanned Aircraft", ch. 4. Versions that know
+``max_elevator_deflection_angle`` take deflections in rad and do not blend to a flat plate at stall; older ones take
+deflections from -1 to 1 and blend. A file belongs to the first where it states such an angle.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Control, Geometry, Inertia
+from sysid_node.errors import InputError
+from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.plant import Plant, States, aircraft_of
+
+Array = NDArray[np.float64]
+
+#: ROSflight's letter of each control, and the sign of the aircraft file's: there, aileron rolls left.
+_CONTROLS = {"elevator": ("de", "e", 1.0), "aileron": ("da", "a", -1.0), "rudder": ("dr", "r", 1.0)}
+_ANGLE = "max_{}_deflection_angle"
+
+_ALPHA = np.deg2rad(np.arange(-20.0, 30.01, 0.5))
+_BETA = np.array([-0.3, 0.0, 0.3])
+
+_PROPELLER = ("D_prop", "CT_0", "CT_1", "CT_2", "CQ_0", "CQ_1", "CQ_2", "KQ", "V_max", "R_motor", "I_0")
+
+#: Where ROSflight's own files have masses and inertias besides parameters: comments such as ``# Jx: 0.25``.
+_COMMENT = re.compile(r"^#\s*(mass|Jx|Jy|Jz|Jxz)\s*:\s*([-+0-9.eE]+)\s*$", re.IGNORECASE | re.MULTILINE)
+
+
+def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
+    """The aircraft of a parameter file, expanded about level flight at ``airspeed`` (m/s). Raises InputError."""
+    parameters, comments = _read(path)
+    get = _Getter(parameters, comments, path)
+    new = any(_ANGLE.format(name) in parameters for name in _CONTROLS)
+    angles = {name: math.radians(get.or_else(_ANGLE.format(name), 40.0)) if new else 1.0 for name in _CONTROLS}
+    controls = {
+        name: Control(name, symbol, {name: sign}, limit=min(angles[name], math.pi / 2))
+        for name, (symbol, _, sign) in _CONTROLS.items()
+    }
+    powered = all(name in parameters for name in _PROPELLER)
+    model = _Model(get, blend=not new, powered=powered)
+    lag = get.or_else("servo_tau", 0.0)
+    effects = {"actuator_lag": dict.fromkeys(("elevator", "aileron"), lag)} if lag else {}
+    plant = Plant(
+        name=path.stem,
+        source=f"parameters of rosflight_sim in {path.name}",
+        mass=get("mass"),
+        inertia=Inertia(get("Jxx"), get("Jyy"), get("Jzz"), get.or_else("Jxz", 0.0)),
+        geometry=model.geometry,
+        density=model.density,
+        controls=controls,
+        air=model.air,
+        engine=model.engine if powered else None,
+        nodes={"alpha": _ALPHA, "beta": _BETA},
+        effects=effects,
+    )
+    aircraft, level = aircraft_of(plant, airspeed)
+    notes = _notes(new, lag, level.throttle if powered else None, level.airspeed)
+    if get.or_else("C_D_p", 0.0) <= 0.0:
+        notes.append(
+            "C_D_p is zero: rosflight_sim takes the parasitic drag from it (not from C_D_O), so there is none."
+        )
+    return Imported(aircraft, tuple(notes))
+
+
+def _notes(new: bool, lag: float, throttle: float | None, airspeed: float) -> list[str]:
+    notes = [
+        "Deflections are in rad, and the lift is linear: the file states a largest deflection, as versions of "
+        "rosflight_sim do that do not blend at stall."
+        if new
+        else "Deflections run from -1 to 1 (per full deflection, not rad), and the lift blends to a flat plate's at "
+        "wing_alpha0: the file states no max_elevator_deflection_angle, as older versions of rosflight_sim."
+    ]
+    notes.append("Between the tables' points, 0.5 degrees of alpha apart, the values are interpolated.")
+    if lag:
+        notes.append(
+            f"servo_tau = {lag:g} s acts on elevator and aileron; rosflight_sim moves the rudder without a lag."
+        )
+    if throttle is None:
+        notes.append("The file has no propeller and motor; the aircraft file has no throttle.")
+    else:
+        notes.append(
+            f"Thrust is exact at throttle {throttle:.3f} for all airspeeds (tables over V) and proportional to the "
+            f"throttle at {airspeed:.1f} m/s; the rotor's curve over the throttle is not held."
+        )
+    return notes
+
+
+#: The names in such comments.
+_ALIASES = {"Jxx": "jx", "Jyy": "jy", "Jzz": "jz", "Jxz": "jxz", "mass": "mass"}
+
+
+class _Getter:
+    """Numbers by name, with errors that name the file and the key."""
+
+    def __init__(self, parameters: Mapping[str, Any], comments: Mapping[str, float], path: Path) -> None:
+        self._parameters, self._comments, self._path = parameters, comments, path
+
+    def __call__(self, name: str) -> float:
+        if name not in self._parameters:
+            comment = self._comments.get(_ALIASES.get(name, ""))
+            if comment is not None:
+                return comment
+            raise InputError(f"{self._path}: {name} is missing; rosflight_sim needs it, and so does an aircraft file")
+        value = self._parameters[name]
+        if isinstance(value, str) and _is_number(value):  # -.99 is a number to ROS, and text to YAML 1.1
+            value = float(value)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{self._path}: {name}: got {value!r}, expected a number")
+        return float(value)
+
+    def or_else(self, name: str, default: float) -> float:
+        """The number, or the default where the file has none."""
+        known = name in self._parameters or _ALIASES.get(name, "") in self._comments
+        return self(name) if known else default
+
+
+class _Model:
+    """ROSflight's loads."""
+
+    def __init__(self, get: _Getter, *, blend: bool, powered: bool) -> None:
+        self.geometry = Geometry(get("wing_s"), get("wing_b"), get("wing_c"))
+        self.density = get("rho")
+        if not (min(self.geometry.S, self.geometry.b, self.geometry.cbar) > 0.0 and self.density > 0.0):
+            raise InputError("rosflight parameters wing_s, wing_b, wing_c and rho must be positive; check the file")
+        self._blend, self._M, self._alpha0 = blend, get("wing_M"), get("wing_alpha0")
+        regressors = ("O", "alpha", "beta", "p", "q", "r", "delta_a", "delta_e", "delta_r")
+        self._c = {
+            f"{c}_{r}": get.or_else(f"C_{c}_{r}", 0.0) for c in ("L", "D", "ell", "m", "n", "Y") for r in regressors
+        }
+        self._prop = {name: get(name) for name in _PROPELLER} if powered else {}
+
+    def air(self, s: States) -> Array:
+        """Loads (N, 6) of the airframe."""
+        c, geometry = self._c, self.geometry
+        p, r = (rate * geometry.b / (2.0 * s.airspeed) for rate in (s.p, s.r))
+        q = s.q * geometry.cbar / (2.0 * s.airspeed)
+        deflection = {letter: sign * s.controls[symbol] for symbol, letter, sign in _CONTROLS.values()}
+        attached = c["L_O"] + c["L_alpha"] * s.alpha
+        lift = self._blended(s.alpha, attached) + c["L_q"] * q + c["L_delta_e"] * deflection["e"]
+        induced = attached**2 / (3.14159 * 0.9 * geometry.b**2 / geometry.S)  # rosflight_sim's own pi and efficiency
+        drag = c["D_p"] + induced + c["D_q"] * q + c["D_delta_e"] * deflection["e"]
+        lateral = [
+            c[f"{n}_O"] + c[f"{n}_beta"] * s.beta + c[f"{n}_p"] * p + c[f"{n}_r"] * r
+            + c[f"{n}_delta_a"] * deflection["a"] + c[f"{n}_delta_r"] * deflection["r"]
+            for n in ("Y", "ell", "n")
+        ]  # fmt: skip
+        pitch = c["m_O"] + c["m_alpha"] * s.alpha + c["m_q"] * q + c["m_delta_e"] * deflection["e"]
+        sin, cos = np.sin(s.alpha), np.cos(s.alpha)
+        scale = 0.5 * self.density * s.airspeed**2 * geometry.S
+        b, cbar = geometry.b, geometry.cbar
+        rows = [-drag * cos + lift * sin, lateral[0], -drag * sin - lift * cos, b * lateral[1], cbar * pitch]
+        return np.column_stack([scale * row for row in (*rows, b * lateral[2])])
+
+    def _blended(self, alpha: Array, attached: Array) -> Array:
+        """Lift of the wing: blended to a flat plate's at stall (Beard & McLain, eqs. 4.9 and 4.10)."""
+        if not self._blend:
+            return attached
+        below, above = np.exp(-self._M * (alpha - self._alpha0)), np.exp(self._M * (alpha + self._alpha0))
+        sigma = (1.0 + below + above) / ((1.0 + below) * (1.0 + above))
+        plate = 2.0 * np.where(alpha >= 0.0, 1.0, -1.0) * np.sin(alpha) ** 2 * np.cos(alpha)
+        return np.asarray((1.0 - sigma) * attached + sigma * plate)
+
+    def engine(self, s: States) -> Array:
+        """Loads (N, 6) of motor and propeller: their balance of torques gives the rotor's speed (sec. 4.3 there)."""
+        g, rho, speed = self._prop, self.density, s.airspeed
+        D, turn = g["D_prop"], 2.0 * math.pi
+        a = g["CQ_0"] * rho * D**5 / turn**2
+        b = g["CQ_1"] * rho * D**4 / turn * speed + g["KQ"] ** 2 / g["R_motor"]
+        c = g["CQ_2"] * rho * D**3 * speed**2 - g["KQ"] / g["R_motor"] * g["V_max"] * s.throttle + g["KQ"] * g["I_0"]
+        omega = (-b + np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))) / (2.0 * a)
+        thrust, torque = (
+            rho * D ** (4 + n) * (g[f"{k}_0"] * (omega / turn) ** 2)
+            + rho * D ** (3 + n) * g[f"{k}_1"] * speed * omega / turn
+            + rho * D ** (2 + n) * g[f"{k}_2"] * speed**2
+            for k, n in (("CT", 0), ("CQ", 1))
+        )
+        zero = np.zeros_like(speed)
+        return np.column_stack([thrust, zero, zero, -torque, zero, zero])
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
+    """All parameters of all nodes of the file, and the numbers of comments such as ``# Jx: 0.25``."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        found = yaml.safe_load(text)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    except (yaml.YAMLError, RecursionError) as error:
+        raise InputError(f"{path}: not valid YAML: {str(error).splitlines()[0]}") from error
+    parameters: dict[str, Any] = {}
+    for node in found.values() if isinstance(found, dict) else ():
+        block = node.get("ros__parameters") if isinstance(node, dict) else None
+        parameters |= block if isinstance(block, dict) else {}
+    if "wing_s" not in parameters:
+        raise InputError(f"{path}: not parameters of rosflight_sim's fixed wing (no wing_s under ros__parameters)")
+    return parameters, {key.lower(): float(value) for key, value in _COMMENT.findall(text) if _is_number(value)}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

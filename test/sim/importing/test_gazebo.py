@@ -1,0 +1,265 @@
+"""Gazebo's models read in. Truth: the equations of gz-sim's LiftDrag, AdvancedLiftDrag and MulticopterMotorModel.
+
+They are written here anew, one state at a time and in Gazebo's own axes (forward-left-up), as the sources state them.
+"""
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from aircraft_loads import loads, motion, planes, scales
+from level_flight import level_flight
+
+from sysid_node.errors import InputError
+from sysid_node.sim.importing.gazebo.read import read_gazebo
+
+SHARED = Path(__file__).resolve().parents[4] / "shared" / "models"
+FLIP = np.diag([1.0, -1.0, -1.0])
+
+#: A flying wing of our own: two surfaces with a joint each, a fin, and a motor.
+SMALL = """<sdf version="1.9"><model name="small wing">
+<link name="base"><inertial><pose>0.02 0 0.01 0 0 0</pose><mass>1.2</mass>
+<inertia><ixx>0.06</ixx><iyy>0.04</iyy><izz>0.1</izz><ixz>0.002</ixz></inertia></inertial></link>
+<link name="rotor"><pose>0.3 0 0 0 1.5707963 0</pose><inertial><mass>0.05</mass>
+<inertia><ixx>1e-5</ixx><iyy>1e-5</iyy><izz>1e-5</izz></inertia></inertial></link>
+{joints}
+{wings}
+<plugin filename="x" name="gz::sim::systems::MulticopterMotorModel">
+<jointName>spin</jointName><linkName>rotor</linkName>
+<turningDirection>ccw</turningDirection><timeConstantUp>0.02</timeConstantUp><timeConstantDown>0.02</timeConstantDown>
+<maxRotVelocity>900</maxRotVelocity><motorConstant>1.5e-05</motorConstant><momentConstant>0.01</momentConstant>
+<rotorDragCoefficient>8e-05</rotorDragCoefficient><rollingMomentCoefficient>1e-06</rollingMomentCoefficient></plugin>
+</model></sdf>"""
+
+
+def small(folder):
+    joint = (
+        '<joint name="{0}" type="revolute"><parent>base</parent><child>base</child><axis><xyz>0 1 0</xyz>'
+        "<limit><lower>-0.5</lower><upper>0.5</upper></limit><dynamics><damping>0.4</damping></dynamics></axis></joint>"
+        "<plugin filename='x' "
+        "name='gz::sim::systems::JointPositionController'><joint_name>{0}</joint_name><p_gain>8</p_gain></plugin>"
+    )
+    wing = (
+        "<plugin filename='x' name='gz::sim::systems::LiftDrag'><a0>{a0}</a0><cla>4.5</cla><cda>{cda}</cda>"
+        "<alpha_stall>0.32</alpha_stall><cla_stall>-3</cla_stall><cda_stall>-0.8</cda_stall><cp>{cp}</cp><area>{area}</area><air_density>1.2"
+        "</air_density><forward>1 0 0</forward><upward>{up}</upward><link_name>base</link_name>{joint}</plugin>"
+    )
+    moved = "<control_joint_name>{}</control_joint_name><control_joint_rad_to_cl>{}</control_joint_rad_to_cl>"
+    wings = [
+        wing.format(a0=0.06, cda=0.5, cp="0 0.4 0.02", area=0.2, up="0 0 1", joint=moved.format("left", -0.4)),
+        wing.format(a0=0.06, cda=0.5, cp="0 -0.4 0.02", area=0.2, up="0 0 1", joint=moved.format("right", -0.4)),
+        wing.format(a0=-0.03, cda=0.6, cp="-0.6 0 0.02", area=0.06, up="0 0 1", joint=moved.format("tail", -2.0)),
+        wing.format(a0=0.0, cda=0.6, cp="-0.6 0 0.1", area=0.04, up="0 1 0", joint=moved.format("fin", 1.5)),
+    ]
+    path = folder / "small.sdf"
+    path.write_text(
+        SMALL.format(joints="".join(joint.format(n) for n in ("left", "right", "tail", "fin")), wings="".join(wings))
+    )
+    return path
+
+
+def numbers(element, tag, default):
+    text = element.findtext(tag)
+    values = [float(part) for part in text.split()] if text else [default] if np.isscalar(default) else list(default)
+    return values[0] if len(values) == 1 else np.array(values)
+
+
+def lift_drag(plugin, velocity, joints):
+    """Force (3,) of one LiftDrag at its place, forward-left-up; after LiftDragPrivate::Update."""
+    get = lambda tag, default: numbers(plugin, tag, default)  # noqa: E731
+    forward, upward = get("forward", (1, 0, 0)), get("upward", (0, 0, 1))
+    span = np.cross(forward, upward)
+    direction = velocity / np.linalg.norm(velocity)
+    cos_sweep = 1.0 - np.clip(span @ direction, -1, 1) ** 2
+    in_plane = velocity - (velocity @ span) * span
+    drag_axis = -in_plane / np.linalg.norm(in_plane)
+    lift_axis = np.cross(span, in_plane)
+    lift_axis = lift_axis / np.linalg.norm(lift_axis)
+    turn = math.acos(np.clip(lift_axis @ upward, -1, 1))
+    alpha = get("a0", 0.0) + (turn if lift_axis @ forward >= 0 else -turn)
+    q = 0.5 * get("air_density", 1.2041) * (in_plane @ in_plane)
+    stall = get("alpha_stall", math.pi / 2)
+    values = {}
+    for name in ("cla", "cda"):
+        before, after = get(name, 1.0), get(f"{name}_stall", 0.0)
+        if alpha > stall:
+            values[name] = (before * stall + after * (alpha - stall)) * cos_sweep
+        elif alpha < -stall:
+            values[name] = (-before * stall + after * (alpha + stall)) * cos_sweep
+        else:
+            values[name] = before * alpha * cos_sweep
+    cl = max(values["cla"], 0.0) if alpha > stall else min(values["cla"], 0.0) if alpha < -stall else values["cla"]
+    joint = plugin.findtext("control_joint_name")
+    if joint:
+        cl += get("control_joint_rad_to_cl", 4.0) * joints[joint]
+    area = get("area", 1.0)
+    return cl * q * area * lift_axis + abs(values["cda"]) * q * area * drag_axis
+
+
+def advanced(plugin, velocity, rates, joints):
+    """Force (3,) at the place and moment (3,), forward-left-up; after AdvancedLiftDragPrivate::Update, Cem mended."""
+    get = lambda tag: numbers(plugin, tag, 0.0)  # noqa: E731
+    x, y, z = np.eye(3)[0], -np.eye(3)[1], -np.eye(3)[2]  # forward, right, down
+    in_plane = velocity - (velocity @ y) * y
+    speed = np.linalg.norm(in_plane)
+    sx = in_plane / speed
+    sz = np.cross(sx, y)
+    alpha, beta = math.atan2(sx @ z, sx @ x), math.atan2(velocity @ y, velocity @ x)
+    AR, area, stall = get("AR"), get("area"), get("alpha_stall")
+    span, mac = math.sqrt(area * AR), get("mac")
+    rr, pr, yr = rates[0], -rates[1], -rates[2]
+    M, a = 15.0, alpha
+    sigma = (1 + math.exp(-M * (a - stall)) + math.exp(M * (a + stall))) / (
+        (1 + math.exp(-M * (a - stall))) * (1 + math.exp(M * (a + stall)))
+    )
+    control = dict.fromkeys(("CL", "CD", "CY", "Cell", "Cem", "Cen"), 0.0)
+    for surface in plugin.findall("control_surface"):
+        angle = math.degrees(joints[surface.findtext("name")]) * float(surface.findtext("direction"))
+        for name in control:
+            control[name] += angle * float(surface.findtext(f"{name}_ctrl"))
+    CL = (1 - sigma) * (get("CL0") + get("CLa") * a) + sigma * 2 * np.sign(a) * math.sin(a) ** 2 * math.cos(a)
+    CL += get("CLb") * beta + control["CL"]
+    flat = 2 / (1 + math.exp(-0.224 - 0.115 * max(AR, 1 / AR)))
+    CD = (1 - sigma) * (get("CD0") + CL**2 / (math.pi * AR * get("eff"))) + sigma * abs(
+        flat * (0.5 - 0.5 * math.cos(2 * a))
+    )
+    CD += control["CD"]
+    Cem = get("Cem0") + get("Cema") * a
+    if abs(a) > stall:
+        Cem = get("Cem0") + math.copysign(stall, a) * get("Cema") + get("Cema_stall") * (a - math.copysign(stall, a))
+    steady = {"CL": CL, "CD": CD, "Cem": Cem + get("Cemb") * beta + control["Cem"]}
+    for name in ("CY", "Cell", "Cen"):
+        steady[name] = get(f"{name}a") * a + get(f"{name}b") * beta + control[name]
+    rho = get("air_density")
+    q, half = 0.5 * rho * speed**2, 0.5 * rho * speed
+    terms = {
+        n: v * q + half * (get(f"{n}p") * rr * span / 2 + get(f"{n}q") * pr * mac / 2 + get(f"{n}r") * yr * span / 2)
+        for n, v in steady.items()
+    }
+    force = area * (-terms["CL"] * sz - terms["CD"] * sx + terms["CY"] * y)
+    return force, area * (terms["Cem"] * mac * y + terms["Cell"] * span * x + terms["Cen"] * span * z)
+
+
+def rotor(plugin, velocity, share):
+    """Force (3,) at the rotor and torque (3,), forward-left-up, at a share of the full thrust."""
+    get = lambda tag: numbers(plugin, tag, 0.0)  # noqa: E731
+    axis = axis_of(plugin)
+    omega = get("maxRotVelocity") * math.sqrt(share)
+    thrust = get("motorConstant") * omega**2
+    across = velocity - (velocity @ axis) * axis
+    sign = -1 if plugin.findtext("turningDirection") == "cw" else 1
+    force = thrust * axis - omega * get("rotorDragCoefficient") * across
+    return force, -sign * thrust * get("momentConstant") * axis - omega * get("rollingMomentCoefficient") * across
+
+
+def axis_of(plugin):
+    """The rotor's z axis: both models pitch it forward."""
+    pitch = float(plugin.get("pitch"))
+    return np.array([math.sin(pitch), 0.0, math.cos(pitch)])
+
+
+def theirs(path, x, aircraft, throttle):
+    """Loads (N, 6) about the centre of gravity, forward-right-down, summed over all plugins."""
+    model = ElementTree.parse(path).getroot().find(".//model")
+    bodies = {}
+    for link in model.findall("link"):
+        inertial = link.find("inertial")
+        pose = np.array([float(v) for v in (link.findtext("pose") or "0 0 0 0 0 0").split()])
+        inner = (
+            np.array([float(v) for v in (inertial.findtext("pose") or "0 0 0 0 0 0").split()])
+            if inertial is not None
+            else pose
+        )
+        bodies[link.get("name")] = (pose, pose[:3] + inner[:3], float(inertial.findtext("mass")))
+    mass = sum(m for _, _, m in bodies.values())
+    centre = sum(m * c for _, c, m in bodies.values()) / mass
+    controls = list(aircraft.controls.values())
+    joints = sorted({j for c in controls for j in c.joints})
+    mixing = np.linalg.inv([[c.joints.get(j, 0.0) for j in joints] for c in controls])
+    velocity, rates = motion(aircraft, x)
+    result = []
+    for i in range(len(x["V"])):
+        angles = dict(zip(joints, mixing @ [x[c.symbol][i] for c in controls], strict=True))
+        v, w = FLIP @ velocity[i], FLIP @ rates[i]
+        total = np.zeros(6)
+        for plugin in model.findall("plugin"):
+            kind = plugin.get("name").rpartition("::")[2]
+            if kind in ("LiftDrag", "AdvancedLiftDrag"):
+                arm = numbers(plugin, "cp", (0, 0, 0)) - centre
+                at = v + np.cross(w, arm)
+                force, torque = (
+                    (lift_drag(plugin, at, angles), 0.0) if kind == "LiftDrag" else advanced(plugin, at, w, angles)
+                )
+            elif kind == "MulticopterMotorModel":
+                pose, place, _ = bodies[plugin.findtext("linkName")]
+                plugin.set("pitch", str(pose[4]))
+                arm = place - centre
+                force, torque = rotor(plugin, v + np.cross(w, arm), throttle)
+            else:
+                continue
+            total += np.concatenate([force, torque + np.cross(arm, force)])
+        result.append(np.concatenate([FLIP @ total[:3], FLIP @ total[3:]]))
+    return np.array(result)
+
+
+@pytest.mark.parametrize("name", ["small", "px4_advanced_plane", "px4_rc_cessna"])
+def test_loads_are_those_of_the_plugins_at_the_tables_points(tmp_path, name):
+    path = small(tmp_path) if name == "small" else SHARED / f"{name}.sdf"
+    if not path.is_file():
+        pytest.skip("the models of other projects are not here (../shared/models)")
+    aircraft = read_gazebo(path).aircraft
+    level = level_flight(aircraft)
+    x = planes(aircraft, level, 5)
+    error = loads(aircraft, x, level["throttle"] * aircraft.throttle.max_thrust) - theirs(
+        path, x, aircraft, level["throttle"]
+    )
+    assert np.abs(error / scales(aircraft, x)).max() < 1e-6
+
+
+def test_masses_servos_and_signs(tmp_path):
+    """1.25 kg at two places; a servo of gain 8 against damping 0.4 lags by 0.05 s; signs are the aircraft file's."""
+    aircraft = read_gazebo(small(tmp_path)).aircraft
+    assert aircraft.mass == pytest.approx(1.25)
+    apart = np.array([0.28, 0.0, -0.01])
+    reduced = 1.2 * 0.05 / 1.25
+    assert aircraft.inertia.Iyy == pytest.approx(0.04 + 1e-5 + reduced * (apart @ apart))
+    assert aircraft.inertia.Ixz == pytest.approx(0.002 - reduced * apart[0] * apart[2])
+    assert [u.value for u in aircraft.effects["actuator_lag"].values()] == pytest.approx(
+        [0.05] * len(aircraft.controls)
+    )
+    assert aircraft.effects["motor_lag"]["time_constant"].value == pytest.approx(0.02)
+    assert aircraft.throttle.max_thrust == pytest.approx(1.5e-5 * 900**2)
+    assert set(aircraft.controls["aileron"].joints) == {"left", "right"}
+    assert set(aircraft.controls["elevator"].joints) == {"tail"}
+    for name in ("Cm_de", "Cl_da", "Cn_dr"):
+        assert aircraft.derivatives[name].value < 0.0
+    assert aircraft.ideal
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<sdf/>", "has no <model>"),
+        ("<sdf><model name='m'/></sdf>", "has no links"),
+        ("<sdf><model name='m'><link name='l'/></model></sdf>", "no plugin LiftDrag or AdvancedLiftDrag"),
+        (
+            "<sdf><model name='m'><link name='l'/><plugin name='x::LiftDrag'><link_name>no</link_name></plugin>"
+            "</model></sdf>",
+            "names the link 'no'",
+        ),
+        (
+            "<sdf><model name='m'><link name='l'/><plugin name='x::LiftDrag'><cla>1 2</cla></plugin></model></sdf>",
+            "<cla>: got '1 2', expected 1 numbers",
+        ),
+        ("<sdf", "not XML"),
+        ("<!DOCTYPE a [<!ENTITY b SYSTEM 'file:///etc/passwd'>]><a>&b;</a>", "declares XML entities"),
+        ("<!DOCTYPE a [<!ENTITY b 'x'><!ENTITY c '&b;&b;'>]><a>&c;</a>", "declares XML entities"),
+    ],
+)
+def test_what_is_no_model_is_one_line(tmp_path, text, said):
+    path = tmp_path / "model.sdf"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_gazebo(path)
