@@ -7,6 +7,7 @@ the estimates and their covariances: with every piece at first, and less often a
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
 from typing import Any
 
@@ -37,10 +38,15 @@ from sysid_node.online.regression.least_squares import InstrumentStrength, Solut
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.selection_bias import selection_bias_factors
 from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.systematic import cross_spectra, estimation
+from sysid_node.online.systematic.estimation import SystematicErrors
+from sysid_node.online.systematic.imperfections import as_stated, line_model, remapped
+from sysid_node.online.systematic.servo_model import ServoModel
 
 Array = NDArray[np.float64]
 RECENT = 8  # pieces about whose mean motion is counted
 SOON = 20.0  # s of data up to which everything is renewed with every piece, then with every second, third, ...
+SERVO_STEPS = 2  # changes of the servos at most in one renewal
 TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which changes more slowly still
 
 
@@ -53,7 +59,7 @@ def renew(state: EstimatorState, last: bool = False) -> None:
     state.pieces += 1
     if last or _is_due(state):
         _measure_noise_moments(state)
-        _solve_all(state, _measure_segment(state, lines))
+        _solve_with_servos(state, lines)
     if state.model.settings.detect_changes:
         _look_for_changes(state, lines)
     if last:
@@ -123,7 +129,7 @@ def _measure_segment(state: EstimatorState, lines: Array) -> Information:
     """The information of the present segment up to the last sample."""
     model = state.model
     begin, end = state.segment_start, state.transform.last
-    info = information.measure(lines, model.instrument_model, model.spectrum, begin, end)
+    info = _measured(state, lines, begin, end)
     samples = max(state.samples, 1)
     mean = info.integrals / information.window_energy(end - begin, 0.5 * model.spectrum.rate)
     per_line_second = regressor_noise.gram_bias(
@@ -135,9 +141,24 @@ def _measure_segment(state: EstimatorState, lines: Array) -> Information:
     return info
 
 
+def _measured(state: EstimatorState, lines: Array, begin: float, end: float) -> Information:
+    """What the transform ``lines`` of begin..end (s) says, with its cross-spectra where not all is exact."""
+    model = state.model
+    info = information.measure(lines, state.line_model, model.spectrum, begin, end)
+    if model.imperfections is not None:
+        plain = information.about_mean(lines.copy(), None)
+        info.spectra = cross_spectra.cross_spectra(plain, model.layout.transformed)
+    return info
+
+
 def _line_seconds(state: EstimatorState, info: Information) -> float:
     """Lines times seconds over which noise counts; the nuisances take one line."""
     return max((state.model.spectrum.omega.size - 1) * info.energy, 1e-9)
+
+
+def _nothing(state: EstimatorState) -> Information:
+    """No information at all."""
+    return information.nothing(state.model.layout, state.past.spectra.shape[0])
 
 
 def _past(state: EstimatorState) -> Information:
@@ -148,8 +169,43 @@ def _past(state: EstimatorState) -> Information:
     state.past_time = now
     if window and state.window_segments and state.window_segments[0][0] <= now - window:
         state.window_segments.popleft()
-        state.past = sum((info for _, info in state.window_segments), information.nothing(state.model.layout))
+        state.past = sum((info for _, info in state.window_segments), _nothing(state))
     return state.past
+
+
+def _solve_with_servos(state: EstimatorState, lines: Array) -> None:
+    """Renew the estimates from the transform's ``lines``; again where servos turn out to be notably elsewhere."""
+    imperfect = state.model.imperfections
+    for _ in range(SERVO_STEPS):
+        _solve_all(state, _measure_segment(state, lines))
+        latest, servos = state.latest, state.servos
+        if imperfect is None or servos is None or latest is None or latest.systematic is None:
+            return
+        step = estimation.notable_step(imperfect, servos, latest.systematic)
+        if step is None:
+            return
+        _move_servos(state, step)
+    _solve_all(state, _measure_segment(state, lines))
+
+
+def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
+    """Take the controls to where these servos have them, in all that is remembered."""
+    model, imperfect = state.model, state.model.imperfections
+    assert imperfect is not None
+    applied = as_stated(imperfect, model.layout)
+    state.servos = servos
+    state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, applied)
+
+    def moved(info: Information) -> Information:
+        return remapped(info, imperfect, state.line_model, model.spectrum)
+
+    state.past = moved(state.past)
+    state.window_segments = deque((end, moved(info)) for end, info in state.window_segments)
+    for excited in state.excited_segments:
+        segments = [replace(segment, said=moved(segment.said)) for segment in excited.segments]
+        excited.segments = deque(segments, maxlen=excited.segments.maxlen)
+    # estimates by other columns are no reference for these
+    state.change_monitor.references.clear()
 
 
 def _solve_all(state: EstimatorState, segment: Information) -> None:
@@ -165,7 +221,8 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
         spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
     gusts = _gust_shares(state, total, equations, solution, spread)
     scale = solution.residual[:, None] * np.abs(solution.inverse.diagonal())
-    variance = gust_correlation.inflation(spread, gusts)[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
+    inflation = gust_correlation.inflation(spread, gusts)
+    variance = inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
     mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
     none = np.zeros(len(equations.coefficients), dtype=bool)
     lag_test, timed = _lag_test(state, solution, spread, gram)
@@ -191,8 +248,31 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
         ),
         outside_model=none,
         contradicted=none,
+        systematic=_systematic(state, total, solution, spread, inflation),
     )
     state.change_monitor.references.append(Reference(now, equations, solution, spread))
+
+
+def _systematic(
+    state: EstimatorState, total: Information, solution: Solution, spread: Uncertainty, inflation: Array
+) -> SystematicErrors | None:
+    """What tolerances do to the estimates; None where there are none, or nothing is solved for."""
+    model, servos = state.model, state.servos
+    if model.imperfections is None or servos is None or not solution.usable:
+        return None
+    return estimation.systematic_errors(
+        model.imperfections,
+        model.aircraft,
+        model.layout,
+        model.spectrum,
+        state.line_model,
+        servos,
+        state.equations,
+        solution,
+        spread,
+        total,
+        inflation,
+    )
 
 
 def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:
@@ -261,7 +341,7 @@ def _change_tests(state: EstimatorState) -> ChangeTests:
     model = state.model
     return ChangeTests(
         model.equations,
-        model.instrument_model,
+        state.line_model,
         model.spectrum,
         state.change_monitor,
         state.transform.last,
@@ -287,22 +367,19 @@ def _begin_anew(state: EstimatorState, lines: Array, since: float) -> None:
     share = (now - since) / (now - state.segment_start)
     state.samples, state.intervals = round(state.samples * share), state.intervals * share
     state.noise_moments = state.noise_moments * share
-    state.past = information.nothing(state.model.layout)
+    state.past = _nothing(state)
     state.window_segments.clear()
     state.segment_start = since
     sampled_transform.take_out(state.transform, before)
     state.change_monitor = ChangeMonitor()
-    _solve_all(state, _measure_segment(state, sampled_transform.current(state.transform)))
+    _solve_with_servos(state, sampled_transform.current(state.transform))
 
 
 def _remember_before(state: EstimatorState, lines: Array, end: float) -> None:
     """Remember the part of the present segment until ``end`` (s), when the transform was ``lines``."""
-    begin, model = state.segment_start, state.model
-    if end - begin < PIECE:
-        return
-    remember(
-        state.excited_segments, information.measure(lines, model.instrument_model, model.spectrum, begin, end), end
-    )
+    begin = state.segment_start
+    if end - begin >= PIECE:
+        remember(state.excited_segments, _measured(state, lines, begin, end), end)
 
 
 def finish_segment(state: EstimatorState) -> None:

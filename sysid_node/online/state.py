@@ -25,6 +25,9 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.weak_instruments import AndersonRubinBounds
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.status import Codes, Vocabulary
+from sysid_node.online.systematic.estimation import SystematicErrors
+from sysid_node.online.systematic.imperfections import Imperfections
+from sysid_node.online.systematic.servo_model import ServoModel
 
 Array = NDArray[np.float64]
 
@@ -45,6 +48,7 @@ class EstimatorModel:
     momentum: MomentumGain
     prior: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
     instrument_model: InstrumentModel | None  # None where the method is least squares
+    imperfections: Imperfections | None  # None where the aircraft file states that all is exact
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
     commanded: bool = False  # whether deflections follow from commands by the aircraft file's servos
@@ -60,6 +64,7 @@ class ValidityBasis:
     longest: Array  # (D,) the largest squared standard error of an interval that has an end
     allowed: Array  # (D,) the largest squared standard error of a valid estimate
     relative: Array | None  # (D,) ... as a share of the estimate's square, where that may be larger
+    systematic: Array  # (D,) squared systematic errors
     floor: Array  # (P,) energy under which a regressor is buried in noise
     fits: Array  # (C, 3) what ``FitQuality`` says besides R squared
 
@@ -85,6 +90,7 @@ class SegmentSolution:
     anderson_rubin: AndersonRubinBounds  # of the intervals
     outside_model: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
     contradicted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
+    systematic: SystematicErrors | None = None  # None where all is exact
     basis: ValidityBasis | None = None  # made when first wanted
 
 
@@ -97,6 +103,8 @@ class EstimatorState:
     equations: NormalEquations  # the model's, with least squares where instruments are weak
     past: Information  # finished segments, faded to ``past_time``
     flow: FlowAngleFilter  # of the flow angles that are not measured
+    line_model: InstrumentModel | None  # what is made of the transform's lines: the controls' servos, instruments
+    servos: ServoModel | None = None  # of the controls, as the lines have them; None where all is exact
     past_time: float = math.nan
     window_segments: deque[tuple[float, Information]] = field(
         default_factory=deque

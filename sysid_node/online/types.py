@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -24,6 +25,9 @@ class DerivativeEstimate(NamedTuple):
     valid: bool
     # "ok", "converging", "not excited", "collinear with ...", "stale input", "outside model", "contradicted", "changed"
     status: str
+    #: Parts of ``standard_error``: by noise and gusts, and by the tolerances of what is taken as known.
+    statistical_error: float = math.nan
+    systematic_error: float = 0.0
 
 
 class FitQuality(NamedTuple):

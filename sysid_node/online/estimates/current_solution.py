@@ -25,7 +25,7 @@ class CurrentSolution:
 
     time: float  # s, of the last sample
     values: Array  # (D,)
-    variances: Array  # (D,) squared standard errors
+    variances: Array  # (D,) squared standard errors, statistical
     solution: Solution
     gram: Array  # (W, W)
     size: Array  # (P,) absolute values of the inverse's diagonal
@@ -38,7 +38,7 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
         return None
     lines, time = sampled_transform.current(state.transform), state.transform.last
     integrals = latest.integrals + lines[-1]
-    gram = products(lines, state.model.instrument_model)
+    gram = products(lines, state.line_model)
     gram += latest.base
     growth, noise = growth_since(latest, time), latest.compensation
     solution = least_squares.solve(equations, gram, None if noise is None else noise * growth)
@@ -52,6 +52,8 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
     numbers = np.empty((2, C, P + 1))  # values and variances of the slopes and, behind them, of the offsets
     numbers[0, :, :P], numbers[1, :, :P] = slopes, variances
     numbers[0, :, P], numbers[1, :, P] = _offsets(equations, latest, integrals, slopes)
+    if latest.systematic is not None:
+        numbers[0] += latest.systematic.correction
     values, squares = numbers.reshape(2, C * (P + 1)).take(state.model.table.place, axis=-1)
     return CurrentSolution(time, values, np.maximum(squares, 0.0), solution, gram, size)
 

@@ -18,6 +18,8 @@ from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
 
+NORMAL_95 = 1.959963984540054  # standard errors of the normal distribution's two-sided 95 % interval
+
 
 def estimate(state: EstimatorState, now: float | None = None) -> Estimates:
     """All derivatives of the aircraft's model with their intervals; ``now`` (s) tells how old the last sample is."""
@@ -34,19 +36,25 @@ def estimate_of(state: EstimatorState, current: CurrentSolution | None, now: flo
     numbers = _intervals(state, latest, current)
     missing = len(model.table.unformed)
     if missing:
-        numbers = np.concatenate([numbers, np.tile([math.nan, math.inf, -math.inf, math.inf], (missing, 1))])
+        nothing = [math.nan, math.inf, math.inf, 0.0, -math.inf, math.inf]
+        numbers = np.concatenate([numbers, np.tile(nothing, (missing, 1))])
         codes = np.concatenate([codes, np.full(missing, status.INERTIA, codes.dtype)])
     derivatives = DerivativeRows(model.table.all_names, numbers, codes, model.vocabulary)
     return Estimates(time, derivatives, FitRows(model.equations.coefficients, _fits(state, latest, current)))
 
 
 def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:
-    """(D, 4) value, standard error, lower and upper end of the interval of each derivative."""
-    values, variances = current.values, current.variances
-    below, above = weak_instruments.interval_arms(
-        validity_basis(state, latest).squares * variances, latest.anderson_rubin
-    )
-    return np.stack([values, np.sqrt(variances), values - below, values + above], axis=-1)
+    """(D, 6) of each derivative: value, standard error, its statistical and systematic part, ends of the interval."""
+    values, variances, basis = current.values, current.variances, validity_basis(state, latest)
+    below, above = weak_instruments.interval_arms(basis.squares * variances, latest.anderson_rubin)
+    statistical = np.sqrt(variances)
+    if latest.systematic is None:
+        return np.stack([values, statistical, statistical, basis.systematic, values - below, values + above], axis=-1)
+    systematic = basis.systematic
+    arms = NORMAL_95**2 * systematic
+    below, above = np.sqrt(below * below + arms), np.sqrt(above * above + arms)
+    errors = np.sqrt(variances + systematic), statistical, np.sqrt(systematic)
+    return np.stack([values, *errors, values - below, values + above], axis=-1)
 
 
 def _fits(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:

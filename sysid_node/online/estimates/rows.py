@@ -19,6 +19,9 @@ from sysid_node.online.types import DerivativeEstimate, FitQuality
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
+#: Of a derivative, in the order of the message.
+DERIVATIVE_NUMBERS = ("value", "standard_error", "statistical_error", "systematic_error", "lower", "upper")
+
 
 class _Rows(Mapping[str, T]):
     """A table by name; a copy through pickle is a plain dictionary."""
@@ -55,7 +58,7 @@ class _Rows(Mapping[str, T]):
 
 
 class DerivativeRows(_Rows[DerivativeEstimate]):
-    """D derivatives: ``numbers`` (D, 4) are value, standard error, lower and upper end of the interval.
+    """D derivatives: ``numbers`` (D, 6), see ``DERIVATIVE_NUMBERS``.
 
     ``codes`` (D,) are their statuses in the words of ``vocabulary``.
     """
@@ -67,7 +70,9 @@ class DerivativeRows(_Rows[DerivativeEstimate]):
         self.numbers, self.codes, self.vocabulary = numbers, codes, vocabulary
 
     def _made(self) -> Iterator[DerivativeEstimate]:
-        return map(DerivativeEstimate, self.names, *self.numbers.T.tolist(), self.valid, self.statuses)
+        value, error, statistical, systematic, lower, upper = self.numbers.T.tolist()
+        columns = value, error, lower, upper, self.valid, self.statuses, statistical, systematic
+        return map(DerivativeEstimate, self.names, *columns)
 
     @property
     def valid(self) -> list[bool]:

@@ -48,17 +48,28 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
         table.offset, latest.selection_bias_factors.max(axis=0)[c], latest.selection_bias_factors[table.unknown, c]
     )
     caution, longest = np.maximum(cautions, 1.0), latest.anderson_rubin.longest(squares)
+    systematic = _systematic(state, latest)
     stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
     return ValidityBasis(
         unobjected=(held >= normal_equations.STRONG)[c] & (objections == status.OK),
         objections=objections,
         squares=squares,
         longest=longest,
-        allowed=np.minimum(table.allowed**2 / caution, longest),
+        # what is allowed is counted with the systematic part, which no caution about chance concerns
+        allowed=np.minimum((table.allowed**2 - systematic) / caution, longest),
         relative=table.relative**2 / caution if table.relative.any() else None,
+        systematic=systematic,
         floor=np.maximum(BURIED * latest.total.bias.take(equations.energy), least_squares.TINY),
         fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
     )
+
+
+def _systematic(state: EstimatorState, latest: SegmentSolution) -> Array:
+    """(D,) squared systematic errors."""
+    table, found = state.model.table, latest.systematic
+    if found is None:
+        return np.zeros(table.place.size)
+    return np.maximum(found.variance.reshape(-1).take(table.place), 0.0)
 
 
 def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
@@ -108,7 +119,7 @@ def _narrow(basis: ValidityBasis, current: CurrentSolution) -> Flags:
     """(D,) whether standard errors are small enough, and no rounding; and intervals have an end."""
     squares, allowed = current.values * current.values, basis.allowed
     if basis.relative is not None:
-        allowed = np.maximum(allowed, np.minimum(basis.relative * squares, basis.longest))
+        allowed = np.maximum(allowed, np.minimum(basis.relative * squares - basis.systematic, basis.longest))
     narrow: Flags = current.variances <= allowed
     squares *= NARROWEST**2
     narrow &= current.variances > squares

@@ -55,13 +55,15 @@ class Layout:
     regressors: tuple[str, ...]  # controls come last
     timed: tuple[str, ...] = ()  # controls whose rates are transformed too, see ``actuator_lag_test``
     instrumented: tuple[str, ...] = ()  # regressors that have an instrument of their own, see ``instruments``
+    with_thrust: bool = False  # whether the thrust is transformed too, which systematic errors need
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """All columns in order."""
         rates = (f"{name} rate" for name in self.timed)
         instruments = (f"{name} instrument" for name in self.instrumented)
-        return (*COEFFICIENTS, *NUISANCES, *self.regressors, *rates, *instruments)
+        thrust = ("thrust",) if self.with_thrust else ()
+        return (*COEFFICIENTS, *NUISANCES, *self.regressors, *rates, *thrust, *instruments)
 
     @property
     def width(self) -> int:
@@ -98,7 +100,8 @@ def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> Layout:
     wanted = dict.fromkeys(r for regressors in aircraft.model_structure.values() for r in regressors if r != "0")
     timed = tuple(r for r in wanted if r in aircraft.control_symbols)
     states = tuple(r for r in wanted if r not in timed)
-    return Layout(states + timed, timed, tuple(r for r in states if r in instrumented))
+    with_thrust = aircraft.throttle is not None and any(sigma > 0.0 for sigma in aircraft.tolerances.values())
+    return Layout(states + timed, timed, tuple(r for r in states if r in instrumented), with_thrust)
 
 
 def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
@@ -133,7 +136,8 @@ def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any) -> Any:
     imu, probe = aircraft.sensors.imu, aircraft.sensors.air_data
     inclination, arm = thrust_line(aircraft.throttle)
     thrust_x, thrust_z = (share * force for share in thrust_axes(inclination, scalar))
-    names, timed = layout(aircraft).regressors, layout(aircraft).timed
+    columns = layout(aircraft)
+    names, timed, with_thrust = columns.regressors, columns.timed, columns.with_thrust
     candidates = (*(r for r in STATE_REGRESSORS if r != "0"), *aircraft.control_symbols)
     chosen = [candidates.index(name) for name in names]
 
@@ -156,6 +160,8 @@ def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any) -> Any:
         row = [lift, drag, mass * fy, L * roll, (M - arm * thrust) * pitch, N * roll, k, one(k)]
         row += [known[i] for i in chosen]
         row += [none(k)] * len(timed)  # rates come with the interval
+        if with_thrust:
+            row.append(thrust * force)
         # the angles carry the tangential acceleration of the lever arm into lift and drag
         return row, [ca, sa]
 

@@ -51,6 +51,8 @@ class Information:
     integrals: Array  # (W,) of the transformed signals over time
     samples: float
     noise_moments: NoiseMoments = field(default_factory=NoiseMoments)
+    #: (F, T, T) see ``systematic.cross_spectra``; empty where nothing is uncertain but noise.
+    spectra: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0, 0), dtype=complex))
 
     def __add__(self, other: Information) -> Information:
         return Information(*(getattr(self, f) + getattr(other, f) for f in self.__dataclass_fields__))
@@ -60,12 +62,13 @@ class Information:
         return Information(*(getattr(self, f) * factor for f in self.__dataclass_fields__))
 
 
-def nothing(layout: Layout) -> Information:
-    """No information at all."""
-    width = layout.width
+def nothing(layout: Layout, lines: int = 0) -> Information:
+    """No information at all; ``lines``: how many have cross-spectra."""
+    width, T = layout.width, layout.transformed if lines else 0
     zeros = np.zeros((BANDS, width, width))
     bias, none = np.zeros((width, width)), np.zeros(width)
-    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, 0.0)
+    spectra = np.zeros((lines, T, T), dtype=complex)
+    return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, 0.0, spectra=spectra)
 
 
 @dataclass(frozen=True)

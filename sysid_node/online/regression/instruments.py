@@ -11,7 +11,7 @@ the lines of the instruments from the lines of the deflections, so that nothing 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,14 @@ _LEAK = 0.1  # 1/s: keeps spiral and phugoid, which are not in question, off the
 
 @dataclass(frozen=True)
 class InstrumentModel:
-    """Frequency response of the instruments to the controls."""
+    """Frequency response of the instruments to the controls, and of the controls to what is recorded of them."""
 
     gains: NDArray[np.complex128]  # (F, I, m)
     controls: slice  # columns of the m controls
+    rates: slice = field(default_factory=lambda: slice(0, 0))  # columns of their rates, right behind them
+    #: (F, m) ``servo_model.lateness``: what the rates bring to the controls' lines; None where controls are exact.
+    servos: NDArray[np.complex128] | None = None
+    derivative: NDArray[np.complex128] | None = None  # (F, 1) j omega, where there are ``servos``
 
 
 def instrument_model(aircraft: Aircraft, layout: Layout, omega: Array) -> InstrumentModel | None:
@@ -42,18 +46,45 @@ def instrument_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Instru
     A, B, rows, scales = _linear(aircraft, layout)
     resolvent = np.linalg.inv(1j * omega[:, None, None] * np.eye(len(STATES)) - A)
     gains = scales[:, None] * (resolvent[:, rows] @ B)
-    return InstrumentModel(gains, layout.deflections)
+    return InstrumentModel(gains, layout.deflections, layout.rates)
+
+
+def with_servos(
+    model: InstrumentModel | None, layout: Layout, omega: Array, servos: NDArray[np.complex128]
+) -> InstrumentModel:
+    """The model with the controls' response to what is recorded of them, ``servos`` (F, m)."""
+    none = np.zeros((omega.size, 0, len(layout.timed)), dtype=complex)
+    model = model or InstrumentModel(none, layout.deflections, layout.rates)
+    return replace(model, servos=servos, derivative=1j * omega[:, None])
 
 
 def fill_in(model: InstrumentModel, lines: Array) -> None:
-    """Write the instruments of lines (..., 2F, W) into their last columns, by the deflections' columns."""
+    """Write the instruments of lines (..., 2F, W) into their last columns, by the deflections' columns.
+
+    Where the model has servos, controls and their rates are first moved to where the servos have them.
+    """
     F, made, controls = model.gains.shape
+    if model.servos is not None:
+        _follow(model, lines, F)
+    if not made:
+        return
     deflections = np.empty((*lines.shape[:-2], F, controls, 1), dtype=complex)
     deflections.real[..., 0] = lines[..., :F, model.controls]
     deflections.imag[..., 0] = lines[..., F:, model.controls]
     answers = (model.gains @ deflections)[..., 0]
     lines[..., :F, -made:] = answers.real
     lines[..., F:, -made:] = answers.imag
+
+
+def _follow(model: InstrumentModel, lines: Array, F: int) -> None:
+    """Move controls and their rates by the servos' lateness: X + g R, and R + j omega g R, of the rates' lines R."""
+    real, imaginary = lines[..., :F, :], lines[..., F:, :]
+    more = (real[..., model.rates] + 1j * imaginary[..., model.rates]) * model.servos
+    real[..., model.controls] += more.real
+    imaginary[..., model.controls] += more.imag
+    more *= model.derivative
+    real[..., model.rates] += more.real
+    imaginary[..., model.rates] += more.imag
 
 
 def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[np.intp], Array]:

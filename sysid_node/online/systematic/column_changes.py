@@ -1,0 +1,207 @@
+"""How imperfections change the transformed signals: a linear map of the columns for each of K imperfections.
+
+A signal about its mean changes by sums of other signals and of their rates. All signals carry the factor k = qbar /
+qbar0, so a column stands for its quantity times the mean k. The means change apart, which matters to the offsets alone:
+C_0 = mean of the coefficient - sum of C_j times the mean of x_j.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.frequency.regression_signals import OFFSET, Layout, momentum_matrix
+from sysid_node.online.systematic.cross_spectra import ServoColumns
+
+Array = NDArray[np.float64]
+Terms = Mapping[str, tuple[float, float]]  # by signal: factors of it, and of its rate (s)
+
+AXES = "xyz"
+RATES = "pqr"
+FORCES = ("X", "Y", "Z")
+
+
+@dataclass(frozen=True)
+class FlightMeans:
+    """What the maps need of the flight: means over time, weighted with k."""
+
+    k: float  # mean of qbar over the reference's
+    values: Mapping[str, float]  # of the coefficients, regressors, and the thrust as a force coefficient
+
+    def of(self, name: str) -> float:
+        """Mean of a signal; zero of one that is not in the model."""
+        return self.values.get(name, 0.0)
+
+
+def flight_means(layout: Layout, integrals: Array) -> FlightMeans:
+    """Means by the signals' ``integrals`` (W,)."""
+    weight, time = float(integrals[OFFSET]), float(integrals[layout.column("1")])
+    names = layout.names[: layout.transformed]
+    shares = integrals[: layout.transformed] / max(weight, 1e-12)
+    return FlightMeans(max(weight / max(time, 1e-12), 1e-3), dict(zip(names, shares.tolist(), strict=True)))
+
+
+@dataclass
+class ColumnChanges:
+    """Changes of N signals (``ServoColumns``) with K imperfections, per unit of each."""
+
+    aircraft: Aircraft
+    layout: Layout
+    columns: ServoColumns
+    means: FlightMeans
+    count: int
+    signals: Array = field(init=False)  # (K, N, 2N) of each signal: factors of all signals, then of their rates
+    shifts: Array = field(init=False)  # (K, N) of the means
+    at: int = 0  # the imperfection that is being described
+
+    def __post_init__(self) -> None:
+        N = self.columns.width
+        self.signals, self.shifts = np.zeros((self.count, N, 2 * N)), np.zeros((self.count, N))
+        self._place = {name: self.columns.place(i) for i, name in enumerate(self.layout.names)}
+        self._place["0"] = OFFSET
+        ratio = momentum_matrix(self.aircraft)
+        self._momentum = {axis: dict(zip((*FORCES, "Cl", "Cm", "Cn"), ratio[i].tolist(), strict=True))
+                          for i, axis in enumerate(RATES)}  # fmt: skip
+        alpha = self.means.of("alpha")
+        self._cos, self._sin = math.cos(alpha), math.sin(alpha)
+
+    @property
+    def airspeed(self) -> float:
+        """Mean airspeed, m/s."""
+        return self.aircraft.reference.airspeed * math.sqrt(self.means.k)
+
+    def per_column(self, rate: str) -> float:
+        """Angular rate (rad/s) per unit of its column."""
+        g = self.aircraft.geometry
+        return 2.0 * self.airspeed / ((g.cbar if rate == "q" else g.b) * self.means.k)
+
+    def add(self, target: str, terms: Terms) -> None:
+        """Change a signal by others and their rates; what is not in the model is left out."""
+        row = self._place.get(target)
+        if row is None:
+            return
+        N = self.columns.width
+        for name, (plain, rate) in terms.items():
+            column = self._place.get(name)
+            if column is not None:
+                self.signals[self.at, row, column] += plain
+                self.signals[self.at, row, N + column] += rate
+
+    def servo(self, control: int, plain: float, rate: float) -> None:
+        """Change a control by its servo's column."""
+        N, place = self.columns.width, self.columns.servos.start + control
+        row = self._place[self.layout.timed[control]]
+        self.signals[self.at, row, place] += plain
+        self.signals[self.at, row, N + place] += rate
+
+    def shift(self, target: str, by: float) -> None:
+        """Change a signal's mean."""
+        row = self._place.get(target)
+        if row is not None:
+            self.shifts[self.at, row] += by
+
+    def scale(self, target: str, share: float) -> None:
+        """Change a signal, its mean included, by a share of it."""
+        self.add(target, {target: (share, 0.0)})
+        self.shift(target, share * self.means.of(target))
+
+    def rescale(self, target: str, share: float) -> None:
+        """Change a signal about its mean by a share of it, and keep the mean: both k and the signal change."""
+        self.add(target, {target: (share, 0.0)})
+
+    def turn_flow(self, terms: Terms, mean: float) -> None:
+        """Change the angle of attack (rad): its regressor, and by turning the force both lift and drag."""
+        self.add("alpha", terms)
+        self.shift("alpha", mean)
+        lift, drag = self.means.of("CL"), self.means.of("CD")
+        self.add("CL", {"CD": (-mean, 0.0)} | _times(terms, -drag))
+        self.add("CD", {"CL": (mean, 0.0)} | _times(terms, lift))
+        self.shift("CL", -mean * drag)
+        self.shift("CD", mean * lift)
+
+    def turn_sideslip(self, terms: Terms, mean: float) -> None:
+        """Change the sideslip (rad)."""
+        self.add("beta", terms)
+        self.shift("beta", mean)
+
+    def airspeed_varies(self, terms: Terms) -> None:
+        """Change the airspeed's variation; ``terms`` make its share of the mean airspeed, times the mean k."""
+        for name in ("CL", "CD", "CY", "Cl", "Cm", "Cn"):
+            self.add(name, _times(terms, -2.0 * self.means.of(name)))
+        self.add("V", _times(terms, self.airspeed / self.aircraft.reference.airspeed))
+
+    def forces(self) -> dict[str, tuple[dict[str, tuple[float, float]], float]]:
+        """The measured force (specific force times mass, thrust included) as coefficients, by body axis.
+
+        Each is the terms that make it about its mean, and its mean.
+        """
+        c, s, lift, drag = self._cos, self._sin, self.means.of("CL"), self.means.of("CD")
+        inclination = self.aircraft.throttle.inclination if self.aircraft.throttle else 0.0
+        tx, tz = math.cos(inclination), -math.sin(inclination)
+        thrust = self.means.of("thrust")
+        X = {"CL": (s, 0.0), "CD": (-c, 0.0), "thrust": (tx, 0.0), "alpha": (c * lift + s * drag, 0.0)}
+        Z = {"CL": (-c, 0.0), "CD": (-s, 0.0), "thrust": (tz, 0.0), "alpha": (s * lift - c * drag, 0.0)}
+        side = self.means.of("CY")
+        return {
+            "X": (X, s * lift - c * drag + tx * thrust),
+            "Y": ({"CY": (1.0, 0.0)}, side),
+            "Z": (Z, -c * lift - s * drag + tz * thrust),
+        }
+
+    def force(self, axis: str, terms: Terms, mean: float = 0.0) -> None:
+        """Change the aerodynamic force along a body axis, as a coefficient; ``mean`` is that of the terms."""
+        c, s = self._cos, self._sin
+        if axis == "Y":
+            self.add("CY", terms)
+            self.shift("CY", mean)
+            return
+        # lift = X sin - Z cos, drag = -X cos - Z sin; a constant force turns in stability axes as alpha varies
+        lift, drag, turned_lift, turned_drag = (s, -c, c, s) if axis == "X" else (-c, -s, s, -c)
+        self.add("CL", _times(terms, lift))
+        self.add("CD", _times(terms, drag))
+        self.add("CL", {"alpha": (turned_lift * mean, 0.0)})
+        self.add("CD", {"alpha": (turned_drag * mean, 0.0)})
+        self.shift("CL", lift * mean)
+        self.shift("CD", drag * mean)
+
+    def rate(self, target: str, source: str, share: float, delay: float = 0.0) -> None:
+        """Change an angular rate by a ``share`` of another, or of its own rate of change times ``delay`` (s).
+
+        It changes its regressor, and all coefficients by its angular acceleration.
+        """
+        per_column = self.per_column(source)
+        ratio = per_column / self.per_column(target)
+        self.add(target, {source: (share * ratio, delay * ratio)})
+        self.shift(target, share * ratio * self.means.of(source))
+        if delay:
+            return
+        for name, momentum in self._momentum[target].items():
+            terms = {source: (0.0, share * momentum * per_column)}
+            if name in FORCES:
+                self.force(name, terms)
+            else:
+                self.add(name, terms)
+
+    def acceleration(self, coefficient: str, rate: str, factor: float) -> None:
+        """Change a coefficient by ``factor`` times an angular acceleration (rad/s^2)."""
+        terms = {rate: (0.0, factor * self.per_column(rate))}
+        if coefficient in FORCES:
+            self.force(coefficient, terms)
+        else:
+            self.add(coefficient, terms)
+
+    def finish(self) -> None:
+        """Derive the changes of the lift's square, which goes with the lift."""
+        square, lift, mean = self._place.get("k"), self._place["CL"], self.means.of("CL")
+        if square is not None:
+            self.signals[:, square] += 2.0 * mean * self.signals[:, lift]
+            self.shifts[:, square] += 2.0 * mean * self.shifts[:, lift]
+
+
+def _times(terms: Terms, factor: float) -> dict[str, tuple[float, float]]:
+    return {name: (factor * plain, factor * rate) for name, (plain, rate) in terms.items()}

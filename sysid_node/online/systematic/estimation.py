@@ -1,0 +1,99 @@
+"""Systematic errors as they stand with the present solution, and the servos as the flight shows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.regression.information import Information, Spectrum
+from sysid_node.online.regression.instruments import InstrumentModel
+from sysid_node.online.regression.instruments import with_servos as model_with_servos
+from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.systematic import cross_spectra, servo_model
+from sysid_node.online.systematic.consider import Considered, consider
+from sysid_node.online.systematic.imperfections import Imperfections, column_changes, prior
+from sysid_node.online.systematic.servo_model import ServoModel
+
+Array = NDArray[np.float64]
+
+LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
+#: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
+#: smaller changes are exact enough to first order.
+NOTABLE_SHARE, NOTABLE = 0.3, 3e-4
+
+
+@dataclass(frozen=True)
+class SystematicErrors:
+    """Of C coefficients' P slopes and, behind them, offsets."""
+
+    considered: Considered
+    correction: Array  # (C, P + 1) to be added to the estimates
+    variance: Array  # (C, P + 1)
+    covariance: Array  # (C, P, P) of the slopes
+    servos: ServoModel  # of all controls, as the correction has them
+    errors: Array  # (m,) standard errors of the lateness of those that are not exactly known, s
+
+
+def systematic_errors(
+    imperfect: Imperfections,
+    aircraft: Aircraft,
+    layout: Layout,
+    lines: Spectrum,
+    model: InstrumentModel | None,
+    servos: ServoModel,
+    equations: NormalEquations,
+    solution: Solution,
+    spread: Uncertainty,
+    total: Information,
+    inflation: Array,
+) -> SystematicErrors:
+    """By the information ``total``, whose lines were made by the ``model`` with these ``servos``.
+
+    ``inflation`` (C,): factors of the statistical variances, which hold for what the flight tells of imperfections too.
+    """
+    none = np.zeros((lines.omega.size, len(layout.timed)), dtype=complex)
+    model = model or model_with_servos(None, layout, lines.omega, none)
+    spectra = cross_spectra.with_servos(
+        total.spectra, imperfect.columns, model, lines.omega, servo_model.rate_gain(servos, lines.omega)
+    )
+    gram = cross_spectra.moments(spectra, lines.omega)
+    changes, means = column_changes(imperfect, aircraft, layout, total.integrals)
+    sigmas, centre = prior(imperfect, servos)
+    noise = inflation * noise_per_gram(equations, spread, total)
+    found = consider(equations, solution, noise, gram, changes, sigmas, centre, means)
+    at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
+    late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
+    late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m :]
+    errors = np.sqrt(found.covariance.diagonal()[S : S + m])
+    return SystematicErrors(
+        found,
+        found.correction,
+        found.variance(),
+        found.slope_covariance(),
+        ServoModel(servos.lateness + late, servos.curvature + curved),
+        errors,
+    )
+
+
+def noise_per_gram(equations: NormalEquations, spread: Uncertainty, total: Information) -> Array:
+    """(C,) variance of a score over the energy of its instrument, in the mean over a coefficient's unknowns."""
+    V = equations.instruments
+    energies = total.grams.sum(axis=0).diagonal()[V]
+    scores = spread.bands @ total.scores.diagonal(axis1=1, axis2=2)[:, V]  # (C, P)
+    shares = scores / np.maximum(energies, TINY) * equations.belongs.T
+    return np.asarray(shares.sum(axis=1) / equations.belongs.sum(axis=0))
+
+
+def notable_step(imperfect: Imperfections, servos: ServoModel, found: SystematicErrors) -> ServoModel | None:
+    """Where the lines should have the servos from now on; None where they are near enough there."""
+    at = imperfect.timed
+    step = found.servos.lateness - servos.lateness
+    if not (np.abs(step[at]) > NOTABLE_SHARE * found.errors + NOTABLE).any():
+        return None
+    share = min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), TINY))
+    return servos.moved(share * step, share * (found.servos.curvature - servos.curvature))

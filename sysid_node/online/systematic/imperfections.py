@@ -1,0 +1,151 @@
+"""The imperfections of one aircraft as the estimator takes them: sources, servos, and where their columns stand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.regression.information import Information, Spectrum
+from sysid_node.online.regression.instruments import InstrumentModel, with_servos
+from sysid_node.online.systematic import servo_model
+from sysid_node.online.systematic.column_changes import ColumnChanges, flight_means
+from sysid_node.online.systematic.cross_spectra import ServoColumns, band_grams
+from sysid_node.online.systematic.cross_spectra import with_servos as spectra_with_servos
+from sysid_node.online.systematic.servo_model import ServoModel
+from sysid_node.online.systematic.sources import Source, describe, sources
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Share of L^2 that the curvature B of a servo of which nothing is known has: first order has 0, a delay 0.5.
+CURVATURE = 0.25
+SHORTEST = 0.02  # s: the lateness from which on the curvature's tolerance goes with its square
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """K = S + 2 m imperfections: S sources, and the lateness and the curvature of m servos."""
+
+    sources: tuple[Source, ...]
+    controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
+    timed: Index  # (m,) places of these controls among those of the layout
+    lateness: Array  # (m,) s: as the aircraft file has it
+    sigmas: Array  # (m,) s: its 1 sigma
+    columns: ServoColumns
+    places: Index  # (W,) where the columns of the signal vector stand among them
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Of each imperfection the key of its tolerance: lateness and curvature of a servo share theirs."""
+        servos = tuple(f"actuator_lag.{name}" for name in self.controls)
+        return (*(source.key for source in self.sources), *servos, *servos)
+
+    @property
+    def servos(self) -> slice:
+        """Places of the servos' lateness."""
+        return slice(len(self.sources), len(self.sources) + len(self.controls))
+
+
+def imperfections(aircraft: Aircraft, layout: Layout) -> Imperfections | None:
+    """Those of an aircraft file; None where it states that all is exact."""
+    found = sources(aircraft)
+    names = {control.symbol: name for name, control in aircraft.controls.items()}
+    rows = []
+    for place, symbol in enumerate(layout.timed):
+        name = names[symbol]
+        sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
+        if sigma > 0.0:
+            rows.append((name, place, 0.0, sigma))
+    if not found and not rows:
+        return None
+    columns = ServoColumns.of(layout)
+    controls, timed, lateness, sigmas = zip(*rows, strict=True) if rows else ((), (), (), ())
+    return Imperfections(
+        found,
+        controls,
+        np.array(timed, np.intp),
+        np.array(lateness),
+        np.array(sigmas),
+        columns,
+        np.array([columns.place(i) for i in range(layout.width)], np.intp),
+    )
+
+
+_SERVO_EFFECTS = ("actuator_lag", "command_delay")
+
+
+def as_stated(imperfect: Imperfections, layout: Layout) -> ServoModel:
+    """The servos before anything is known of the flight."""
+    none = np.zeros(len(layout.timed))
+    model = ServoModel(none, none.copy())
+    model.lateness[imperfect.timed] = imperfect.lateness
+    return model
+
+
+def line_model(
+    exact: InstrumentModel | None, layout: Layout, omega: Array, model: ServoModel, applied: ServoModel
+) -> InstrumentModel | None:
+    """The ``exact`` model of the lines with the controls where the servos have them."""
+    if np.array_equal(model.lateness, applied.lateness) and np.array_equal(model.curvature, applied.curvature):
+        return exact
+    return with_servos(exact, layout, omega, servo_model.lateness(model, applied, omega))
+
+
+def column_changes(
+    imperfect: Imperfections, aircraft: Aircraft, layout: Layout, integrals: Array
+) -> tuple[ColumnChanges, Array]:
+    """What one unit of each imperfection changes, and the means (W,) of the signals."""
+    means = flight_means(layout, integrals)
+    count = len(imperfect.sources) + 2 * len(imperfect.controls)
+    changes = ColumnChanges(aircraft, layout, imperfect.columns, means, count)
+    for i, source in enumerate(imperfect.sources):
+        changes.at = i
+        describe(changes, source)
+    for i, place in enumerate(imperfect.timed.tolist()):
+        changes.at = imperfect.servos.start + i
+        changes.servo(place, 1.0, 0.0)
+        changes.at = imperfect.servos.stop + i
+        changes.servo(place, 0.0, 1.0)
+    changes.finish()
+    return changes, np.array([means.of(name) for name in layout.names])
+
+
+def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
+    """(K,) 1 sigma of each, and (K,) its mean, both from where the servos are at present taken to be."""
+    late, curved = model.lateness[imperfect.timed], model.curvature[imperfect.timed]
+    of_curvature = CURVATURE * np.maximum(late, SHORTEST) ** 2
+    sigmas = np.concatenate([[source.sigma for source in imperfect.sources], imperfect.sigmas, of_curvature])
+    means = np.concatenate(
+        [np.zeros(len(imperfect.sources)), imperfect.lateness - late, CURVATURE * late**2 - curved]
+    )
+    return sigmas, means
+
+
+def remapped(
+    info: Information, imperfect: Imperfections, model: InstrumentModel | None, lines: Spectrum
+) -> Information:
+    """The information with the controls where another ``model`` has them.
+
+    The Gram matrices follow from the cross-spectra. The scores, whose noise is correlated between lines, change as the
+    Gram matrices do: column by column, they are as many times as large.
+    """
+    if model is None or not info.spectra.size or not info.samples:
+        return info
+    full = spectra_with_servos(info.spectra, imperfect.columns, model, lines.omega, None)
+    grams = band_grams(full, lines.bands, imperfect.places)
+    energies = info.grams.diagonal(axis1=1, axis2=2)
+    scores = info.scores.diagonal(axis1=1, axis2=2)
+    per_energy = np.divide(np.maximum(scores, 0.0), energies, out=np.zeros_like(energies), where=energies > 0.0)
+    root = np.sqrt(per_energy)
+    more = (grams - info.grams) * root[:, :, None] * root[:, None, :]
+    return _replaced(info, grams, info.scores + more)
+
+
+def _replaced(info: Information, grams: Array, scores: Array) -> Information:
+    values = {name: getattr(info, name) for name in info.__dataclass_fields__}
+    return Information(**(values | {"grams": grams, "scores": scores}))
