@@ -144,9 +144,10 @@ def _measure_segment(state: EstimatorState, lines: Array) -> Information:
 def _measured(state: EstimatorState, lines: Array, begin: float, end: float) -> Information:
     """What the transform ``lines`` of begin..end (s) says, with its cross-spectra where not all is exact."""
     model = state.model
-    info = information.measure(lines, state.line_model, model.spectrum, begin, end)
+    edges = information.edges(model.spectrum.omega, begin, end) if model.imperfections else None
+    info = information.measure(lines, state.line_model, model.spectrum, begin, end, edges)
     if model.imperfections is not None:
-        plain = information.about_mean(lines.copy(), None)
+        plain = information.about_mean(lines.copy(), None, edges)
         info.spectra = cross_spectra.cross_spectra(plain, model.layout.transformed)
     return info
 
@@ -180,6 +181,8 @@ def _solve_with_servos(state: EstimatorState, lines: Array) -> None:
         _solve_all(state, _measure_segment(state, lines))
         latest, servos = state.latest, state.servos
         if imperfect is None or servos is None or latest is None or latest.systematic is None:
+            return
+        if latest.systematic.pieces != state.pieces:
             return
         step = estimation.notable_step(imperfect, servos, latest.systematic)
         if step is None:
@@ -260,6 +263,9 @@ def _systematic(
     model, servos = state.model, state.servos
     if model.imperfections is None or servos is None or not solution.usable:
         return None
+    last = state.latest.systematic if state.latest is not None else None
+    if last is not None and last.holds(state.pieces, servos, total.energy):
+        return last
     return estimation.systematic_errors(
         model.imperfections,
         model.aircraft,
@@ -272,6 +278,8 @@ def _systematic(
         spread,
         total,
         inflation,
+        state.pieces,
+        last.changes if last is not None else None,
     )
 
 

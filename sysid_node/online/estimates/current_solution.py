@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import least_squares
-from sysid_node.online.regression.information import products
+from sysid_node.online.regression.information import edges, products
 from sysid_node.online.regression.least_squares import Solution
 from sysid_node.online.regression.mixed_estimation import weighed
 from sysid_node.online.regression.normal_equations import NormalEquations
@@ -38,7 +38,8 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
         return None
     lines, time = sampled_transform.current(state.transform), state.transform.last
     integrals = latest.integrals + lines[-1]
-    gram = products(lines, state.line_model)
+    impulses = edges(state.model.spectrum.omega, state.segment_start, time) if state.servos else None
+    gram = products(lines, state.line_model, impulses)
     gram += latest.base
     growth, noise = growth_since(latest, time), latest.compensation
     solution = least_squares.solve(equations, gram, None if noise is None else noise * growth)

@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 _N = slice(OFFSET + 1, OFFSET + 3)  # columns of constant and drift
 _NUISANCES = slice(OFFSET, OFFSET + 3)
 BANDS = 6
+#: Share of an impulse's energy that is not another's, under which both are one.
+ALIKE = 1e-3
 #: Share of the drift's energy that is not the constant's, under which it brings nothing.
 INDEPENDENT = 1e-12
 
@@ -105,11 +107,47 @@ def spectrum(omega: Array, memory: float) -> Spectrum:
     return Spectrum(omega, bands, order, rate, inverse.astype(np.complex128), (1.0 / plus).astype(np.complex128))
 
 
-def about_mean(transform: Array, model: InstrumentModel | None) -> Array:
+@dataclass(frozen=True)
+class Edges:
+    """What impulses at both ends of a stretch have in its lines.
+
+    The finite transform of a signal's rate is j omega times the signal's, but for such impulses; so is that of a signal
+    that follows another late. Where they are projected out, rates and lags follow from the lines alone.
+    """
+
+    lines: Array  # (2, 2F)
+    inverse: Array  # (2, 2) of their Gram matrix
+
+    def take_out(self, lines: Array) -> None:
+        """Project them out of lines (2F, W)."""
+        lines -= self.lines.T @ (self.inverse @ (self.lines @ lines))
+
+    def take_out_of(self, gram: Array, lines: Array) -> None:
+        """Project them out of the Gram matrix (W, W) of lines (2F, W)."""
+        across = self.lines.dot(lines)
+        gram -= across.T.dot(self.inverse.dot(across))
+
+
+def edges(omega: Array, begin: float, end: float) -> Edges:
+    """The impulses at ``begin`` and ``end`` (s) at lines ``omega`` (F,) rad/s."""
+    F = omega.size
+    found = np.empty((2, 2 * F))
+    wave = np.exp(np.multiply.outer((-1j * begin, -1j * end), omega))
+    found[:, :F], found[:, F:] = wave.real, wave.imag
+    overlap = float(found[0].dot(found[1])) / F
+    left = 1.0 - overlap * overlap
+    if left < ALIKE:
+        return Edges(found, np.array([[1.0 / F, 0.0], [0.0, 0.0]]))
+    share = 1.0 / (F * left)
+    return Edges(found, np.array([[share, -overlap * share], [-overlap * share, share]]))
+
+
+def about_mean(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) whose signals are taken about their means, and of instruments.
 
-    The lines are made where the transforms lie, which must be in one piece. Nuisances are kept. The airspeed's noise is
-    in k: fitting the offset to the lines of k would regress on noise.
+    The lines are made where the transforms lie, which must be in one piece. Nuisances are kept, but for what they have
+    in common with the ``edges`` which are taken out of all. The airspeed's noise is in k: fitting
+    the offset to the lines of k would regress on noise.
     """
     if transform.ndim > 2:
         for one in transform:
@@ -121,6 +159,8 @@ def about_mean(transform: Array, model: InstrumentModel | None) -> Array:
     lines = transform[..., :-1, :]
     if model is not None:
         fill_in(model, lines)
+    if edges is not None:
+        edges.take_out(lines)
     return lines
 
 
@@ -169,18 +209,20 @@ def window_energy(duration: float, rate: float) -> float:
     return -math.expm1(-rate * duration) / rate if rate else duration
 
 
-def clean_lines(transform: Array, model: InstrumentModel | None) -> Array:
+def clean_lines(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) without offset, constant and drift, with their instruments."""
-    return project(about_mean(transform.copy(), model))
+    return project(about_mean(transform.copy(), model, edges))
 
 
-def products(transform: Array, model: InstrumentModel | None) -> Array:
+def products(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:
     """(W, W) Gram matrix of a transform's (2F + 1, W) clean lines, constant and drift projected out.
 
     The transform is overwritten.
     """
     lines = about_mean(transform, model)
     gram: Array = lines.T.dot(lines)
+    if edges is not None:
+        edges.take_out_of(gram, lines)
     _project_out(gram)
     return gram
 
@@ -194,14 +236,23 @@ def _project_out(gram: Array) -> None:
             dger(-1.0 / left, row, row, a=gram.T, overwrite_a=True)
 
 
-def measure(transform: Array, model: InstrumentModel | None, lines: Spectrum, begin: float, end: float) -> Information:
+def measure(
+    transform: Array,
+    model: InstrumentModel | None,
+    lines: Spectrum,
+    begin: float,
+    end: float,
+    edges: Edges | None = None,
+) -> Information:
     """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``noise_moments``: none."""
-    clean = clean_lines(transform, model)
+    clean = clean_lines(transform, model, edges)
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
     n = clean[:, _N]
     # what projecting the nuisances out leaves of the noise's square in each line: diagonal of (I - H) K
     left = covariance.diagonal() - ((n @ inverse2(n.T @ n)) * spread[:, _N]).sum(axis=1)
+    if edges is not None:
+        left -= ((covariance @ edges.lines.T) * (edges.lines.T @ edges.inverse)).sum(axis=1)
     W = clean.shape[1]
     grams, scores, traces = np.empty((BANDS, W, W)), np.empty((BANDS, W, W)), np.empty(BANDS)
     clean, spread, left = clean[lines.order], spread[lines.order], left[lines.order]

@@ -36,7 +36,8 @@ class InstrumentModel:
     rates: slice = field(default_factory=lambda: slice(0, 0))  # columns of their rates, right behind them
     #: (F, m) ``servo_model.lateness``: what the rates bring to the controls' lines; None where controls are exact.
     servos: NDArray[np.complex128] | None = None
-    derivative: NDArray[np.complex128] | None = None  # (F, 1) j omega, where there are ``servos``
+    #: (2, 2, F, 2 m) what real and imaginary parts of the rates' lines bring to those of controls and rates.
+    following: Array = field(default_factory=lambda: np.zeros((2, 2, 0, 0)))
 
 
 def instrument_model(aircraft: Aircraft, layout: Layout, omega: Array) -> InstrumentModel | None:
@@ -55,7 +56,9 @@ def with_servos(
     """The model with the controls' response to what is recorded of them, ``servos`` (F, m)."""
     none = np.zeros((omega.size, 0, len(layout.timed)), dtype=complex)
     model = model or InstrumentModel(none, layout.deflections, layout.rates)
-    return replace(model, servos=servos, derivative=1j * omega[:, None])
+    both = np.hstack([servos, 1j * omega[:, None] * servos])
+    following = np.array([[both.real, -both.imag], [both.imag, both.real]])
+    return replace(model, servos=servos, following=following)
 
 
 def fill_in(model: InstrumentModel, lines: Array) -> None:
@@ -78,13 +81,11 @@ def fill_in(model: InstrumentModel, lines: Array) -> None:
 
 def _follow(model: InstrumentModel, lines: Array, F: int) -> None:
     """Move controls and their rates by the servos' lateness: X + g R, and R + j omega g R, of the rates' lines R."""
-    real, imaginary = lines[..., :F, :], lines[..., F:, :]
-    more = (real[..., model.rates] + 1j * imaginary[..., model.rates]) * model.servos
-    real[..., model.controls] += more.real
-    imaginary[..., model.controls] += more.imag
-    more *= model.derivative
-    real[..., model.rates] += more.real
-    imaginary[..., model.rates] += more.imag
+    parts = lines.reshape(*lines.shape[:-2], 2, F, lines.shape[-1])
+    rates = parts[..., model.rates]
+    both = np.concatenate([rates, rates], axis=-1)
+    more = model.following * both[..., None, :, :, :]
+    parts[..., model.controls.start : model.rates.stop] += more[..., 0, :, :] + more[..., 1, :, :]
 
 
 def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[np.intp], Array]:

@@ -15,6 +15,7 @@ from sysid_node.online.regression.instruments import with_servos as model_with_s
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic import cross_spectra, servo_model
+from sysid_node.online.systematic.column_changes import ColumnChanges
 from sysid_node.online.systematic.consider import Considered, consider
 from sysid_node.online.systematic.imperfections import Imperfections, column_changes, prior
 from sysid_node.online.systematic.servo_model import ServoModel
@@ -24,7 +25,10 @@ Array = NDArray[np.float64]
 LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to first order.
-NOTABLE_SHARE, NOTABLE = 0.3, 3e-4
+NOTABLE_SHARE, NOTABLE = 0.5, 5e-4
+EVERY = 4  # pieces between looks, once there are ``EARLY`` s of data
+EARLY = 10.0
+GROWTH = 1.3  # of the data, after which the flight's means are taken anew
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,15 @@ class SystematicErrors:
     covariance: Array  # (C, P, P) of the slopes
     servos: ServoModel  # of all controls, as the correction has them
     errors: Array  # (m,) standard errors of the lateness of those that are not exactly known, s
+    lines: ServoModel  # as the lines had them
+    pieces: int  # number of pieces finished when this was found
+    energy: float  # s: data that it rests on
+    changes: tuple[float, ColumnChanges, Array]  # s: data that the column changes rest on; them; the signals' means
+
+    def holds(self, pieces: int, servos: ServoModel, energy: float) -> bool:
+        """Whether this is new enough: it changes slowly once there are data."""
+        new = pieces - self.pieces < (EVERY if self.energy > EARLY else 1)
+        return new and self.lines is servos and energy >= self.energy
 
 
 def systematic_errors(
@@ -51,10 +64,13 @@ def systematic_errors(
     spread: Uncertainty,
     total: Information,
     inflation: Array,
+    pieces: int,
+    known: tuple[float, ColumnChanges, Array] | None,
 ) -> SystematicErrors:
     """By the information ``total``, whose lines were made by the ``model`` with these ``servos``.
 
     ``inflation`` (C,): factors of the statistical variances, which hold for what the flight tells of imperfections too.
+    ``known`` are the changes that were last used; they depend on the flight's means alone.
     """
     none = np.zeros((lines.omega.size, len(layout.timed)), dtype=complex)
     model = model or model_with_servos(None, layout, lines.omega, none)
@@ -62,7 +78,9 @@ def systematic_errors(
         total.spectra, imperfect.columns, model, lines.omega, servo_model.rate_gain(servos, lines.omega)
     )
     gram = cross_spectra.moments(spectra, lines.omega)
-    changes, means = column_changes(imperfect, aircraft, layout, total.integrals)
+    if known is None or not known[0] <= total.energy <= GROWTH * known[0]:
+        known = (total.energy, *column_changes(imperfect, aircraft, layout, total.integrals))
+    _, changes, means = known
     sigmas, centre = prior(imperfect, servos)
     noise = inflation * noise_per_gram(equations, spread, total)
     found = consider(equations, solution, noise, gram, changes, sigmas, centre, means)
@@ -77,6 +95,10 @@ def systematic_errors(
         found.slope_covariance(),
         ServoModel(servos.lateness + late, servos.curvature + curved),
         errors,
+        servos,
+        pieces,
+        total.energy,
+        known,
     )
 
 

@@ -120,9 +120,7 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     late, curved = model.lateness[imperfect.timed], model.curvature[imperfect.timed]
     of_curvature = CURVATURE * np.maximum(late, SHORTEST) ** 2
     sigmas = np.concatenate([[source.sigma for source in imperfect.sources], imperfect.sigmas, of_curvature])
-    means = np.concatenate(
-        [np.zeros(len(imperfect.sources)), imperfect.lateness - late, CURVATURE * late**2 - curved]
-    )
+    means = np.concatenate([np.zeros(len(imperfect.sources)), imperfect.lateness - late, CURVATURE * late**2 - curved])
     return sigmas, means
 
 
