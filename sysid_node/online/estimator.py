@@ -32,7 +32,7 @@ from sysid_node.online.segment_update import begin_segment, reach, renew
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorModel, EstimatorState
 from sysid_node.online.status import vocabulary
-from sysid_node.online.systematic.imperfections import as_stated, imperfections
+from sysid_node.online.systematic.imperfections import imperfections
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
         momentum=regression_signals.momentum_gain(aircraft),
         prior=believed_derivatives(aircraft, equations),
         instrument_model=instrument_model(aircraft, layout, grid.omega),
-        imperfections=imperfections(aircraft, layout),
+        imperfections=imperfections(aircraft, layout, commanded=commanded, positions=settings.actuators == "positions"),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
         commanded=commanded,
@@ -87,7 +87,7 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
         nothing,
         flow_angle_filter.init(aircraft),
         model.instrument_model,
-        as_stated(model.imperfections, layout) if model.imperfections else None,
+        model.imperfections.applied if model.imperfections else None,
         excited_segments=no_excited_segments(equations, layout),
     )
 

@@ -40,7 +40,7 @@ from sysid_node.online.regression.selection_bias import selection_bias_factors
 from sysid_node.online.state import EstimatorState, SegmentSolution
 from sysid_node.online.systematic import cross_spectra, estimation
 from sysid_node.online.systematic.estimation import SystematicErrors
-from sysid_node.online.systematic.imperfections import as_stated, line_model, remapped
+from sysid_node.online.systematic.imperfections import line_model, remapped
 from sysid_node.online.systematic.servo_model import ServoModel
 
 Array = NDArray[np.float64]
@@ -195,9 +195,8 @@ def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
     """Take the controls to where these servos have them, in all that is remembered."""
     model, imperfect = state.model, state.model.imperfections
     assert imperfect is not None
-    applied = as_stated(imperfect, model.layout)
     state.servos = servos
-    state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, applied)
+    state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied)
 
     def moved(info: Information) -> Information:
         return remapped(info, imperfect, state.line_model, model.spectrum)

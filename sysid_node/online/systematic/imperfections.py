@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.servos import servos_of
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.instruments import InstrumentModel, with_servos
@@ -34,8 +35,8 @@ class Imperfections:
     sources: tuple[Source, ...]
     controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
     timed: Index  # (m,) places of these controls among those of the layout
-    lateness: Array  # (m,) s: as the aircraft file has it
-    sigmas: Array  # (m,) s: its 1 sigma
+    applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
+    sigmas: Array  # (m,) s: 1 sigma of the lateness about the aircraft file's
     columns: ServoColumns
     places: Index  # (W,) where the columns of the signal vector stand among them
 
@@ -51,25 +52,34 @@ class Imperfections:
         return slice(len(self.sources), len(self.sources) + len(self.controls))
 
 
-def imperfections(aircraft: Aircraft, layout: Layout) -> Imperfections | None:
-    """Those of an aircraft file; None where it states that all is exact."""
+def imperfections(aircraft: Aircraft, layout: Layout, *, commanded: bool, positions: bool) -> Imperfections | None:
+    """Those of an aircraft file; None where it states that all is exact.
+
+    ``commanded``: the deflections follow from commands by the file's servos. ``positions``: they are known to be
+    measured, so that no servo comes after them. Where neither is known, they may be either.
+    """
     found = sources(aircraft)
+    servos = dict(zip(aircraft.control_symbols, servos_of(aircraft)[1:], strict=True))
     names = {control.symbol: name for name, control in aircraft.controls.items()}
+    stated = [servo_model.of_servo(servos[symbol]) for symbol in layout.timed]
     rows = []
     for place, symbol in enumerate(layout.timed):
         name = names[symbol]
         sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
-        if sigma > 0.0:
-            rows.append((name, place, 0.0, sigma))
+        if not commanded:
+            sigma = math.hypot(sigma, stated[place][0])
+        if sigma > 0.0 and not positions:
+            rows.append((name, place, sigma))
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
-    controls, timed, lateness, sigmas = zip(*rows, strict=True) if rows else ((), (), (), ())
+    controls, timed, sigmas = zip(*rows, strict=True) if rows else ((), (), ())
+    applied = np.array(stated).reshape(-1, 2) if commanded else np.zeros((len(layout.timed), 2))
     return Imperfections(
         found,
         controls,
         np.array(timed, np.intp),
-        np.array(lateness),
+        ServoModel(applied[:, 0].copy(), applied[:, 1].copy()),
         np.array(sigmas),
         columns,
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
@@ -77,14 +87,6 @@ def imperfections(aircraft: Aircraft, layout: Layout) -> Imperfections | None:
 
 
 _SERVO_EFFECTS = ("actuator_lag", "command_delay")
-
-
-def as_stated(imperfect: Imperfections, layout: Layout) -> ServoModel:
-    """The servos before anything is known of the flight."""
-    none = np.zeros(len(layout.timed))
-    model = ServoModel(none, none.copy())
-    model.lateness[imperfect.timed] = imperfect.lateness
-    return model
 
 
 def line_model(
@@ -120,7 +122,10 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     late, curved = model.lateness[imperfect.timed], model.curvature[imperfect.timed]
     of_curvature = CURVATURE * np.maximum(late, SHORTEST) ** 2
     sigmas = np.concatenate([[source.sigma for source in imperfect.sources], imperfect.sigmas, of_curvature])
-    means = np.concatenate([np.zeros(len(imperfect.sources)), imperfect.lateness - late, CURVATURE * late**2 - curved])
+    stated, expected = imperfect.applied.lateness[imperfect.timed], imperfect.applied.curvature[imperfect.timed]
+    # what is late beyond the file's servo may be a lag or a delay
+    expected = expected + CURVATURE * (late - stated) ** 2
+    means = np.concatenate([np.zeros(len(imperfect.sources)), stated - late, expected - curved])
     return sigmas, means
 
 

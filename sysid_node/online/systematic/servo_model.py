@@ -19,6 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.flight.servos import Servo
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -37,6 +39,13 @@ class ServoModel:
         lateness = np.clip(self.lateness + by_lateness, -0.1, LATEST)
         least = -0.25 * np.maximum(lateness, 0.02) ** 2
         return ServoModel(lateness, np.clip(self.curvature + by_curvature, least, np.maximum(lateness, 0.02) ** 2))
+
+
+def of_servo(servo: Servo) -> tuple[float, float]:
+    """Lateness (s) and curvature (s^2) of a servo of the aircraft file, its rate limit left out."""
+    T, d = servo.time_constant, servo.delay
+    late, curved = (2.0 * servo.damping * T, T * T) if servo.damping else (T, 0.0)
+    return late + d, curved + late * d + 0.5 * d * d
 
 
 def lateness(model: ServoModel, applied: ServoModel, omega: Array) -> Complex:
