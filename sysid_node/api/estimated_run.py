@@ -30,7 +30,7 @@ _FIGURES = {
     "residuals": residuals.figures_of,
 }
 
-_COLUMNS = ("value", "standard_error", "lower", "upper", "valid", "status")
+_COLUMNS = ("value", "standard_error", "statistical_error", "systematic_error", "lower", "upper", "valid", "status")
 
 
 class EstimatedRun(ABC):

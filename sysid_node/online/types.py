@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 #: Columns of an aligned sample before the aerodynamic controls (which follow in the aircraft file's order).
@@ -47,3 +47,6 @@ class Estimates:
     time: float
     derivatives: Mapping[str, DerivativeEstimate]
     fits: Mapping[str, FitQuality]
+    servos: Mapping[str, DerivativeEstimate] = field(default_factory=dict)  # by control: how late it follows, s
+    #: By derivative: shares of its variance by source, see ``systematic.budget``.
+    budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

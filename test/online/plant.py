@@ -32,7 +32,10 @@ TRUTH = {
 
 
 def made_aircraft(derivatives: Mapping[str, float] = TRUTH, **changes: object) -> Aircraft:
-    """A 3.5 kg UAV whose file is right, with tolerances of 10 %; ``changes`` replace its fields."""
+    """A 3.5 kg UAV whose file is right, with derivatives' tolerances of 10 %; ``changes`` replace its fields.
+
+    It is a simulator's: all but the derivatives is exactly known.
+    """
     surfaces = {"elevator": "de", "aileron": "da", "rudder": "dr"}
     aircraft = Aircraft(
         name="made",
@@ -44,6 +47,8 @@ def made_aircraft(derivatives: Mapping[str, float] = TRUTH, **changes: object) -
         controls={name: Control(name, symbol, {name: 1.0}) for name, symbol in surfaces.items()},
         derivatives={name: Derivative(value, max(0.1 * abs(value), 0.01)) for name, value in derivatives.items()},
         throttle=Throttle("throttle", 30.0),
+        ideal=True,
+        noise_bias=dict.fromkeys(("accel", "gyro", "alpha", "beta", "airspeed"), 0.0),
     )
     return replace(aircraft, **changes)
 

@@ -40,6 +40,9 @@ def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[Co
     relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))
     growth = growth_since(latest, current.time)
     variances = slope_variances(latest, current.solution.residual, current.size, growth)
+    if latest.systematic is not None:
+        theta = theta + latest.systematic.correction[:, :-1].T * equations.belongs
+        variances = variances + latest.systematic.variance[:, :-1]
     spread = np.sqrt(np.maximum(variances.T, 0.0) + _tolerances(precisions))
     deviations = np.where(equations.belongs > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()

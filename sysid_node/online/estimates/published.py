@@ -14,11 +14,13 @@ from sysid_node.online.estimates.validity import judge, validity_basis
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import weak_instruments
 from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.systematic.budget import Budget
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
 
 NORMAL_95 = 1.959963984540054  # standard errors of the normal distribution's two-sided 95 % interval
+SERVO_KNOWN = 0.01  # s: the largest standard error of a servo's time that is valid
 
 
 def estimate(state: EstimatorState, now: float | None = None) -> Estimates:
@@ -40,7 +42,33 @@ def estimate_of(state: EstimatorState, current: CurrentSolution | None, now: flo
         numbers = np.concatenate([numbers, np.tile(nothing, (missing, 1))])
         codes = np.concatenate([codes, np.full(missing, status.INERTIA, codes.dtype)])
     derivatives = DerivativeRows(model.table.all_names, numbers, codes, model.vocabulary)
-    return Estimates(time, derivatives, FitRows(model.equations.coefficients, _fits(state, latest, current)))
+    fits = FitRows(model.equations.coefficients, _fits(state, latest, current))
+    if latest.systematic is None:
+        return Estimates(time, derivatives, fits)
+    return Estimates(time, derivatives, fits, _servos(state, latest), _budget(state, latest, current))
+
+
+def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, DerivativeEstimate]:
+    """How late each control follows what is recorded of it, s: of those whose servos are not exactly known."""
+    imperfect, found = state.model.imperfections, latest.systematic
+    assert imperfect is not None
+    assert found is not None
+    late, rows = found.servos.lateness[imperfect.timed].tolist(), {}
+    for name, value, error in zip(imperfect.controls, late, found.errors.tolist(), strict=True):
+        half, valid = NORMAL_95 * error, error <= SERVO_KNOWN
+        words = "ok" if valid else "converging"
+        rows[name] = DerivativeEstimate(name, value, error, value - half, value + half, valid, words, error, 0.0)
+    return rows
+
+
+def _budget(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Budget:
+    """What the variance of each derivative is made of."""
+    imperfect, found, table = state.model.imperfections, latest.systematic, state.model.table
+    assert imperfect is not None
+    assert found is not None
+    jacobian = found.considered.jacobian
+    per_derivative = jacobian.reshape(jacobian.shape[0], -1)[:, table.place]
+    return Budget(table.names, imperfect.keys, per_derivative, found.considered.covariance, current.variances)
 
 
 def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:

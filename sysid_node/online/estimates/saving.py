@@ -41,6 +41,8 @@ def save_estimates(
         "settings": settings.as_dict(),
         "derivatives": {name: _plain(d._asdict(), without="name") for name, d in estimates.derivatives.items()},
         "fits": {name: _plain(f._asdict(), without="coefficient") for name, f in estimates.fits.items()},
+        "servos": {name: _plain(d._asdict(), without="name") for name, d in estimates.servos.items()},
+        "budget": {name: dict(shares) for name, shares in estimates.budget.items()},
         "holdout": {},
     }
     folder = folder.absolute()

@@ -17,11 +17,10 @@ from sysid_node.flight.cdr.layout import Definitions
 from sysid_node.flight.cdr.template import Template, Templates
 from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES_TYPE
-from sysid_node.online.estimates.rows import DerivativeRows, FitRows
+from sysid_node.online.estimates.rows import DERIVATIVE_NUMBERS, DerivativeRows, FitRows
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 
 Array = NDArray[np.float64]
-_NUMBERS = ("value", "standard_error", "lower", "upper")
 _FIT_NUMBERS = ("r_squared", "residual_std", "degrees_of_freedom")
 _REMEMBERED = 64  # templates
 
@@ -55,42 +54,58 @@ class EstimatesSerialiser:
         seconds, nanoseconds = divmod(stamps_ns[:, None], 1_000_000_000)
         derivatives = np.array([_derivatives(estimates.derivatives) for estimates in history])
         fits = np.array([_fits(estimates.fits) for estimates in history])
-        numbers = [part.reshape(len(history), -1) for part in (derivatives, fits[:, :, :-1])]
+        servos = np.array([_derivatives(estimates.servos) for estimates in history])
+        numbers = [part.reshape(len(history), -1) for part in (derivatives, fits[:, :, :-1], servos)]
         columns = {"i4": seconds, "u4": nanoseconds, "f8": np.concatenate(numbers, axis=1), "u8": fits[:, :, -1]}
         return template.write(**{kind: column for kind, column in columns.items() if column.size})
 
     def _make(
-        self, frame_id: str, names: tuple[str, ...], statuses: tuple[str, ...], coefficients: tuple[str, ...]
+        self,
+        frame_id: str,
+        names: tuple[str, ...],
+        statuses: tuple[str, ...],
+        coefficients: tuple[str, ...],
+        servos: tuple[tuple[str, str], ...],
     ) -> Template:
         """The template of messages with these names, statuses, and coefficients."""
-        blank, blank_fit = (0.0,) * len(_NUMBERS), (0.0,) * len(_FIT_NUMBERS)
+        blank, blank_fit = (0.0,) * len(DERIVATIVE_NUMBERS), (0.0,) * len(_FIT_NUMBERS)
         header = ((0, 0), frame_id)
-        derivatives = tuple(
-            (name, *blank, status == "ok", status) for name, status in zip(names, statuses, strict=True)
+        derivatives, of_servos = (
+            tuple((name, *blank, status == "ok", status) for name, status in rows)
+            for rows in (zip(names, statuses, strict=True), servos)
         )
         fits = tuple((coefficient, *blank_fit, 0) for coefficient in coefficients)
-        return self._templates.template(DERIVATIVES_TYPE, (header, *self._said, derivatives, fits))
+        return self._templates.template(DERIVATIVES_TYPE, (header, *self._said, derivatives, fits, of_servos))
 
 
 def _alike(estimates: Estimates) -> Hashable:
     """What is equal where names and statuses are."""
     derivatives, fits = estimates.derivatives, estimates.fits
     if isinstance(derivatives, DerivativeRows) and isinstance(fits, FitRows):
-        return derivatives.names, derivatives.codes.tobytes(), fits.names
+        return derivatives.names, derivatives.codes.tobytes(), fits.names, _servos(estimates)
     return _strings(estimates)
 
 
-def _strings(estimates: Estimates) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Names, statuses, coefficients."""
-    derivatives, fits = estimates.derivatives, estimates.fits
+_Servos = tuple[tuple[str, str], ...]  # names and statuses
+
+
+def _strings(estimates: Estimates) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...], _Servos]:
+    """Names, statuses, coefficients, servos."""
+    derivatives, fits = estimates.derivatives, tuple(estimates.fits)
     if isinstance(derivatives, DerivativeRows):
-        return derivatives.names, derivatives.statuses, tuple(fits)
-    return tuple(derivatives), tuple(row.status for row in derivatives.values()), tuple(fits)
+        return derivatives.names, derivatives.statuses, fits, _servos(estimates)
+    return tuple(derivatives), tuple(row.status for row in derivatives.values()), fits, _servos(estimates)
+
+
+def _servos(estimates: Estimates) -> _Servos:
+    return tuple((name, row.status) for name, row in estimates.servos.items())
 
 
 def _derivatives(rows: Mapping[str, DerivativeEstimate]) -> Array:
-    """(n, 4) what ``_NUMBERS`` names of n derivatives."""
-    return rows.numbers if isinstance(rows, DerivativeRows) else _table(rows, attrgetter(*_NUMBERS), len(_NUMBERS))
+    """(n, 6) what ``DERIVATIVE_NUMBERS`` names of n derivatives or servos."""
+    if isinstance(rows, DerivativeRows):
+        return rows.numbers
+    return _table(rows, attrgetter(*DERIVATIVE_NUMBERS), len(DERIVATIVE_NUMBERS))
 
 
 def _fits(rows: Mapping[str, FitQuality]) -> Array:

@@ -15,6 +15,7 @@ transform of the control's rate, whose boundary terms are right: X = X + g (tran
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,5 +64,5 @@ def rate_gain(model: ServoModel, omega: Array) -> Complex:
     return np.asarray(-1.0 / _denominator(model, 1j * omega[:, None]))
 
 
-def _denominator(model: ServoModel, s: Complex) -> Complex:
+def _denominator(model: ServoModel, s: NDArray[Any]) -> Complex:
     return np.asarray(1.0 + model.lateness * s + model.curvature * s * s)

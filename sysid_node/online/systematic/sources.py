@@ -52,7 +52,7 @@ def describe(changes: ColumnChanges, source: Source) -> None:
     """Put what one unit of a source changes into the ``changes``."""
     change = _change_of(source)
     assert change is not None
-    change(changes, *source.key.rsplit(".", 1)[-1:], source.key)
+    change(changes, source.key.rpartition(".")[2], source.key)
 
 
 def _change_of(source: Source) -> Change | None:

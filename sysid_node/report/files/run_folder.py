@@ -12,7 +12,7 @@ from typing import Any
 
 from sysid_node.errors import InputError
 from sysid_node.interruption import on_interrupt
-from sysid_node.online.types import Estimates
+from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.drawing.thinning import MAX_ROWS, thin_curve, thin_flight
 from sysid_node.report.files import run_tables as tables
 from sysid_node.report.files.fault_summary import as_summary, from_summary
@@ -58,7 +58,7 @@ def read_run(folder: Path) -> RunResult:
     return RunResult(
         aircraft=found["aircraft"],
         method=found["method"],
-        history=tables.read_history(folder / "estimates.csv", folder / "fits.csv"),
+        history=_with_servos(tables.read_history(folder / "estimates.csv", folder / "fits.csv"), found),
         title=found.get("title", ""),
         data=RunData(_from_json(found.get("data_seconds")), found.get("samples", 0), found.get("rejected", {})),
         settings=found.get("settings", {}),
@@ -75,6 +75,15 @@ def read_run(folder: Path) -> RunResult:
     )
 
 
+def _with_servos(history: list[Estimates], found: Mapping[str, Any]) -> list[Estimates]:
+    """The history with what the summary alone holds of its end: servos and budget."""
+    if not history:
+        return history
+    rows = _from_json(found.get("servos", {}))
+    servos = {name: DerivativeEstimate(name=name, **row) for name, row in rows.items()}
+    return [*history[:-1], replace(history[-1], servos=servos, budget=found.get("budget", {}))]
+
+
 def summary(run: RunResult) -> dict[str, Any]:
     """The content of ``summary.json``; what is not a finite number is null."""
     final = run.final or Estimates(math.nan, {}, {})
@@ -88,6 +97,8 @@ def summary(run: RunResult) -> dict[str, Any]:
         "settings": run.settings,
         "derivatives": {name: _without(d._asdict(), "name") for name, d in final.derivatives.items()},
         "fits": {name: _without(f._asdict(), "coefficient") for name, f in final.fits.items()},
+        "servos": {name: _without(d._asdict(), "name") for name, d in final.servos.items()},
+        "budget": {name: dict(shares) for name, shares in final.budget.items()},
         "holdout": run.holdout,
         "faults": as_summary(run.faults),
         "remarks": list(run.remarks),

@@ -1,9 +1,10 @@
 """The CSV tables of a run, written and read back without loss: numbers to the last bit, an empty cell is NaN.
 
 ========================  ==============================================================================
-``derivatives.csv``       final: name, value, standard_error, lower, upper, valid, status, prior,
-                          prior_tolerance, truth, truth_since (where it changed in flight)
-``estimates.csv``         over time: time, name, value, standard_error, lower, upper, valid, status
+``derivatives.csv``       final: name, value, standard_error, lower, upper, valid, status, statistical_error,
+                          systematic_error, prior, prior_tolerance, truth, truth_since (where it changed in flight)
+``estimates.csv``         over time: time, name, value, standard_error, lower, upper, valid, status,
+                          statistical_error, systematic_error
 ``fits.csv``              over time: time, coefficient, r_squared, residual_std, degrees_of_freedom, samples
 ``signals.csv``           the aligned record (thinned where it is long): time, one column per signal
 ``spectra.csv``           frequency, ``input_<control>``, ``measured_<coefficient>``, ``residual_<coefficient>``
@@ -30,7 +31,8 @@ from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.report.results.run_result import Prior, References
 from sysid_node.report.results.signals import Response, Spectra
 
-ESTIMATE_COLUMNS = ("name", "value", "standard_error", "lower", "upper", "valid", "status")
+_PARTS = ("statistical_error", "systematic_error")
+ESTIMATE_COLUMNS = ("name", "value", "standard_error", "lower", "upper", "valid", "status", *_PARTS)
 FIT_COLUMNS = ("coefficient", "r_squared", "residual_std", "degrees_of_freedom", "samples")
 REFERENCE_COLUMNS = ("prior", "prior_tolerance", "truth", "truth_since")
 RESPONSE_COLUMNS = ("name", "unit", "time", "measured", "modelled")
@@ -162,15 +164,20 @@ def read_responses(path: Path) -> dict[str, Response]:
 
 
 def _estimate_cells(d: DerivativeEstimate) -> Row:
-    return (d.name, d.value, d.standard_error, d.lower, d.upper, "true" if d.valid else "false", d.status)
+    parts = d.statistical_error, d.systematic_error
+    return (d.name, d.value, d.standard_error, d.lower, d.upper, "true" if d.valid else "false", d.status, *parts)
 
 
 def _estimate(row: list[str]) -> tuple[float, DerivativeEstimate]:
-    time, name, value, standard_error, lower, upper, valid, status = row
+    time, name, value, standard_error, lower, upper, valid, status, *parts = row
     if valid not in ("true", "false"):
         raise ValueError(f"valid is {valid!r}, expected true or false")
     error, low, high = _number(standard_error), _number(lower), _number(upper)
-    return _number(time), DerivativeEstimate(name, _number(value), error, low, high, valid == "true", status)
+    statistical, systematic = (_number(part) for part in parts)
+    estimate = DerivativeEstimate(
+        name, _number(value), error, low, high, valid == "true", status, statistical, systematic
+    )
+    return _number(time), estimate
 
 
 def _fit(row: list[str]) -> tuple[float, FitQuality]:

@@ -70,7 +70,14 @@ def _derivative(
     status = estimate.status if not estimate.valid or trusted == "ok" else trusted
     valid = estimate.valid and trusted == "ok"
     return DerivativeEstimate(
-        name, estimate.value, estimate.standard_error, estimate.lower, estimate.upper, valid, status
+        name,
+        estimate.value,
+        estimate.standard_error,
+        estimate.lower,
+        estimate.upper,
+        valid,
+        status,
+        estimate.standard_error,
     )
 
 

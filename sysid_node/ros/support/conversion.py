@@ -55,12 +55,16 @@ def estimates_from_message(message: Any, start_ns: int) -> Estimates:
     """The estimates in a sysid_msgs/DerivativeEstimates; ``time`` is in s from ``start_ns``."""
     return Estimates(
         time=(stamp_ns(message.header.stamp) - start_ns) / NANOSECONDS,
-        derivatives={
-            d.name: types.DerivativeEstimate(d.name, d.value, d.standard_error, d.lower, d.upper, d.valid, d.status)
-            for d in message.derivatives
-        },
+        derivatives={d.name: _estimate(d) for d in message.derivatives},
         fits={
             f.coefficient: types.FitQuality(f.coefficient, f.r_squared, f.residual_std, f.degrees_of_freedom, f.samples)
             for f in message.fits
         },
+        servos={d.name: _estimate(d) for d in message.servos},
     )
+
+
+def _estimate(d: Any) -> types.DerivativeEstimate:
+    """The estimate in a sysid_msgs/DerivativeEstimate."""
+    parts = d.statistical_error, d.systematic_error
+    return types.DerivativeEstimate(d.name, d.value, d.standard_error, d.lower, d.upper, d.valid, d.status, *parts)

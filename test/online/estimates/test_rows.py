@@ -8,10 +8,10 @@ from sysid_node.online.estimates.rows import DerivativeRows, FitRows
 from sysid_node.online.status import NOT_EXCITED, OK, WORDS, Vocabulary
 from sysid_node.online.types import DerivativeEstimate, FitQuality
 
-NUMBERS = np.array([[-1.0, 0.1, -1.2, -0.8], [0.5, np.inf, -np.inf, np.inf]])
+NUMBERS = np.array([[-1.0, 0.1, 0.08, 0.06, -1.2, -0.8], [0.5, np.inf, np.inf, 0.0, -np.inf, np.inf]])
 ROWS = {
-    "Cm_q": DerivativeEstimate("Cm_q", -1.0, 0.1, -1.2, -0.8, True, "ok"),
-    "Cm_de": DerivativeEstimate("Cm_de", 0.5, np.inf, -np.inf, np.inf, False, "not excited"),
+    "Cm_q": DerivativeEstimate("Cm_q", -1.0, 0.1, -1.2, -0.8, True, "ok", 0.08, 0.06),
+    "Cm_de": DerivativeEstimate("Cm_de", 0.5, np.inf, -np.inf, np.inf, False, "not excited", np.inf, 0.0),
 }
 
 

@@ -49,7 +49,9 @@ def test_files_of_an_earlier_run_do_not_linger(tmp_path):
 def test_summary_keeps_to_the_contract():
     content = summary(synthetic.run(seconds=10.0))
     assert content["rejected"]["air_data: not finite"] == 12
-    assert set(content["derivatives"]["Cm_alpha"]) == {"value", "standard_error", "lower", "upper", "valid", "status"}
+    errors = {"standard_error", "statistical_error", "systematic_error"}
+    assert set(content["derivatives"]["Cm_alpha"]) == {"value", *errors, "lower", "upper", "valid", "status"}
+    assert {"servos", "budget"} <= set(content)
     assert {"r_squared", "residual_std"} <= set(content["fits"]["Cm"])
     keys = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
     assert keys <= set(content)

@@ -40,7 +40,7 @@ def test_nan_is_an_empty_cell(tmp_path):
     path = tmp_path / "estimates.csv"
     unknown = estimate("Cm_q", *[math.nan] * 4, valid=False, status="not excited")
     tables.write_estimates(path, [Estimates(1.0, {"Cm_q": unknown}, {})])
-    assert path.read_text().splitlines()[1] == "1.0,Cm_q,,,,,false,not excited"
+    assert path.read_text().splitlines()[1] == "1.0,Cm_q,,,,,false,not excited,,0.0"
     (back,) = tables.read_history(path, tmp_path / "none.csv")
     assert math.isnan(back.derivatives["Cm_q"].value)
 
@@ -93,14 +93,14 @@ def test_nothing_to_write_leaves_no_file(tmp_path):
 @pytest.mark.parametrize(
     ("row", "wrong"),
     [
-        ("1.0,Cm_q,abc,,,,true,ok", "could not convert string to float: 'abc'"),
-        ("1.0,Cm_q,1.0", "3 cells, expected 8"),
-        ("1.0,Cm_q,,,,,perhaps,ok", "valid is 'perhaps'"),
+        ("1.0,Cm_q,abc,,,,true,ok,,", "could not convert string to float: 'abc'"),
+        ("1.0,Cm_q,1.0", "3 cells, expected 10"),
+        ("1.0,Cm_q,,,,,perhaps,ok,,", "valid is 'perhaps'"),
     ],
 )
 def test_a_damaged_row_is_named(tmp_path, row, wrong):
     path = tmp_path / "estimates.csv"
-    path.write_text(",".join(("time", *tables.ESTIMATE_COLUMNS)) + f"\n0.5,Cm_q,1,1,1,1,true,ok\n{row}\n")
+    path.write_text(",".join(("time", *tables.ESTIMATE_COLUMNS)) + f"\n0.5,Cm_q,1,1,1,1,true,ok,1,0\n{row}\n")
     with pytest.raises(InputError, match=r"estimates\.csv, line 3: ") as error:
         tables.read_history(path, tmp_path / "fits.csv")
     assert wrong in str(error.value)
