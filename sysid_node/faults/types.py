@@ -56,7 +56,8 @@ class Fault:
         """All values as texts for a diagnostic_msgs/DiagnosticStatus, at a time (s, as ``since``)."""
         found: dict[str, object] = {"kind": self.kind, "part": self.part, "size": self.size}
         found |= {"lower": self.lower, "upper": self.upper, "unit": self.unit, "probability": self.probability}
-        found |= {"since (s)": self.since, "found (s)": self.found, "now (s)": now}
+        times = {"onset": self.since, "found": self.found, "now": now}
+        found |= {f"{name} (s since the first IMU message)": time for name, time in times.items()}
         found |= {c.name: f"{c.value:.6g} [{c.lower:.6g}, {c.upper:.6g}]" for c in self.changes}
         return {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in found.items()}
 

@@ -6,8 +6,17 @@ are published as messages. A module that imports no ROS belongs in the layer who
 """
 
 import os
+import signal
 import sys
+import threading
 from pathlib import Path
+
+PROGRAMS = frozenset(
+    {
+        *("adapter", "adaptive_controller", "exciter", "fault_monitor"),
+        *("flight_simulator", "identifier", "player", "recorder"),
+    }
+)
 
 
 def find_packages() -> None:
@@ -20,4 +29,19 @@ def find_packages() -> None:
         os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
 
+def end_quietly() -> None:
+    """Let SIGINT and SIGTERM end this process at once with code 0, where it is one of the ``PROGRAMS`` that starts.
+
+    Imports take a second or more, in which Ctrl-C would leave a traceback of the import system. Nothing has begun by
+    then that would have to be ended. ``support.spin`` takes the signals over. ``-m`` is the name of a program that
+    Python is about to find by its module.
+    """
+    starting = Path(sys.argv[0] if sys.argv else "").name in ("-m", *PROGRAMS)
+    if starting and threading.current_thread() is threading.main_thread():
+        for one in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(one) is not signal.SIG_IGN:
+                signal.signal(one, lambda *_: os._exit(0))
+
+
+end_quietly()
 find_packages()

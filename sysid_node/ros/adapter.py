@@ -36,7 +36,7 @@ from sysid_node.parameter import Parameter, annotated_yaml, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.diagnostics import Source
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.ros.support.spin import run_node
 
 #: Autopilots' bridges publish best effort. The queue is deep enough for a burst after a pause of the process.
 INPUT_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -202,7 +202,7 @@ def parameter_file() -> str:
 
 def main() -> None:
     """Entry point of the node."""
-    sys.exit(run_program(lambda: serve(AdapterNode())))
+    sys.exit(run_node(AdapterNode, __doc__ or "", PARAMETERS))
 
 
 if __name__ == "__main__":

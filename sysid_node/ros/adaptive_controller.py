@@ -43,7 +43,7 @@ from sysid_node.ros.support.loop_node import (
     by_name,
     named,
 )
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = ControllerSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
@@ -261,7 +261,7 @@ class AdaptiveController(LoopNode):
 
 def main() -> None:
     """Entry point of the node."""
-    sys.exit(run_program(lambda: serve(AdaptiveController())))
+    sys.exit(run_node(AdaptiveController, __doc__ or "", PARAMETERS))
 
 
 if __name__ == "__main__":

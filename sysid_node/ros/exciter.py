@@ -26,7 +26,7 @@ from sysid_node.flight.topics import AIR_DATA, IMU
 from sysid_node.parameter import Parameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, named
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = ExcitationSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
@@ -147,7 +147,7 @@ class Exciter(LoopNode):
 
 def main() -> None:
     """Entry point of the node."""
-    sys.exit(run_program(lambda: serve(Exciter())))
+    sys.exit(run_node(Exciter, __doc__ or "", PARAMETERS))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.parameter import Parameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = FaultMonitorSettings()
 _setting = partial(setting, _DEFAULT, RANGES)
@@ -136,7 +136,7 @@ class FaultMonitor(LoopNode):
 
 def main() -> None:
     """Entry point of the node."""
-    sys.exit(run_program(lambda: serve(FaultMonitor())))
+    sys.exit(run_node(FaultMonitor, __doc__ or "", PARAMETERS))
 
 
 if __name__ == "__main__":

@@ -6,18 +6,31 @@ This module imports nothing that simulation needs, so that one line says where t
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from importlib.util import find_spec
 
+from rclpy.node import Node
+
 from sysid_node.errors import InputError
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.parameter import Parameter
+from sysid_node.ros.support.spin import run_node
 
 
 def main() -> None:
     """Entry point of the node."""
-    sys.exit(run_program(_fly))
+    about = "Flies an aircraft in real time, or faster, and is flown over topics."
+    sys.exit(run_node(_make, about, _table() if {"-h", "--help"} & set(sys.argv[1:]) else ()))
 
 
-def _fly() -> None:
+def _table() -> Sequence[Parameter]:
+    if find_spec("jax") is None:
+        return ()
+    from sysid_node.ros.support.simulated_flight import PARAMETERS  # noqa: PLC0415  # JAX may be missing
+
+    return PARAMETERS
+
+
+def _make() -> Node:
     missing = [name for name in ("jax", "scipy") if find_spec(name) is None]
     if missing:
         raise InputError(
@@ -25,7 +38,7 @@ def _fly() -> None:
         )
     from sysid_node.ros.support.simulated_flight import FlightSimulator  # noqa: PLC0415  # JAX may be missing
 
-    serve(FlightSimulator())
+    return FlightSimulator()
 
 
 if __name__ == "__main__":

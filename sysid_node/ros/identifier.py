@@ -41,7 +41,7 @@ from sysid_node.ros.support.diagnostics import Source, lag_level, lag_words, rej
 from sysid_node.ros.support.lifecycle import CarefulNode
 from sysid_node.ros.support.loop_node import SENSOR_QOS, UNHEARD, expected_joints, full_name, say
 from sysid_node.ros.support.message_types import fields_of
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.ros.support.spin import run_node
 
 DIAGNOSTICS = 1.0  # s between diagnostics
 TICK = 0.2  # s between checks of whether diagnostics are overdue because no estimate was published
@@ -253,7 +253,7 @@ class Identifier(CarefulNode):
 
 def main() -> None:
     """Entry point of the node."""
-    sys.exit(run_program(lambda: serve(Identifier())))
+    sys.exit(run_node(Identifier, __doc__ or "", PARAMETERS))
 
 
 if __name__ == "__main__":

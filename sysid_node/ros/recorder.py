@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.executors import ExternalShutdownException
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -48,19 +49,27 @@ class Recorder(Node):
 
     def __init__(self, writer: Writer, topics: Mapping[str, str]) -> None:
         super().__init__("recorder")
-        self.count = 0
+        self.counts: dict[str, int] = {}  # messages written, by resolved topic
         overrides = QoSOverridingOptions.with_default_policies()
         for topic, type_name in topics.items():
             package, _, name = type_name.partition("/msg/")
             kind = getattr(importlib.import_module(f"{package}.msg"), name)
             resolved = self.resolve_topic_name(topic)
-            take = self._writing(writer, add_topic(writer, resolved, type_name))
+            take = self._writing(writer, resolved, add_topic(writer, resolved, type_name))
             self.create_subscription(kind, topic, take, QOS, raw=True, qos_overriding_options=overrides)
 
-    def _writing(self, writer: Writer, connection: Any) -> Callable[[bytes], None]:
+    def words(self) -> str:
+        """How much was recorded, and on which topics nothing came."""
+        missing = [topic for topic, count in self.counts.items() if not count]
+        nothing = f"; nothing came on {', '.join(missing)}" if missing else ""
+        return f"recorded {sum(self.counts.values())} messages of {len(self.counts) - len(missing)} topics{nothing}"
+
+    def _writing(self, writer: Writer, topic: str, connection: Any) -> Callable[[bytes], None]:
+        self.counts[topic] = 0
+
         def take(message: bytes) -> None:
             writer.write(connection, time.time_ns(), message)
-            self.count += 1
+            self.counts[topic] += 1
 
         return take
 
@@ -82,6 +91,7 @@ def main() -> None:
             recorder.get_logger().info(f"records into {options.bag}")
             with contextlib.suppress(ExternalShutdownException):  # the writer aborts on exceptions
                 serve(recorder)
+        get_logger("recorder").info(f"{recorder.words()}, into {options.bag}")
 
     sys.exit(run_program(record))
 

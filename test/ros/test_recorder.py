@@ -1,6 +1,7 @@
 """A flight in closed loop, recorded over DDS, replays to the estimates that the live node published."""
 
 import contextlib
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -49,3 +50,12 @@ def test_a_bag_that_exists_is_left_alone(tmp_path: Path) -> None:
     assert process.returncode == 2
     assert "exists already" in text
     assert "Traceback" not in text
+
+
+def test_it_says_how_much_was_recorded_and_what_is_missing(tmp_path: Path, ros: None) -> None:
+    process = start("recorder", str(tmp_path / "empty"))
+    assert process.stdout is not None
+    assert "records into" in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    text, _ = process.communicate(timeout=20.0)
+    assert "recorded 0 messages of 0 topics; nothing came on /imu/data, /air_data, /actuators" in text

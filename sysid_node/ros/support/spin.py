@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import gc
 import signal
-from collections.abc import Callable
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import rclpy
 from rclpy.exceptions import NotInitializedException
@@ -14,6 +17,32 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 from sysid_node.errors import InputError
+from sysid_node.parameter import Parameter
+
+
+def run_node(make: Callable[[], Node], about: str, table: Sequence[Parameter] = ()) -> int:
+    """Make a node and serve it until it is stopped; returns the exit code (see ``run_program``).
+
+    With ``--help`` it prints what the node is ``about`` and its ``table`` of parameters.
+    """
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(help_text(Path(sys.argv[0]).stem, about, table))
+        return 0
+    return run_program(lambda: serve(make()))
+
+
+def help_text(name: str, about: str, table: Sequence[Parameter]) -> str:
+    """The help of a node: how to start it, what it does, its parameters with their defaults."""
+    lines = [f"usage: ros2 run sysid_node {name} --ros-args [-p NAME:=VALUE]... [--params-file FILE]", ""]
+    lines += [about.strip(), "", "parameters (default):"]
+    for one in table:
+        allowed = f" Values: {one.constraint}." if one.constraint else ""
+        unit = f" Unit: {one.unit}." if one.unit and not allowed else ""
+        default = '""' if one.default == "" else one.default
+        text = f"{one.name} ({default}): {one.meaning}{allowed}{unit}"
+        lines += textwrap.wrap(text, 110, initial_indent="  ", subsequent_indent="      ")
+    lines += ["", f"config/{name}.yaml is a file of all of them; topics and services: docs/reference/topics.md"]
+    return "\n".join(lines)
 
 
 def run_program(program: Callable[[], None]) -> int:
@@ -24,7 +53,8 @@ def run_program(program: Callable[[], None]) -> int:
     does, and ``program`` must end when ``rclpy.ok()`` is false. There is no KeyboardInterrupt, because in the middle
     of rclpy's conversion of a message one becomes a RuntimeError.
     """
-    signal.signal(signal.SIGINT, lambda *_: None)  # ROS's own handler, added next, calls this one
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, lambda *_: None)  # ROS's own handler, added next, calls this one
     try:
         rclpy.init()
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
@@ -42,6 +72,8 @@ def run_program(program: Callable[[], None]) -> int:
             raise  # otherwise ROS was shutting down
     finally:
         rclpy.try_shutdown()
+        for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
+            signal.signal(one, signal.SIG_IGN)
     return 0
 
 

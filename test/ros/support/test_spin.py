@@ -1,7 +1,14 @@
 """Programs end as they should when they are told to stop. Truth: exit codes; rclpy's own signal handling."""
 
+import contextlib
+import os
+import pty
+import signal
 import subprocess
 import sys
+import time
+
+import pytest
 
 INTERRUPTED = """
 import os, signal, sys, time
@@ -38,8 +45,8 @@ def ended(text: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_ctrl_c_and_sigterm_let_the_program_end_instead_of_raising_in_the_middle_of_it() -> None:
-    for signal in ("SIGINT", "SIGTERM"):
-        done = ended(INTERRUPTED.format(signal=signal))
+    for name in ("SIGINT", "SIGTERM"):
+        done = ended(INTERRUPTED.format(signal=name))
         assert (done.returncode, done.stdout, done.stderr) == (0, "told to stop\n", "")
 
 
@@ -65,3 +72,42 @@ def test_a_simulator_without_its_libraries_ends_with_one_line() -> None:
     (line,) = done.stderr.splitlines()
     assert "flight_simulator needs jax" in line
     assert "pip install -r requirements/desk.txt" in line
+
+
+@pytest.mark.parametrize(
+    ("wait", "times", "terminal"), [(0.4, 1, False), (0.4, 2, True), (3.0, 2, False), (3.0, 1, True)]
+)
+def test_a_node_ends_with_code_0_and_without_a_word(ros: None, wait: float, times: int, terminal: bool) -> None:
+    """By SIGINT, or Ctrl-C in a terminal, once or twice in a tenth of a second. While modules are imported, too."""
+    master, slave = pty.openpty()
+    node = ["-m", "sysid_node.ros.fault_monitor", "--ros-args", "-p", "aircraft:=cdrw"]
+    attach = ["-c", "import os, sys; os.login_tty(0); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"]
+    command = [sys.executable, *(attach if terminal else []), *node]
+    process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave)
+    os.close(slave)
+    time.sleep(wait)
+    for _ in range(times):
+        if terminal:
+            os.write(master, b"\x03")
+        else:
+            process.send_signal(signal.SIGINT)
+        time.sleep(0.1)
+    code, text = process.wait(20.0), ""
+    with contextlib.suppress(OSError):  # Linux: nothing was written, and the other end is closed
+        text = os.read(master, 100_000).decode()
+    os.close(master)
+    assert code == 0, text
+    for word in ("Traceback", "FATAL", "KeyboardInterrupt"):
+        assert word not in text
+
+
+@pytest.mark.parametrize("node", ["identifier", "adaptive_controller", "adapter", "recorder"])
+def test_help_helps(node: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", f"sysid_node.ros.{node}", "--help"], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"usage: {'' if node == 'recorder' else 'ros2 run sysid_node '}{node}")
+    if node == "adaptive_controller":
+        assert "gain_margin (2.0): Factor by which" in done.stdout
+    assert done.stderr == ""
