@@ -11,6 +11,7 @@ RATE ?= 1
 BAG  ?= bags/cdrw_multistep
 OUT  ?= out/demo
 ARGS ?=
+VIEW ?=
 
 VENV_DIR := $(abspath $(VENV))
 BIN      := $(VENV_DIR)/bin
@@ -30,8 +31,8 @@ help:  ## this list
 	@echo "make ... (VENV=$(VENV))"
 	@sed -nE 's/^([a-z]+):.*## (.*)/  \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
 
-demo: $(DONE)/build $(DONE)/run  ## identify the bundled flight live, over DDS; RATE=4 plays it four times faster
-	@$(BIN)/python -m sysid_node.cli demo $(BAG) --rate $(RATE) --out $(OUT) $(ARGS)
+demo: $(DONE)/build $(DONE)/run $(if $(VIEW),$(DONE)/view)  ## identify the bundled flight live, over DDS; RATE=4 plays it faster, VIEW=1 shows it in 3-D
+	@$(BIN)/python -m sysid_node.cli demo $(BAG) --rate $(RATE) --out $(OUT) $(if $(VIEW),--view) $(ARGS)
 
 loop: $(DONE)/build $(DONE)/run $(DONE)/desk  ## closed loop over DDS: something fails at 30 s, the controller adapts
 	@$(BIN)/python -m sysid_node.cli loop $(ARGS)

@@ -36,6 +36,7 @@ setup(
             "player = sysid_node.ros.player:main",
             "recorder = sysid_node.ros.recorder:main",
             "sysid = sysid_node.cli.main:main",
+            "view = sysid_node.cli.live.viewing:main",
         ],
     },
 )

@@ -16,6 +16,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.live.live_table import LiveStatus, ReferenceValues, live_table
 from sysid_node.cli.live.processes import node_process
 from sysid_node.cli.live.ros_domain import own_domain
+from sysid_node.cli.live.viewing import viewer_beside
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.align import why_nothing_aligned
@@ -77,6 +78,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("--aircraft", default="cdrw", help="file or name (default: cdrw)")
     parser.add_argument("--rate", type=float, default=1.0, help="how many times as fast as flown (default: 1)")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/demo"), help="default: out/demo")
+    options.add_view(parser)
     options.add_force(parser)
     return parser
 
@@ -87,9 +89,10 @@ def run(args: argparse.Namespace) -> None:
         raise InputError(f"--rate {args.rate:g}: expected a number over zero")
     flight = _read(args.bag, load_aircraft(args.aircraft))
     own_domain()
-    inputs, logs = options.inputs_of([args.bag], args.aircraft), ("identifier.log", "player.log")
+    inputs, logs = options.inputs_of([args.bag], args.aircraft), ("identifier.log", "player.log", "view.log")
     with output_folder(args.out, "demo", inputs=inputs, force=args.force, working=logs) as out:
-        follower, history = _fly(flight, args.aircraft, args.rate, args.out)
+        with viewer_beside(args.aircraft, args.view, args.out):
+            follower, history = _fly(flight, args.aircraft, args.rate, args.out)
         out.publish(lambda folder: write_run(folder, _result(flight, follower, history)))
     print(_summary(flight, history[-1], args.out))
     lost = _lost(flight, follower)

@@ -19,8 +19,9 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
     parser = commands.add_parser("view", help="show a flight in 3-D and against time", description=__doc__)
     add = parser.add_argument
-    add("path", metavar="RUN|BAG", type=Path, help="a folder that a command wrote, or a bag or log of a flight")
-    add("--aircraft", metavar="FILE|NAME", help="aircraft file, or name as in cdrw; needed for a bag")
+    add("path", metavar="RUN|BAG", type=Path, nargs="?", help="a folder that a command wrote, or a bag or log")
+    add("--live", action="store_true", help="show what is flown and identified now, over ROS, until Ctrl-C")
+    add("--aircraft", metavar="FILE|NAME", help="aircraft file, or name as in cdrw; needed for a bag and for --live")
     add("--save", metavar="FILE.rrd", type=Path, help="write a file instead of opening a window")
     options.add_reading(parser)
     return parser
@@ -31,6 +32,11 @@ def run(args: argparse.Namespace) -> None:
     from sysid_node.view import recording  # noqa: PLC0415  # not needed to print the help
 
     recording.require_rerun()
+    if args.live == (args.path is not None):
+        raise InputError("give either RUN|BAG or --live")
+    if args.live:
+        _live(args)
+        return
     scene = _scene(args)
     if args.save is None:
         recording.show(scene)
@@ -38,6 +44,15 @@ def run(args: argparse.Namespace) -> None:
     recording.save(scene, args.save)
     if not args.quiet:
         print(args.save)
+
+
+def _live(args: argparse.Namespace) -> None:
+    from sysid_node.aircraft.load import load_aircraft  # noqa: PLC0415
+    from sysid_node.cli.live.viewing import watch_live  # noqa: PLC0415
+
+    if args.aircraft is None:
+        raise InputError("--live: say which aircraft is flown: --aircraft FILE|NAME")
+    watch_live(load_aircraft(args.aircraft), args.save, args.body_frame)
 
 
 def _scene(args: argparse.Namespace) -> Scene:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -90,9 +91,14 @@ def moving(time: Array, values: Array, state: str) -> list[Change]:
     return changes if changes and changes[0].time == time[0] else [Change(float(time[0]), NOTHING), *changes]
 
 
-def derivative_tabs(history: Sequence[Estimates], references: References) -> dict[str, list[Panel]]:
-    """A tab of panels for each half of the model: estimates with their 95 % intervals, the file's value, the truth."""
-    names = list(dict.fromkeys(name for e in history for name in e.derivatives))
+def derivative_tabs(
+    history: Sequence[Estimates], references: References, names: Iterable[str] = ()
+) -> dict[str, list[Panel]]:
+    """A tab of panels for each half of the model: estimates with their 95 % intervals, the file's value, the truth.
+
+    ``names``: the derivatives; by default those that were estimated.
+    """
+    names = list(names) or list(dict.fromkeys(name for e in history for name in e.derivatives))
     tabs: dict[str, list[Panel]] = {}
     for name in names:
         tab = "Pitch" if name.partition("_")[0] in ("CL", "CD", "Cm") else "Roll and yaw"
@@ -132,7 +138,7 @@ def estimate_notes(history: Sequence[Estimates]) -> list[Note]:
 
 def _reference_curves(name: str, time: Array, references: References) -> list[Curve]:
     """The file's value and the truth, as lines over the estimates' time."""
-    ends, curves = time[[0, -1]], []
+    ends, curves = time[[0, -1]] if time.size else np.zeros(2), []
     if name in references.prior:
         curves.append(Curve("aircraft file", ends, np.full(2, references.prior[name].value), VERMILION, 1.0))
     if name in references.truth:
@@ -145,12 +151,16 @@ def _reference_curves(name: str, time: Array, references: References) -> list[Cu
 def _span(
     value: Array, lower: Array, upper: Array, valid: Array, name: str, references: References
 ) -> tuple[float, float] | None:
-    """The range that shows the valid estimates and what they are compared with; early intervals are far wider."""
-    shown = valid & np.isfinite(value)
-    if not shown.any():
-        return None
+    """The range that shows the valid estimates and what they are compared with; early intervals are far wider.
+
+    Without a valid estimate it is the file's value with four times its tolerance at either side.
+    """
     known = [references.prior[name].value] if name in references.prior else []
     known += [references.truth[name]] if name in references.truth else []
+    shown = valid & np.isfinite(value)
+    if not shown.any():
+        tolerance = references.prior[name].tolerance if name in references.prior else math.nan
+        return None if not known or math.isnan(tolerance) else (known[0] - 4.0 * tolerance, known[0] + 4.0 * tolerance)
     last = int(np.flatnonzero(shown)[-1])
     half = 0.5 * float(upper[last] - lower[last])
     ends = np.array([*value[shown], *known, value[last] - 4.0 * half, value[last] + 4.0 * half])

@@ -57,15 +57,10 @@ def save(scene: Scene, path: Path) -> None:
 
     Raises InputError where the file cannot be written, or is there and holds something else.
     """
-    from sysid_node.view.layout import blueprint  # noqa: PLC0415  # imports Rerun
-
     check_recording(path)
-    stream, aside = new_recording(scene.title), path.with_name(f".{path.name}.unfinished")
+    aside = path.with_name(f".{path.name}.unfinished")
     try:
-        with aside.open("wb"):
-            pass  # Rerun would only log that it cannot write
-        stream.save(aside, default_blueprint=blueprint(scene))
-        declare(stream, scene)
+        stream = open_file(scene, aside)
         append(stream, scene)
         stream.flush()
         stream.disconnect()
@@ -111,6 +106,27 @@ def open_window(scene: Scene) -> rerun.RecordingStream:
     return stream
 
 
+def open_file(scene: Scene, path: Path) -> rerun.RecordingStream:
+    """A recording that is written into a file as it goes on, with the scene declared. Raises InputError."""
+    from sysid_node.view.layout import blueprint  # noqa: PLC0415  # imports Rerun
+
+    stream = new_recording(scene.title)
+    try:
+        with path.open("wb"):
+            pass  # Rerun would only log that it cannot write
+    except OSError as error:
+        raise InputError(f"--save {path}: cannot be written ({error.strerror}); give another file") from None
+    stream.save(path, default_blueprint=blueprint(scene))
+    declare(stream, scene)
+    return stream
+
+
+def say(stream: rerun.RecordingStream, words: str) -> None:
+    """Replace the text (Markdown) beside the plots."""
+    rr = require_rerun()
+    _static(stream, ABOUT, rr.TextDocument(words, media_type=rr.MediaType.MARKDOWN))
+
+
 def without_usage_reports(program: str) -> None:
     """Turns the viewer's usage reports off for this account, as ``rerun analytics disable`` does, where they are on."""
     run = subprocess.run([program, "analytics", "config"], capture_output=True, text=True, check=False)
@@ -122,7 +138,7 @@ def without_usage_reports(program: str) -> None:
 def declare(stream: rerun.RecordingStream, scene: Scene) -> None:
     """Log what does not change in a flight: shapes, names and colours of curves and lanes, and the text."""
     rr = require_rerun()
-    _static(stream, ABOUT, rr.TextDocument(scene.about, media_type=rr.MediaType.MARKDOWN))
+    say(stream, scene.about)
     _static(stream, WORLD, rr.ViewCoordinates.FRD)
     for body in scene.bodies:
         _declare_body(stream, body, scene.shape)

@@ -48,6 +48,12 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     add_quiet(parser)
 
 
+def add_view(parser: argparse.ArgumentParser) -> None:
+    """``--view``, with or without a file."""
+    meaning = "show the flight in the viewer Rerun meanwhile, or write it into a file"
+    parser.add_argument("--view", metavar="FILE.rrd", type=Path, nargs="?", const=Path("-"), help=meaning)
+
+
 def add_quiet(parser: argparse.ArgumentParser) -> None:
     """``--quiet``."""
     parser.add_argument("--quiet", action="store_true", help="print nothing")

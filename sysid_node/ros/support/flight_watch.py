@@ -1,0 +1,107 @@
+"""Watches a flight for a viewer: inputs, estimates and faults, taken over in bulk a few times a second."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState
+from sysid_msgs.msg import AirData, DerivativeEstimates
+
+from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
+from sysid_node.flight.live.news import FlightNews
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.online.types import Estimates
+from sysid_node.ros.support.conversion import NANOSECONDS, estimates_from_message, stamp_ns
+from sysid_node.ros.support.loop_node import DERIVATIVES, SENSOR_QOS
+
+FAULTS = "fault_monitor/faults"
+
+#: IMU messages that are taken over, a second: more than the eye sees are left out as they come.
+_RATE = 50.0
+
+
+class FlightWatch:
+    """``news`` and ``estimates`` since they were last taken; ``faults``: part -> text of what is reported now.
+
+    Subscriptions are best effort, so that no publisher waits for them.
+    """
+
+    def __init__(self, frame: BodyFrame = "flu") -> None:
+        self.start_ns = 0  # the first stamp
+        self.faults: Mapping[str, str] = {}
+        self._frame: BodyFrame = frame
+        self._news = FlightNews([], [], [])
+        self._estimates: list[Estimates] = []
+        self._next_ns = 0
+        self.node: Node = rclpy.create_node("view")
+        for kind, topic, take in (
+            (Imu, IMU, self._on_imu),
+            (AirData, AIR_DATA, self._on_air_data),
+            (JointState, ACTUATORS, self._on_actuators),
+            (DerivativeEstimates, DERIVATIVES, self._on_estimates),
+            (DiagnosticArray, FAULTS, self._on_faults),
+        ):
+            self.node.create_subscription(kind, topic, take, SENSOR_QOS)
+        self._executor = EventsExecutor()
+        self._executor.add_node(self.node)
+
+    def listen(self, seconds: float) -> None:
+        """Receive messages for so many seconds."""
+        end = self.node.get_clock().now().nanoseconds + round(seconds * NANOSECONDS)
+        while (left := (end - self.node.get_clock().now().nanoseconds) / NANOSECONDS) > 0.0 and rclpy.ok():
+            self._executor.spin_once(timeout_sec=left)
+
+    def take(self) -> tuple[FlightNews, list[Estimates]]:
+        """What came in since the last call; times of estimates are in s from ``start_ns``."""
+        taken = self._news, self._estimates
+        self._news, self._estimates = FlightNews([], [], []), []
+        return taken
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+    def _on_imu(self, message: Any) -> None:
+        stamp = self._stamp(message)
+        if 0 < self._next_ns - stamp < NANOSECONDS:
+            return
+        self._next_ns = stamp + round(NANOSECONDS / _RATE)
+        pair = (message.linear_acceleration, message.angular_velocity)
+        vectors = np.array([[vector.x, vector.y, vector.z] for vector in pair])
+        values = turn_vectors(vectors, self._frame).ravel().tolist()
+        self._news.imu.append((stamp, (*values, *self._attitude(message))))
+
+    def _attitude(self, message: Any) -> list[float]:
+        if message.orientation_covariance[0] == -1.0:
+            return [math.nan] * 3
+        quaternion = np.array([[getattr(message.orientation, part) for part in "xyzw"]])
+        angles: list[float] = euler_from_quaternion(quaternion, self._frame)[0].tolist()
+        return angles
+
+    def _on_air_data(self, message: Any) -> None:
+        values = (message.true_airspeed, message.angle_of_attack, message.sideslip, message.air_density)
+        self._news.air.append((self._stamp(message), values))
+
+    def _on_actuators(self, message: Any) -> None:
+        joints = dict(zip(message.name, message.position, strict=False))
+        self._news.joints.append((self._stamp(message), joints))
+
+    def _on_estimates(self, message: Any) -> None:
+        self._stamp(message)
+        self._estimates.append(estimates_from_message(message, self.start_ns))
+
+    def _on_faults(self, message: Any) -> None:
+        self.faults = {status.name.partition(": ")[2]: status.message for status in message.status}
+
+    def _stamp(self, message: Any) -> int:
+        stamp = stamp_ns(message.header.stamp)
+        self.start_ns = self.start_ns or stamp
+        return stamp
