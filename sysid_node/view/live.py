@@ -14,14 +14,14 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.types import Estimates
 from sysid_node.report.results.run_result import References, prior_of
 from sysid_node.view.bodies import body_of_record, shape_of_aircraft
-from sysid_node.view.panels import SURFACES, derivative_tabs, estimate_notes, motion_panels, moving
+from sysid_node.view.panels import MOVING_SHARE, SURFACES, derivative_tabs, estimate_notes, motion_panels
 from sysid_node.view.scene import NOTHING, PALE, VERMILION, Body, Change, Lane, Note, Panel, Scene
 
 _IMU = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi")
 _AIR = ("V", "alpha", "beta", "rho")
 
 #: Seconds of controls that are looked at to see whether one moves, and the least deflection that counts, rad.
-_LOOK_BACK, _LEAST = 3.0, 0.01
+_LOOK_BACK, _LEAST = 1.0, 0.01
 
 #: Regressors -> the manoeuvre that excites them.
 _EXCITED_BY = {
@@ -95,6 +95,8 @@ class LiveScene:
             control: [n for n, d in known.items() if not d.valid and _EXCITED_BY.get(n.partition("_")[2]) == control]
             for control in dict.fromkeys(_EXCITED_BY.values())
         }
+        if any(d.status == "stale input" for d in known.values()):
+            return "\n\n".join([*lines, "A sensor sends no data (stale input)."])
         for control, names in sorted(missing.items(), key=lambda pair: -len(pair[1])):
             if names:
                 lines.append(f"**Move the {control}**: {', '.join(f'{n} ({known[n].status})' for n in names)}.")
@@ -144,8 +146,10 @@ class LiveScene:
             time, values = np.append(time, record.time[new]), np.append(values, record[symbol][new])
             kept = time > record.time[-1] - _LOOK_BACK
             self._controls[symbol] = time[kept], values[kept]
-            moves = moving(time[kept], values[kept], "moves") if np.ptp(values[kept]) > _LEAST else []
-            lanes += self._changed(SURFACES.get(symbol, symbol), record.time[-1], "moves" if _now(moves) else NOTHING)
+            low, high = self._range.get(symbol, (np.inf, -np.inf))
+            self._range[symbol] = low, high = min(low, *values[kept]), max(high, *values[kept])
+            moves = np.ptp(values[kept]) > max(MOVING_SHARE * (high - low), _LEAST)
+            lanes += self._changed(SURFACES.get(symbol, symbol), record.time[-1], "moves" if moves else NOTHING)
         return lanes
 
     def _failures(self, now: float, faults: Mapping[str, str]) -> list[Lane]:
@@ -168,10 +172,6 @@ def _again(note: Note, seen: set[str]) -> bool:
     """Whether a note says of a derivative that was valid before that it is."""
     name, _, rest = note.text.partition(" ")
     return rest.startswith("valid") and name in seen
-
-
-def _now(changes: Sequence[Change]) -> bool:
-    return bool(changes) and any(change.state != NOTHING for change in changes[-2:])
 
 
 def _emptied(panel: Panel) -> Panel:

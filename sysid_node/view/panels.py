@@ -43,7 +43,7 @@ MOTION = (
 )
 
 #: A control moves where it covers this share of its whole range within so many seconds.
-_SHARE, _WITHIN = 0.15, 1.5
+MOVING_SHARE, _WITHIN = 0.15, 1.5
 
 #: Share of the window that is taken off a move again; the rest keeps a single step visible.
 _EDGES = 0.85
@@ -84,7 +84,7 @@ def moving(time: Array, values: Array, state: str) -> list[Change]:
     if values.size < 2 or not whole > 0.0:
         return [Change(float(time[0]) if time.size else 0.0, NOTHING)]
     size = max(round(_WITHIN / float(np.median(np.diff(time)))), 2)
-    near = (maximum_filter1d(values, size) - minimum_filter1d(values, size)) > _SHARE * whole
+    near = (maximum_filter1d(values, size) - minimum_filter1d(values, size)) > MOVING_SHARE * whole
     moves = minimum_filter1d(near, round(_EDGES * size))  # a window reaches out by half its length at either end
     edges = np.flatnonzero(np.diff(moves.astype(np.int8), prepend=0))
     changes = [Change(float(time[i]), state if moves[i] else NOTHING) for i in edges]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.interruption import on_interrupt
 from sysid_node.view.live import LiveScene
 from sysid_node.view.recording import append, check_recording, open_file, open_window, require_rerun, say
 
@@ -22,21 +24,28 @@ WINDOW = Path("-")
 
 PERIOD = 0.2  # s between two updates of the screen
 LOG = "view.log"
+_NICE = 10  # lower priority than the identifier's: on a busy computer the screen waits, not the flight
 
 
 def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame, arguments: list[str] | None = None) -> None:
-    """Show the flight until ROS is shut down, or write it into a file. Raises InputError."""
+    """Show the flight until ROS is shut down or the process is interrupted, or write it into a file.
+
+    ``arguments``: those of a program that ROS itself interrupts; None for a command. Raises InputError.
+    """
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
     from sysid_node.ros.support.flight_watch import FlightWatch  # noqa: PLC0415
 
+    os.nice(_NICE)
     scene = LiveScene(aircraft)
     if save is not None:
         check_recording(save)
     stream: Any = open_window(scene.declared) if save is None else open_file(scene.declared, save)
-    rclpy.init(args=arguments)
+    handlers = SignalHandlerOptions.NO if arguments is None else SignalHandlerOptions.ALL
+    rclpy.init(args=arguments, signal_handler_options=handlers)
     watch, words = FlightWatch(frame), ""
-    try:
+    with on_interrupt(lambda: _end(stream)):
         while rclpy.ok():
             watch.listen(PERIOD)
             news = scene.update(watch.start_ns, *watch.take(), watch.faults)
@@ -44,13 +53,14 @@ def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame, argument
             if news.about != words:
                 say(stream, news.about)
             words = news.about
-    except KeyboardInterrupt:
-        pass
-    finally:
-        watch.close()
-        rclpy.try_shutdown()
-        stream.flush()
-        stream.disconnect()
+    watch.close()
+    _end(stream)
+
+
+def _end(stream: Any) -> None:
+    """Send what has not been sent yet."""
+    stream.flush()
+    stream.disconnect()
 
 
 @contextmanager

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import struct
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
@@ -23,14 +25,14 @@ from sysid_node.ros.support.loop_node import DERIVATIVES, SENSOR_QOS
 
 FAULTS = "fault_monitor/faults"
 
-#: IMU messages that are taken over, a second: more than the eye sees are left out as they come.
-_RATE = 50.0
+#: Least time between two messages of a topic that are decoded, s: more than the eye sees are left out as they come.
+_PERIODS = {IMU: 0.02, AIR_DATA: 0.02, ACTUATORS: 0.02, DERIVATIVES: 0.1, FAULTS: 0.0}
 
 
 class FlightWatch:
     """``news`` and ``estimates`` since they were last taken; ``faults``: part -> text of what is reported now.
 
-    Subscriptions are best effort, so that no publisher waits for them.
+    Subscriptions are best effort, so that no publisher waits for them, and messages that are left out are not decoded.
     """
 
     def __init__(self, frame: BodyFrame = "flu") -> None:
@@ -39,7 +41,6 @@ class FlightWatch:
         self._frame: BodyFrame = frame
         self._news = FlightNews([], [], [])
         self._estimates: list[Estimates] = []
-        self._next_ns = 0
         self.node: Node = rclpy.create_node("view")
         for kind, topic, take in (
             (Imu, IMU, self._on_imu),
@@ -48,7 +49,7 @@ class FlightWatch:
             (DerivativeEstimates, DERIVATIVES, self._on_estimates),
             (DiagnosticArray, FAULTS, self._on_faults),
         ):
-            self.node.create_subscription(kind, topic, take, SENSOR_QOS)
+            self.node.create_subscription(kind, topic, self._sparsely(kind, topic, take), SENSOR_QOS, raw=True)
         self._executor = EventsExecutor()
         self._executor.add_node(self.node)
 
@@ -69,15 +70,25 @@ class FlightWatch:
         self._executor.shutdown()
         self.node.destroy_node()
 
+    def _sparsely(self, kind: Any, topic: str, take: Callable[[Any], None]) -> Callable[[bytes], None]:
+        """A callback that decodes serialised messages, and leaves out those that follow too soon by their stamps."""
+        period, due = round(NANOSECONDS * _PERIODS[topic]), 0
+
+        def on_message(raw: bytes) -> None:
+            nonlocal due
+            seconds, nanoseconds = struct.unpack_from("<iI" if raw[1] & 1 else ">iI", raw, 4)  # after CDR's own header
+            stamp = seconds * NANOSECONDS + nanoseconds
+            if not 0 < due - stamp <= period:
+                due = stamp + period
+                take(deserialize_message(raw, kind))
+
+        return on_message
+
     def _on_imu(self, message: Any) -> None:
-        stamp = self._stamp(message)
-        if 0 < self._next_ns - stamp < NANOSECONDS:
-            return
-        self._next_ns = stamp + round(NANOSECONDS / _RATE)
         pair = (message.linear_acceleration, message.angular_velocity)
         vectors = np.array([[vector.x, vector.y, vector.z] for vector in pair])
         values = turn_vectors(vectors, self._frame).ravel().tolist()
-        self._news.imu.append((stamp, (*values, *self._attitude(message))))
+        self._news.imu.append((self._stamp(message), (*values, *self._attitude(message))))
 
     def _attitude(self, message: Any) -> list[float]:
         if message.orientation_covariance[0] == -1.0:
