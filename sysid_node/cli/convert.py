@@ -22,7 +22,7 @@ from sysid_node.flight.logs.content import Content, content_of
 from sysid_node.flight.logs.fractions import joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight
 from sysid_node.flight.logs.opening import open_log
-from sysid_node.flight.logs.rates import slow_topics
+from sysid_node.flight.logs.rates import rates_of_streams
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.streams import COMMAND_FRACTIONS
 from sysid_node.report.files.output_file import output_bag
@@ -76,7 +76,8 @@ def _show(out: Path, flight: LogFlight) -> None:
     stamps = streams.imu.arrival.stamp_ns
     seconds = (stamps[-1] - stamps[0]) / 1e9
     print(f"{out}: {seconds:.1f} s, {stamps.size} samples; joints {', '.join(streams.actuators.names)}")
-    for remark in (*flight.remarks, *slow_topics(streams)):
+    slow = [found.fault for found in rates_of_streams(streams).values() if found.fault]
+    for remark in (*flight.remarks, *slow):
         print(f"  {remark}")
     if streams.actuators.content == COMMAND_FRACTIONS:
         print(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,3 +101,22 @@ def arrivals_in_stamp_order(*stamps_ns: Stamps) -> list[Arrival]:
     order[np.argsort(every, kind="stable")] = np.arange(every.size)
     ends = np.cumsum([stamps.size for stamps in stamps_ns])[:-1]
     return [Arrival(stamps, stamps, place) for stamps, place in zip(stamps_ns, np.split(order, ends), strict=True)]
+
+
+def in_order_of_logging(streams: Streams) -> Streams:
+    """The streams with the order among all messages that follows from when each was logged."""
+    logged = [stream.arrival.log_ns for stream in streams.by_topic.values()]
+    every = np.concatenate(logged)
+    order = np.empty(every.size, np.int64)
+    order[np.argsort(every, kind="stable")] = np.arange(every.size)
+    ends = np.cumsum([times.size for times in logged])[:-1]
+    arrivals = [
+        replace(stream.arrival, order=place)
+        for stream, place in zip(streams.by_topic.values(), np.split(order, ends), strict=True)
+    ]
+    return replace(
+        streams,
+        imu=replace(streams.imu, arrival=arrivals[0]),
+        air_data=replace(streams.air_data, arrival=arrivals[1]),
+        actuators=replace(streams.actuators, arrival=arrivals[2]),
+    )

@@ -20,6 +20,7 @@ from sysid_node.flight.streams import (
     ImuStream,
     JointStream,
     Streams,
+    in_order_of_logging,
 )
 
 #: Below this airspeed (m/s) in every sample, nothing was measured: no fixed wing flies so slowly.
@@ -45,16 +46,14 @@ def flight_of_log(log: AutopilotLog, outputs: str = "") -> LogFlight:
     attitude = attitude_at(log.attitude, imu.stamp_ns)
     air, remarks = air_data(log, imu, attitude, airspeed)
     joints = _joints(log, outputs)
-    told = (*_said_part(log), *remarks, *log.remarks)
-    return LogFlight(
-        Streams(
-            ImuStream(_arrival(imu), imu.values, attitude, "base_link", source=imu.source, remedy=_remedy(log, IMU)),
-            AirDataStream(_arrival(air), air.values, source=airspeed.source, remedy=_remedy(log, AIRSPEED)),
-            joints,
-            log.name,
-        ),
-        told,
+    told = (*said_part(log), *remarks, *log.remarks)
+    streams = Streams(
+        ImuStream(_arrival(imu), imu.values, attitude, "base_link", source=imu.source, remedy=_remedy(log, IMU)),
+        AirDataStream(_arrival(air), air.values, source=airspeed.source, remedy=_remedy(log, AIRSPEED)),
+        joints,
+        log.name,
     )
+    return LogFlight(in_order_of_logging(streams), told)
 
 
 def _remedy(log: AutopilotLog, role: str) -> str:
@@ -107,7 +106,7 @@ def _require_one_clock(log: AutopilotLog) -> None:
 def missing_airspeed(log: AutopilotLog) -> str:
     """What is wrong with the airspeed in the part that was flown, or an empty text."""
     name = log.airspeed.source
-    values = log.airspeed.values[within(log.flown, log.airspeed.stamp_ns), 0]
+    values = log.airspeed.values[within(log.flown or None, log.airspeed.stamp_ns), 0]
     if not values.size:
         return f"no {name} in it; connect an airspeed sensor, and log it"
     if not np.isfinite(values).any():
@@ -121,7 +120,10 @@ def _flown_part(log: AutopilotLog, signal: Signal) -> Signal:
     return signal.selected(within(log.flown, signal.stamp_ns))
 
 
-def _said_part(log: AutopilotLog) -> tuple[str, ...]:
+def said_part(log: AutopilotLog) -> tuple[str, ...]:
+    """Which part of the log is taken, a sentence."""
+    if log.flown is not None and not log.flown:
+        return ("never flew as a fixed wing (on the ground, or hovering)",)
     if log.flown is None:
         return ("the log does not say when it flew; all of it is taken",)
     whole = (int(log.imu.stamp_ns[-1]) - int(log.imu.stamp_ns[0])) / 1e9

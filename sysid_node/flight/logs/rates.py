@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -27,11 +28,10 @@ class SampleRate(NamedTuple):
 
     @property
     def fault(self) -> str:
-        """What is too slow and what to do, or an empty text."""
+        """What is too slow, or an empty text."""
         if self.rate >= 0.93 * self.needed:  # stamps of a logger scatter
             return ""
-        remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{self.source} comes at {said_rate(self.rate)} Hz; {self.needed:g} Hz are needed{remedy}"
+        return f"{self.source} comes at {said_rate(self.rate)} Hz; {self.needed:g} Hz are needed"
 
 
 def rate_of(stamps: Stamps) -> float:
@@ -47,40 +47,31 @@ def said_rate(rate: float) -> str:
 
 
 def rates_of_log(log: AutopilotLog, *, raw_outputs: bool = False) -> dict[str, SampleRate]:
-    """The rates of the IMU, the airspeed and the controls in the part that was flown, by the signals' roles."""
+    """The rates of the IMU, the airspeed and the controls in the part that was flown, by topic."""
     use_outputs = raw_outputs or not log.controls.names
     signals = {
-        IMU_ROLE: (log.imu, IMU),
-        AIRSPEED: (log.airspeed, AIR_DATA),
-        CONTROLS: ((log.outputs if use_outputs else log.controls).signal, ACTUATORS),
+        IMU: (log.imu, IMU_ROLE),
+        AIR_DATA: (log.airspeed, AIRSPEED),
+        ACTUATORS: ((log.outputs if use_outputs else log.controls).signal, CONTROLS),
     }
+    found = {}
+    for topic, (signal, role) in signals.items():
+        rate = rate_of(signal.stamp_ns[within(log.flown or None, signal.stamp_ns)])
+        found[topic] = SampleRate(signal.source, rate, NEEDED[topic], log.remedies.get(role, ""))
+    return found
+
+
+def rates_of_streams(streams: Streams) -> dict[str, SampleRate]:
+    """The rates of the topics of a flight."""
     return {
-        role: SampleRate(
-            signal.source,
-            rate_of(signal.stamp_ns[within(log.flown, signal.stamp_ns)]),
-            NEEDED[topic],
-            log.remedies.get(role, ""),
-        )
-        for role, (signal, topic) in signals.items()
+        topic: SampleRate(stream.source or topic, rate_of(stream.arrival.stamp_ns), NEEDED[topic], stream.remedy)
+        for topic, stream in streams.by_topic.items()
     }
 
 
-def require_rates_of_log(log: AutopilotLog, *, raw_outputs: bool = False) -> None:
-    """Raise InputError as ``require_rates``, for the signals that the log holds."""
-    for found in rates_of_log(log, raw_outputs=raw_outputs).values():
-        if found.rate and found.fault:
-            raise InputError(f"{log.name}: {found.fault}")
-
-
-def slow_topics(streams: Streams) -> tuple[str, ...]:
-    """For each topic that comes at too low a rate: the rate, the one needed, and the autopilot's setting."""
-    every = streams.by_topic.items()
-    rates = [SampleRate(s.source or topic, rate_of(s.arrival.stamp_ns), NEEDED[topic], s.remedy) for topic, s in every]
-    return tuple(found.fault for found in rates if found.fault)
-
-
-def require_rates(streams: Streams) -> None:
-    """Raise InputError, which names the topic and the autopilot's setting, where one comes at too low a rate."""
-    slow = slow_topics(streams)
+def require_rates(name: str, rates: Mapping[str, SampleRate]) -> None:
+    """Raise InputError, which names every topic that is too slow and the setting that raises its rate."""
+    slow = [found for found in rates.values() if found.rate and found.fault]
     if slow:
-        raise InputError(f"{streams.name}: {slow[0]}")
+        remedies = dict.fromkeys(found.remedy for found in slow if found.remedy)
+        raise InputError("; ".join([f"{name}: {slow[0].fault}", *(found.fault for found in slow[1:]), *remedies]))

@@ -146,7 +146,7 @@ def dataflash_log(
     motion = np.column_stack([record[name] for name in ("p", "q", "r", "ax", "ay", "az")])
     degrees = np.degrees(np.column_stack([record[name] for name in ("phi", "theta", "psi")]))
     equivalent = record["V"] * np.sqrt(record["rho"] / 1.225)
-    pulses = _pulses(fractions(record))
+    pulses = pulses_of(fractions(record))
     kelvin = 288.15
     rows = {
         "MSG": [(us[0], f"{firmware} (abcd)")],
@@ -169,7 +169,7 @@ def dataflash_log(
     return record
 
 
-def _pulses(commands: np.ndarray) -> np.ndarray:
+def pulses_of(commands: np.ndarray) -> np.ndarray:
     """Pulses (N, 4), us, of the outputs 1 to 4, as ArduPilot computes them from roll, pitch, throttle and yaw."""
     columns = []
     for number, command in zip((1, 2, 3, 4), commands[:, [0, 1, 3, 2]].T, strict=True):

@@ -35,6 +35,16 @@ def test_the_flight_comes_back(tmp_path, kind):
     assert not back.measured("alpha")
 
 
+def test_messages_are_in_the_order_in_which_they_were_logged(tmp_path):
+    """A replay takes the messages in this order, and waits for a late topic for 5 s only."""
+    px4_log(tmp_path / "flight.ulg")
+    streams = open_streams(tmp_path / "flight.ulg", aircraft()).by_topic.values()
+    order = np.concatenate([stream.arrival.order for stream in streams])
+    stamps = np.concatenate([stream.arrival.stamp_ns for stream in streams])
+    np.testing.assert_array_equal(np.sort(order), np.arange(order.size))
+    assert np.all(np.diff(stamps[np.argsort(order)]) >= 0)
+
+
 def test_slow_airspeed_moves_as_the_imu_says(tmp_path):
     """Completed by the IMU, the airspeed is as near to the measured one as a line between the samples, or nearer."""
     record = px4_log(tmp_path / "flight.ulg", {**FULL_RATES, "airspeed": 2.0, "attitude": 20.0})

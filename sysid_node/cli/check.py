@@ -1,0 +1,57 @@
+"""``sysid check``: what a flight's file holds, what it is good for, and which setting of the autopilot to change."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from sysid_node.cli.shared import options
+from sysid_node.errors import InputError
+from sysid_node.flight.logs.rates import said_rate
+from sysid_node.flight.logs.survey import Survey, survey
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+
+def add_parser(commands: Commands) -> argparse.ArgumentParser:
+    """The command's arguments."""
+    parser = commands.add_parser("check", help="say what a flight's file is good for", description=__doc__)
+    parser.add_argument("logs", metavar="LOG", type=Path, nargs="+", help=options.LOG_HELP)
+    return parser
+
+
+def run(args: argparse.Namespace) -> None:
+    """Prints a table for each log. Raises InputError after the last where one could not be read."""
+    unread = []
+    for path in args.logs:
+        try:
+            _show(survey(path))
+        except InputError as error:
+            unread.append(str(error))
+    if unread:
+        raise InputError("; ".join(unread))
+
+
+def _show(found: Survey) -> None:
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(f"[bold]{found.name}[/bold]: {found.kind}, {found.seconds:.1f} s", markup=True)
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in ("signal", "from", "rate", "gaps", "clock", "use"):
+        table.add_column(heading, justify="right" if heading == "rate" else "left", no_wrap=True)
+    for row in found.rows:
+        style = "red" if row.verdict != "ok" else ""
+        rate = f"{said_rate(row.rate)} Hz" if row.rate else "-"
+        cells = (row.signal, row.source, rate, row.gaps, row.clock, row.verdict)
+        table.add_row(*cells, style=style)
+    console.print(table)
+    for label, lines in (("excited", found.excitation), ("good for", found.good_for)):
+        for name, text in lines.items():
+            console.print(f"  {label:9} {name}: {text}", markup=False)
+    for label, texts in (("change", found.remedies), ("note", found.remarks)):
+        for text in texts:
+            console.print(f"  {label:9} {text}", markup=False)
