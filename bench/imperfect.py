@@ -30,7 +30,7 @@ from sysid_node.sim.flying.sortie import Sortie, SortieConditions, fly_sortie
 
 AIRCRAFT = "cdrw"
 MANOEUVRE = "3211:repeat=3"
-RATE, COMMAND_RATE = 200.0, 100.0  # Hz
+RATE, COMMAND_RATE, POSITION_RATE = 1000.0, 100.0, 200.0  # Hz, of the simulation, the autopilot, measured positions
 
 #: Name of the row -> effects as of `sysid simulate --effect`.
 IMPERFECTIONS = {
@@ -45,7 +45,7 @@ IMPERFECTIONS = {
     "`vane_scale` 3 %": ("vane_scale:alpha=0.03:beta=0.03",),
     "`airspeed_scale` 2 %": ("airspeed_scale:error=0.02",),
     "`imu_scale` 1 % (rates)": ("imu_scale:p=0.01:q=0.01:r=0.01",),
-    "`imu_misalignment` 0.01 rad": ("imu_misalignment:x=0.01:y=0.01:z=0.01",),
+    "`imu_misalignment` 0.01 rad": ("imu_misalignment:roll=0.01:pitch=0.01:yaw=0.01",),
     "`imu_lever_arm` 5 cm": ("imu_lever_arm:x=0.05",),
     "`vane_lever_arm` 10 cm": ("vane_lever_arm:x=0.1",),
     "`mass_error` 2 %": ("mass_error:error=0.02",),
@@ -99,7 +99,7 @@ def row(name: str, flights: int, turbulence: str) -> list[str]:
     positions, commands = Count(), Count()
     for seed in range(1, flights + 1):
         sortie = fly(IMPERFECTIONS[name], seed, turbulence)
-        measured = Recorder(actuator_rate=RATE, surfaces="measured").record(sortie)
+        measured = Recorder(actuator_rate=POSITION_RATE, surfaces="measured").record(sortie)
         positions.add(estimated(measured, "positions"), sortie.derivatives)
         commands.add(estimated(Recorder().record(sortie), "auto"), sortie.derivatives)
     return [name, *positions.cells(flights), *commands.cells(flights)]

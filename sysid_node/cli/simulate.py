@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
-#: Rate of the integration, Hz; raised to the IMU's where that is higher.
-_RATE = 200.0
+#: Rate of the integration, Hz; raised to the IMU's where that is higher. Commands that are held jump within a step, so
+#: that their time is right to half of it.
+_RATE, _HELD_RATE = 200.0, 1000.0
 #: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.
 LOSSES = ("control_effectiveness_loss", "stuck_surface")
 
@@ -94,7 +95,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     held = args.actuator_rate if args.surfaces == "commanded" else None
-    simulator = Simulator(load_aircraft(args.aircraft), max(_RATE, args.rate, held or 0.0))
+    simulator = Simulator(load_aircraft(args.aircraft), max(_HELD_RATE if held else _RATE, args.rate, held or 0.0))
     conditions = SortieConditions(
         args.effect,
         args.airspeed,

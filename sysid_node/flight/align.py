@@ -22,7 +22,15 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.checks import DUPLICATE, OUT_OF_ORDER, UNSTAMPED, air_data_faults, gap, imu_faults
-from sysid_node.flight.commanded import AROUND, Commands, commands_of, deflections, known_from, take_command
+from sysid_node.flight.commanded import (
+    AROUND,
+    Commands,
+    commands_of,
+    deflections,
+    known_from,
+    take_command,
+    with_excess,
+)
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Arrival, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
@@ -54,7 +62,8 @@ class Alignment:
     """Aligned samples, and the messages that each was made of.
 
     ``samples`` (N, 12 + controls): ax ay az p q r V alpha beta rho thrust air_interval, then the controls in the
-    aircraft's order. The air interval (s) is the time between the air-data messages on either side.
+    aircraft's order. The air interval (s) is the time between the air-data messages on either side. Where commands are
+    followed, as many columns stand behind: the deflections' excess (``servos.move``), zero in samples before that.
     """
 
     imu: ScreenedMessages
@@ -179,9 +188,10 @@ def align(
 def _actuated(
     commands: Commands | None, messages: ScreenedMessages, right: NDArray[np.intp], at: Stamps
 ) -> tuple[Array, int]:
-    """Thrust and deflections (n, 1 + controls) at the stamps ``at`` (n,), and the place from which commands make them.
+    """Thrust and deflections at the stamps ``at`` (n,), and the place from which commands make them.
 
-    The calls are those of ``online.alignment.streaming`` in the same order, so that both give the same bits.
+    (n, 1 + controls), or with the deflections' excess (n, 1 + 2 controls) where they do at all. The calls are those of
+    ``online.alignment.streaming`` in the same order, so that both give the same bits.
     """
     stamps, values = messages.stamps, messages.values
     actuated = interpolate(stamps, values, right, at)
@@ -196,6 +206,7 @@ def _actuated(
         commands.since = 0, int(stamps[known - 1])
     rows = zip(stamps[first:].tolist(), values[first:].tolist(), strict=True)
     given = first
+    actuated = np.hstack([actuated, np.zeros((len(at), values.shape[1] - 1))])
     for k, (moment, last) in enumerate(zip(at[begin:].tolist(), right[begin:].tolist(), strict=True), begin):
         while given <= last:
             take_command(commands, 0, *next(rows))
@@ -276,7 +287,11 @@ def flight_record(
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
         raise InputError(why_nothing_aligned(streams, aligned.rejected))
-    columns = dict(zip(sample_columns(aircraft), np.ascontiguousarray(aligned.samples.T), strict=True))
+    samples, names = aligned.samples, sample_columns(aircraft)
+    if samples.shape[1] > len(names):
+        first = len(names) - len(aircraft.controls)
+        samples = np.hstack([samples[:, :first], with_excess(aligned.stamps, samples[:, first:])])
+    columns = dict(zip(names, np.ascontiguousarray(samples.T), strict=True))
     del columns[AIR_INTERVAL]
     attitude = streams.imu.attitude[aligned.imu.kept[aligned.used]]
     columns |= dict(zip(("phi", "theta", "psi"), np.ascontiguousarray(attitude.T), strict=True))

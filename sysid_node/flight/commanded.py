@@ -154,11 +154,29 @@ def follows(state: Commands, epoch: int, stamp: int) -> bool:
     return state.since is not None and (epoch, stamp) > state.since
 
 
-def deflections(state: Commands, epoch: int, stamp: int, held: Sequence[float]) -> Sequence[float]:
-    """Thrust and deflections at ``stamp`` (ns), increasing; ``held`` is the last message's before it.
+def deflections(state: Commands, epoch: int, stamp: int, held: Sequence[float]) -> list[float]:
+    """Thrust and deflections at ``stamp`` (ns), increasing, then the deflections' excess (``servos.move``).
 
-    Where the servos are already in another epoch of the clock, what is held stands in.
+    Where the servos are already in another epoch of the clock, the last message before it, ``held``, stands in.
     """
     if epoch != state.epoch:
-        return held
-    return [move(servo, stamp) for servo in state.servos]
+        return [*held, *(0.0 for _ in held[1:])]
+    moved = [move(servo, stamp) for servo in state.servos]
+    return [*(position for position, _ in moved), *(excess for _, excess in moved[1:])]
+
+
+def with_excess(stamps: Stamps, rows: Array) -> Array:
+    """Deflections (N, m) whose straight lines have the areas that ``rows`` (N, 2m) tell: deflections, then excesses.
+
+    Half of the area that an interval has in excess is given to each of the samples at its ends.
+    """
+    values, excess = np.hsplit(rows, 2)
+    step = np.diff(stamps)[:, None] / 1e9
+    share = np.zeros_like(values)
+    share[1:] += excess[1:] * step
+    share[:-1] += excess[1:] * step
+    around = np.zeros((len(values), 1))
+    around[1:] += step
+    around[:-1] += step
+    found: Array = values + share / np.maximum(around, 1e-9)
+    return found

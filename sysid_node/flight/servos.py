@@ -60,6 +60,9 @@ class ServoState:
     lagged: float = 0.0
     rate: float = 0.0  # of ``lagged``, 1/s
     position: float = 0.0  # after the rate limit
+    seen: int | None = None  # ns: when ``move`` was last called
+    seen_position: float = 0.0  # then
+    area: float = 0.0  # s: integral since then of the position beyond ``seen_position``
     pending: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=MOST_PENDING))  # ns at the servo
 
 
@@ -73,35 +76,57 @@ def give(state: ServoState, stamp: int, command: float) -> None:
         state.pending.append((arrives, command))
 
 
-def move(state: ServoState, stamp: int) -> float:
-    """The deflection at ``stamp`` (ns), which must not be before that of the last call."""
+def move(state: ServoState, stamp: int) -> tuple[float, float]:
+    """The deflection at ``stamp`` (ns), which must not be before that of the last call; and an excess.
+
+    Estimators take signals as straight lines between samples. The excess is by how much the mean deflection since the
+    last call is above that of such a line: a command that is followed at once, or a servo that begins to move, lies
+    between two samples. Zero at the first call.
+    """
     pending = state.pending
     while pending and pending[0][0] <= stamp:
         arrives, command = pending.popleft()
         _hold(state, arrives)
         state.command = command
+        if state.servo.time_constant == 0.0 and state.servo.rate_limit == math.inf:
+            state.lagged = state.position = command
     _hold(state, stamp)
-    return state.position
+    excess = 0.0
+    if state.seen is not None and stamp > state.seen:
+        excess = state.area / ((stamp - state.seen) / 1e9) - 0.5 * (state.position - state.seen_position)
+    state.seen, state.seen_position, state.area = stamp, state.position, 0.0
+    return state.position, excess
 
 
 def _hold(state: ServoState, stamp: int) -> None:
     """Advance the state to ``stamp`` (ns) at a constant command."""
     if state.time is None or stamp <= state.time:
         return
-    servo, step = state.servo, (stamp - state.time) / 1e9
+    servo, step, before = state.servo, (stamp - state.time) / 1e9, state.position
     state.time = stamp
-    if servo.time_constant == 0.0:
-        state.lagged = state.command
-    elif servo.damping == 0.0:
-        state.lagged = state.command + (state.lagged - state.command) * math.exp(-step / servo.time_constant)
-    else:
-        state.lagged, state.rate = _second_order(servo, state.lagged - state.command, state.rate, step)
-        state.lagged += state.command
+    area = _follow(state, step)
     if servo.rate_limit == math.inf:
         state.position = state.lagged
     else:
         most = servo.rate_limit * step
         state.position += min(max(state.lagged - state.position, -most), most)
+        area = 0.5 * (before + state.position) * step
+    state.area += area - state.seen_position * step
+
+
+def _follow(state: ServoState, step: float) -> float:
+    """Advance the lag by a ``step`` (s); returns the integral of ``lagged`` over it, from the lag's own equation."""
+    T, z = state.servo.time_constant, state.servo.damping
+    x, rate = state.lagged, state.rate
+    if T == 0.0:
+        state.lagged = state.command
+        return state.command * step
+    if z == 0.0:
+        state.lagged = state.command + (x - state.command) * math.exp(-step / T)
+        return state.command * step - T * (state.lagged - x)
+    error, state.rate = _second_order(state.servo, x - state.command, rate, step)
+    state.lagged = error + state.command
+    return state.command * step - T * T * (state.rate - rate) - 2.0 * z * T * (state.lagged - x)
 
 
 def _second_order(servo: Servo, error: float, rate: float, step: float) -> tuple[float, float]:

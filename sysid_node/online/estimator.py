@@ -22,7 +22,7 @@ from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes.detection import PIECE
 from sysid_node.online.changes.excited_segments import no_excited_segments
 from sysid_node.online.frequency import fourier_transform, regression_signals, sampled_transform
-from sysid_node.online.frequency.regression_signals import NUISANCES, OUTPUTS
+from sysid_node.online.frequency.regression_signals import NUISANCES, OFFSET, OUTPUTS
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression import information, normal_equations
 from sysid_node.online.regression.derivative_index import derivative_index
@@ -76,6 +76,7 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
         commanded=commanded,
+        timed=tuple(aircraft.control_symbols.index(symbol) for symbol in layout.timed),
     )
     transform = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
     running = SampledTransform(layout, transform)
@@ -113,10 +114,13 @@ def _lowest(controls: int) -> tuple[float, ...]:
 def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     """Take in one aligned sample (``SAMPLE_COLUMNS``, then the controls) at ``time`` (s).
 
+    Where the model is ``commanded``, the deflections' excess over straight lines between samples stands behind.
+
     A sample that lacks a value, has an impossible one, or does not come after the last one, is left out and counted in
     ``incomplete``. Where the first sample has no thrust it is taken as unknown, and as none, from then on; where it
     lacks a flow angle, that is reconstructed from then on.
     """
+    sample, excess = _without_excess(state.model, sample)
     sample = flow_angle_filter.complete(state.flow, time, sample, state.model.settings.max_gap)
     if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = first_counted(time, state.model.settings)
@@ -141,9 +145,20 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
         interrupt(state, time, row)
         return
     state.step = time - previous[0]
-    sampled_transform.append(state.transform, time, row, state.model.momentum(previous[1], motion))
+    gain = state.model.momentum(previous[1], motion)
+    if excess:
+        gain += [row[OFFSET] * state.step * excess[i] for i in state.model.timed]
+    sampled_transform.append(state.transform, time, row, gain)
     state.samples += 1
     state.intervals += sample[INTERVAL]
+
+
+def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+    """The sample, and behind it the controls' excess where the model is ``commanded``."""
+    if not model.commanded:
+        return sample, ()
+    count = len(model.lower_limits)
+    return sample[:count], sample[count:]
 
 
 def renew_early(state: EstimatorState) -> None:

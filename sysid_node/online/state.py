@@ -52,6 +52,7 @@ class EstimatorModel:
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
     commanded: bool = False  # whether deflections follow from commands by the aircraft file's servos
+    timed: tuple[int, ...] = ()  # places among the aircraft's controls of those in the layout's order
 
 
 @dataclass(frozen=True)

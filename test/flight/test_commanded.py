@@ -21,7 +21,7 @@ def followed(stamps, commands, servo):
     state, found = ServoState(servo), []
     for stamp, command in zip(stamps.tolist(), commands[:, 0].tolist(), strict=True):
         give(state, stamp, command)
-        found.append(move(state, stamp))
+        found.append(move(state, stamp)[0])
     return np.array(found)[:, None] + 1e-4 * np.random.default_rng(1).standard_normal((len(found), 1))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.flight.commanded import commands_of, deflections, known_from, take_command
+from sysid_node.flight.commanded import commands_of, deflections, known_from, take_command, with_excess
 from sysid_node.flight.record import FlightRecord
 
 
@@ -22,9 +22,11 @@ def with_commands(aircraft: Aircraft, flight: FlightRecord, carried: str) -> Fli
     if commands is None:
         return flight
     names = ("thrust", *aircraft.control_symbols)
-    rows = np.column_stack([flight[name] for name in names])
-    for i, (stamp, row) in enumerate(zip(stamps.tolist(), rows.tolist(), strict=True)):
+    rows = []
+    for stamp, row in zip(stamps.tolist(), np.column_stack([flight[name] for name in names]).tolist(), strict=True):
         take_command(commands, 0, stamp, row)
-        rows[i] = deflections(commands, 0, stamp, row)
-    followed = {name: column for name, column in zip(names, rows.T, strict=True) if name in flight.columns}
+        rows.append(deflections(commands, 0, stamp, row))
+    moved = np.array(rows)
+    columns = [moved[:, 0], *with_excess(stamps, moved[:, 1:]).T]
+    followed = {name: column for name, column in zip(names, columns, strict=True) if name in flight.columns}
     return replace(flight, columns={**flight.columns, **followed}, commanded=True)

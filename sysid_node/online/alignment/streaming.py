@@ -79,7 +79,10 @@ class _Missing(Enum):
 
 
 class AlignedSample(NamedTuple):
-    """A sample that is complete: SAMPLE_COLUMNS, then the aircraft's controls."""
+    """A sample that is complete: SAMPLE_COLUMNS, the aircraft's controls, and their excess where commands are followed.
+
+    The excess is that of ``flight.servos.move``.
+    """
 
     time: float  # s
     sample: Sample

@@ -31,7 +31,7 @@ class AlignedSamples(NamedTuple):
     """Samples in bulk: what feeding the messages one by one gives, to the last bit."""
 
     time: Array  # (N,) s
-    samples: Array  # (N, M): SAMPLE_COLUMNS, then the controls
+    samples: Array  # (N, M): SAMPLE_COLUMNS, the controls, and where commands are followed the controls' excess
     rejected: Rejected
     stamps: Stamps  # (N,) header stamps of the IMU messages, ns
     wait: Array  # (N,) s from each to the last of the messages that it lies before
@@ -97,8 +97,9 @@ def align_by_message(
             new = on_actuators(state, stamps[2][row], actuators.names, values[2][row])
         complete += new
         sources += [stamp_of(state, one.time) for one in new]
-    width = len(SAMPLE_COLUMNS) + len(aircraft.controls)
-    time, samples, wait = (np.array([one[i] for one in complete]) for i in range(3))
+    width = max((len(one.sample) for one in complete), default=len(SAMPLE_COLUMNS) + len(aircraft.controls))
+    time, wait = (np.array([one[i] for one in complete]) for i in (0, 2))
+    samples = np.array([(*one.sample, *(0.0,) * (width - len(one.sample))) for one in complete])
     stamps_used = np.array(sources, np.int64)
     commands_from = int(np.searchsorted(time, state.commands_from))
     samples = samples.reshape(len(complete), width)

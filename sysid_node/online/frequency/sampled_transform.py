@@ -30,7 +30,7 @@ class SampledTransform:
     transform: Transform
     times: list[float] = field(default_factory=list)  # s: the last sample transformed, then those that wait
     rows: list[Sequence[float]] = field(default_factory=list)  # (T,) signals of each
-    gains: list[Sequence[float]] = field(default_factory=list)  # (6,) of each interval, see ``append``
+    gains: list[Sequence[float]] = field(default_factory=list)  # (6,) or (6 + m,) of each interval, see ``append``
     recent: list[Array] = field(default_factory=list)  # (n, T) signals transformed since this was last cleared
 
     @property
@@ -42,7 +42,8 @@ class SampledTransform:
 def append(state: SampledTransform, time: float, row: Sequence[float], gain: Sequence[float]) -> None:
     """Take in the sample ``row`` (T,) at ``time`` (s), to which the signals go in straight lines from the one before.
 
-    ``gain`` (6,) is what the areas of the coefficients gain by the angular accelerations in between.
+    ``gain`` (6,) is what the areas of the coefficients gain by the angular accelerations in between; behind them may
+    stand what those of the m controls have more than straight lines.
     """
     state.times.append(time)
     state.rows.append(row)
@@ -80,12 +81,15 @@ def transform_waiting(state: SampledTransform) -> None:
 def over_intervals(layout: Layout, steps: Array, rows: Array, gains: Array) -> tuple[Array, Array]:
     """Areas and slants (n, T) of the signals ``rows`` (n + 1, T) over ``steps`` (n, 1) s; see ``fourier_transform``.
 
-    ``gains`` (n, 6) are added to the coefficients' areas. The area of a control's rate is the control's increment.
+    ``gains`` (n, 6) are added to the coefficients' areas, (n, m) behind them to those of the controls. The area of a
+    control's rate is the control's increment.
     """
     before, after = rows[:-1], rows[1:]
     slants = after - before
     areas = (after + before) * (0.5 * steps)
-    areas[:, :OUTPUTS] += gains
+    areas[:, :OUTPUTS] += gains[:, :OUTPUTS]
+    if gains.shape[1] > OUTPUTS:
+        areas[:, layout.deflections] += gains[:, OUTPUTS:]
     areas[:, layout.rates] = slants[:, layout.deflections]
     slants *= 0.5 * steps * steps
     return areas, slants
