@@ -89,7 +89,14 @@ def identify(
         aircraft, selections = supported_model(aircraft, records, settings.low_pass)
         left_out = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(left_out) or 'nothing'}")
-    fit, predict = _fitted(method, aircraft, records, settings)
+    try:
+        fit, predict = _fitted(method, aircraft, records, settings)
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        names = ", ".join(record.name for record in records)
+        raise InputError(
+            f"{names}: {method} finds no solution ({' '.join(str(error).split())}); the motion does not determine the "
+            "model: give flights that excite it, or a simpler model"
+        ) from error
     figures: FiguresByFlight = {}
     for record in holdout:
         responses = [*predicted_coefficients(aircraft, fit.values, [record], settings.low_pass), *predict(record)]

@@ -14,6 +14,7 @@ from sysid_node.suggestion import did_you_mean
 
 #: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
 DEFAULT_LOW_PASS = 3.0
+LOWEST_LOW_PASS = 0.01  # Hz: a filter this slow leaves nothing of a flight's motion
 
 #: Hz: first line, step, last line.
 Frequencies = tuple[float, float, float]
@@ -45,6 +46,8 @@ class BatchSettings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"setting {name} = {value}: expected a number, zero or more")
+        if 0.0 < self.low_pass < LOWEST_LOW_PASS:
+            raise InputError(f"setting low_pass = {self.low_pass}: expected 0 or at least {LOWEST_LOW_PASS:g} Hz")
         if self.actuators not in CARRIED:
             raise InputError(f"setting actuators = {self.actuators!r}: expected one of {', '.join(CARRIED)}")
         if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):

@@ -15,6 +15,7 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.autopilot_log import AutopilotLog
 from sysid_node.flight.logs.content import Content, content_of
+from sysid_node.flight.logs.damage import reading_log
 from sysid_node.flight.logs.fractions import between_commands, joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight, flight_of_log
 from sysid_node.flight.logs.rates import rates_of_log, rates_of_streams, require_rates
@@ -35,12 +36,13 @@ def read_autopilot_log(path: str | Path, settings: AdapterSettings | None = None
     ``settings`` are those of the adapter, for bags. Raises InputError where the file is damaged or no flight.
     """
     content = content_of(path)
-    if content is Content.ULOG:
-        return read_ulog(path)
-    if content in (Content.DATAFLASH, Content.DATAFLASH_TEXT):
-        return read_dataflash(path, text=content is Content.DATAFLASH_TEXT)
-    if content is Content.TELEMETRY:
-        return read_telemetry(path)
+    with reading_log(path):
+        if content is Content.ULOG:
+            return read_ulog(path)
+        if content in (Content.DATAFLASH, Content.DATAFLASH_TEXT):
+            return read_dataflash(path, text=content is Content.DATAFLASH_TEXT)
+        if content is Content.TELEMETRY:
+            return read_telemetry(path)
     if content is Content.ROSBAG1 or (content is Content.ROSBAG2 and _recorded_topics(Path(path))):
         return read_autopilot_bag(path, settings)
     return None

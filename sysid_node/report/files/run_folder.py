@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -41,7 +42,19 @@ def write_run(folder: Path, run: RunResult) -> None:
 
 def rebuild_report(folder: Path) -> Path:
     """Draws ``report.html`` from the folder's other files and gives its path. Raises as ``read_run`` does."""
-    run = read_run(folder)
+    try:
+        run = read_run(folder)
+        _write_aside(folder, run)
+    except InputError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError, csv.Error) as error:
+        words = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise InputError(f"{folder}: its files are damaged ({words}); run the command that wrote them again") from error
+    return folder / REPORT
+
+
+def _write_aside(folder: Path, run: RunResult) -> None:
+    """Write the page under another name, and move it into place."""
     aside = folder / f".{REPORT}"
     with _writing(folder), on_interrupt(lambda: aside.unlink(missing_ok=True)):
         try:
@@ -49,7 +62,6 @@ def rebuild_report(folder: Path) -> Path:
             aside.replace(folder / REPORT)
         finally:
             aside.unlink(missing_ok=True)
-    return folder / REPORT
 
 
 def read_run(folder: Path) -> RunResult:

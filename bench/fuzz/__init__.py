@@ -1,0 +1,1 @@
+"""Damaged input for every reader and command, for as long as one likes."""
