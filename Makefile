@@ -4,7 +4,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo loop docs test lint format build bench clean distclean
+.PHONY: help demo loop docs test lint format build bench fuzz clean distclean
 
 VENV ?= .venv
 RATE ?= 1
@@ -54,6 +54,9 @@ format: $(DONE)/dev  ## lay the source out by ruff
 	@$(BIN)/ruff format .
 
 build: $(DONE)/build  ## sysid_msgs and sysid_node into $(VENV), by colcon
+
+fuzz: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## damaged input for every reader and command; ARGS="--seconds 3600 --seed 7"
+	@$(BIN)/python -m bench.fuzz.run $(ARGS)
 
 bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## all benches; BENCH=live runs bench/live.py alone
 	@for bench in $(or $(BENCH:%=bench/%.py),$(sort $(wildcard bench/*.py))); do

@@ -10,7 +10,8 @@ from collections.abc import Callable
 #: What stands in place of a number: outside every range, of another kind, or nothing.
 ODD_NUMBERS = (
     "nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "1e999", "0", "-0.0", "-1", "1e6", "1e-9", "1e18", "0x10",
-    "1_000", "", "true", "null", "[]", "{}", "abc", "1,5", "9" * 400, "\u0663", "{value: 1, tolerance: -1}", "[1, 2, 3]",
+    "1_000", "",
+    "true", "null", "[]", "{}", "abc", "1,5", "9" * 400, "\u0663", "{value: 1, tolerance: -1}", "[1, 2, 3]",
 )  # fmt: skip
 _NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
 _EXTREMES = (0, 1, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 2**63 - 1, 2**63, 2**64 - 1)
