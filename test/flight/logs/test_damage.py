@@ -25,7 +25,7 @@ def test_lines_of_python_and_of_compiled_code_are_one_warning(capfd):
 
 @pytest.mark.parametrize("error", [KeyError("Name"), ValueError("invalid\nliteral"), RecursionError(), MemoryError()])
 def test_an_error_is_one_line_that_names_the_file(error, capfd):
-    with pytest.raises(InputError, match="x.ulg: is damaged and cannot be read") as caught, reading_log("x.ulg"):
+    with pytest.raises(InputError, match=r"x\.ulg: is damaged and cannot be read") as caught, reading_log("x.ulg"):
         raise error
     assert "\n" not in str(caught.value)
     print("heard again", file=sys.stderr)
