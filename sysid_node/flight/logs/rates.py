@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +11,20 @@ from sysid_node.errors import InputError
 from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog
 from sysid_node.flight.logs.autopilot_log import IMU as IMU_ROLE
 from sysid_node.flight.logs.flown import within
+from sysid_node.flight.logs.steps import MOSTLY, share_in_steps
+from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
-#: The lowest rates (Hz) at which estimates hold (docs/results/log_rates.md), in the order of the topics.
+#: The lowest rates (Hz) at which estimates hold (docs/results/log_rates.md); of commands that move smoothly.
 NEEDED = {IMU: 20.0, AIR_DATA: 2.0, ACTUATORS: 20.0}
+
+#: The lowest rate (Hz) of commands that move in steps: between samples the time of a step is not known.
+NEEDED_FOR_STEPS = 100.0
+
+
+#: Throttle and flaps stand still or step in every flight, and are no input of a manoeuvre.
+_NOT_STEPPED = {"throttle", "flap"}
 
 
 class SampleRate(NamedTuple):
@@ -31,7 +40,8 @@ class SampleRate(NamedTuple):
         """What is too slow, or an empty text."""
         if self.rate >= 0.93 * self.needed:  # stamps of a logger scatter
             return ""
-        return f"{self.source} comes at {said_rate(self.rate)} Hz; {self.needed:g} Hz are needed"
+        why = " for commands in steps" if self.needed == NEEDED_FOR_STEPS else ""
+        return f"{self.source} comes at {said_rate(self.rate)} Hz; {self.needed:g} Hz are needed{why}"
 
 
 def rate_of(stamps: Stamps) -> float:
@@ -58,15 +68,29 @@ def rates_of_log(log: AutopilotLog, *, raw_outputs: bool = False) -> dict[str, S
     for topic, (signal, role) in signals.items():
         rate = rate_of(signal.stamp_ns[within(log.flown or None, signal.stamp_ns)])
         found[topic] = SampleRate(signal.source, rate, NEEDED[topic], log.remedies.get(role, ""))
+    if not use_outputs:
+        commands = log.controls.signal.selected(within(log.flown or None, log.controls.signal.stamp_ns))
+        found[ACTUATORS] = _with_steps(found[ACTUATORS], log.controls.names, commands.values)
     return found
+
+
+def _with_steps(found: SampleRate, names: Sequence[str], commands: Array) -> SampleRate:
+    """The rate with what is needed where the surfaces' commands (N, C) move in steps."""
+    surfaces = [i for i, name in enumerate(names) if name not in _NOT_STEPPED]
+    stepped = share_in_steps(commands[:, surfaces]) >= MOSTLY
+    return found._replace(needed=NEEDED_FOR_STEPS) if stepped else found
 
 
 def rates_of_streams(streams: Streams) -> dict[str, SampleRate]:
     """The rates of the topics of a flight."""
-    return {
+    found = {
         topic: SampleRate(stream.source or topic, rate_of(stream.arrival.stamp_ns), NEEDED[topic], stream.remedy)
         for topic, stream in streams.by_topic.items()
     }
+    joints = streams.actuators
+    if joints.content:
+        found[ACTUATORS] = _with_steps(found[ACTUATORS], joints.names, joints.positions)
+    return found
 
 
 def require_rates(name: str, rates: Mapping[str, SampleRate]) -> None:

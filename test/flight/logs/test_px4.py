@@ -65,7 +65,10 @@ def test_slow_airspeed_moves_as_the_imu_says(tmp_path):
         ({"drop": ("airspeed_validated",)}, "no airspeed in it; connect an airspeed sensor"),
         ({"drop": ("sensor_combined",)}, "no sensor_combined in it; SDLOG_PROFILE = 27"),
         ({"drop": ("actuator_servos",)}, "which output moves which surface is not known"),
-        ({"rates": PX4_DEFAULT}, "actuator_servos comes at 10 Hz; 20 Hz are needed; SDLOG_PROFILE = 27"),
+        (
+            {"rates": PX4_DEFAULT},
+            "actuator_servos comes at 10 Hz; 20 Hz are needed; SDLOG_PROFILE = 27",
+        ),
         ({"jump": -30.0}, "the stamps of sensor_combined go back by 30.0 s after 10.0 s"),
     ],
 )

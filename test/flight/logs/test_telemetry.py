@@ -15,7 +15,7 @@ G = 9.80665
 START_US = 1_700_000_000_000_000  # when the ground station's clock shows the autopilot's start
 
 
-def telemetry_log(path: Path, *, kind: int = 1, rate: int = 50, parameters: bool = True) -> None:
+def telemetry_log(path: Path, *, kind: int = 1, rate: int = 100, parameters: bool = True) -> None:
     """A .tlog of the simulated flight: each message after the time of its arrival, 20 ms after it was sent."""
     link = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
     record = flight().between(2.0, 9.0)
@@ -60,7 +60,7 @@ def test_the_flight_comes_back(tmp_path):
     [
         ({"kind": 2}, "never flew as a fixed wing"),
         ({"parameters": False}, "which output moves which surface is not known"),
-        ({"rate": 10}, "RAW_IMU comes at 10 Hz; 20 Hz are needed; SERVO_OUTPUT_RAW comes at 10 Hz"),
+        ({"rate": 10}, "RAW_IMU comes at 10 Hz; 20 Hz are needed; SERVO_OUTPUT_RAW comes at 10 Hz; 20 Hz"),
     ],
 )
 def test_what_a_log_lacks_is_one_line(tmp_path, options, said):
