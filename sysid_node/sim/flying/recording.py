@@ -26,6 +26,8 @@ START_NS = 1_767_225_600_000_000_000
 _STEPS = np.array(
     [32 * GRAVITY / 2**16] * 3 + [np.deg2rad(4000.0) / 2**16] * 3 + [0.0] * 3 + [0.01] + [2 * np.pi / 2**14] * 2
 )
+#: Resolution of recorded commands, rad: far below that of a servo, and bags are smaller than with all digits.
+_COMMAND_STEP = 2.0**-15
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,8 @@ class Recorder:
         stamps = START_NS + np.round(times * 1e9).astype(np.int64)
         logged = stamps + round(self.latency * 1e9)
         arrival = Arrival(stamps, logged, np.arange(stamps.size))
-        return JointStream(arrival, *_joints(sortie.simulator.aircraft, controls))
+        joints, positions = _joints(sortie.simulator.aircraft, controls)
+        return JointStream(arrival, joints, np.round(positions / _COMMAND_STEP) * _COMMAND_STEP)
 
     def _commands(self, sortie: Sortie) -> tuple[Array, Array]:
         """Times (K,), s, at which commands are given, and the commands (K, controls + 1), rad and N.
