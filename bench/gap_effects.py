@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,9 @@ def believed(aircraft: Aircraft, random: np.random.Generator) -> Aircraft:
     return replace(aircraft, derivatives=off)
 
 
-def fly(aircraft: Aircraft, belief: Aircraft, effect: str, plan: tuple[str, ...], seed: int, vanes: bool) -> GapFlight:
+def fly(
+    aircraft: Aircraft, belief: Aircraft, effects: Sequence[str], plan: tuple[str, ...], seed: int, vanes: bool
+) -> GapFlight:
     """A flight of the aircraft as a bag would hold it, read with the file that is believed."""
     simulator = Simulator(aircraft, RATE)
     deflections = np.zeros((round(DURATION * RATE) + 1, len(simulator.commands)))
@@ -61,7 +63,7 @@ def fly(aircraft: Aircraft, belief: Aircraft, effect: str, plan: tuple[str, ...]
         deflections[:, column] = moved[name]
     thrust = aircraft.throttle.max_thrust if aircraft.throttle else None
     deflections[:, -1] *= thrust or 1.0
-    sortie = fly_sortie(simulator, deflections, SortieConditions([effect], seed=seed))
+    sortie = fly_sortie(simulator, deflections, SortieConditions(list(effects), seed=seed))
     record = flight_record(belief, Recorder(RATE, RATE, RATE).record(sortie), 0.2)
     unread = {} if vanes else {name: np.full(len(record), np.nan) for name in ANGLES}
     record = replace(record, columns={**record.columns, **unread})
@@ -74,7 +76,7 @@ def told(effect: str, vanes: bool) -> dict[str, Any]:
     belief = believed(aircraft, np.random.default_rng(seed))
     spec = f"{effect}:{EXAMPLES[effect]}"
     try:
-        flights = [fly(aircraft, belief, spec, plan, seed + k, vanes) for k, plan in enumerate(PLANS)]
+        flights = [fly(aircraft, belief, [spec], plan, seed + k, vanes) for k, plan in enumerate(PLANS)]
     except InputError:  # so large that these manoeuvres cannot be flown
         return {"verdict": "the flight diverges"}
     try:
@@ -110,7 +112,8 @@ def right(effect: str, found: Mapping[str, Any]) -> bool:
 def _cause(cause: Mapping[str, Any], flown: str) -> str:
     """Name, probability, what it was not told apart from, and the parameters that were flown."""
     keys = [part.partition("=")[0] for part in flown.split(":")]
-    sizes = [f"{k} {v:.3g} ({e:.2g})" for k, (v, e) in cause["parameters"].items() if k in keys]
+    every = not set(keys) & set(cause["parameters"])  # what was flown on all controls is found on each
+    sizes = [f"{k} {v:.3g} ({e:.2g})" for k, (v, e) in cause["parameters"].items() if every or k in keys]
     rivals = f" or {', '.join(cause['indistinguishable_from'])}" if cause["indistinguishable_from"] else ""
     return f"{cause['label']}{rivals} {cause['probability']:.2f}{': ' if sizes else ''}{', '.join(sizes)}"
 

@@ -39,7 +39,7 @@ ROOMS = {
     ),
     "gap": (
         "thresholds", "flightdata", "residuals", "estimation", "instruments", "selection", "validation", "verdict",
-        "diagnose", "document",
+        "diagnose", "document", "correction",
     ),
 }  # fmt: skip
 

@@ -17,9 +17,9 @@ class Actuators:
     ) -> None:
         self._effects, self._limits, self._step = effects, limits, step
         self._omega = 2.0 * math.pi * servo
-        late = effects.get("command_delay", {}).get("delay", 0.0) / step
-        self._whole, self._part = int(late), late - int(late)
-        self._history = deque([dict(trim)] * (self._whole + 2), maxlen=self._whole + 2)
+        self._late = {n: _of(effects, "command_delay", "delay", _CALLED.get(n, n), 0.0) / step for n in trim}
+        length = int(max(self._late.values())) + 2
+        self._history = deque([dict(trim)] * length, maxlen=length)
         clipped = {n: max(-limits[n], min(limits[n], trim[n])) for n in limits}
         self._servo = {n: (x, 0.0) for n, x in clipped.items()}
         self._lagged, self._linked, self._position = dict(clipped), dict(clipped), dict(clipped)
@@ -28,20 +28,22 @@ class Actuators:
     def move(self, command: Mapping[str, float], time: float) -> tuple[dict[str, float], float]:
         """One step on: the deflections (rad) that count, and the thrust (N)."""
         self._history.append(dict(command))
-        newer, older = self._history[1], self._history[0]
-        arriving = {n: newer[n] + self._part * (older[n] - newer[n]) for n in newer}
+        arriving = {}
+        for name, late in self._late.items():
+            newer, older = self._history[-1 - int(late)][name], self._history[-2 - int(late)][name]
+            arriving[name] = newer + (late - int(late)) * (older - newer)
         return {n: self._surface(n, arriving[n], time) for n in self._limits}, self._thrust(arriving["thrust"])
 
     def _surface(self, name: str, command: float, time: float) -> float:
         limit, effects = self._limits[name], self._effects
         wanted = self._servo_step(name, max(-limit, min(limit, command)))
-        tau = effects.get("actuator_lag", {}).get("time_constant", 0.0)
+        tau = _of(effects, "actuator_lag", "time_constant", name, 0.0)
         share = 1.0 - math.exp(-self._step / tau) if tau else 1.0
         self._lagged[name] += share * (wanted - self._lagged[name])
         play = 0.5 * effects.get("actuator_backlash", {}).get(name, 0.0)
         off = self._lagged[name] - self._linked[name]
         self._linked[name] += math.copysign(max(abs(off) - play, 0.0), off)
-        rate = effects.get("actuator_rate_limit", {}).get("rate", math.inf)
+        rate = _of(effects, "actuator_rate_limit", "rate", name, math.inf)
         reach = self._linked[name] - self._position[name]
         self._position[name] += math.copysign(min(abs(reach), rate * self._step), reach)
         x = self._position[name] + effects.get("actuator_bias", {}).get(name, 0.0)
@@ -65,6 +67,16 @@ class Actuators:
         share = 1.0 - math.exp(-self._step / tau) if tau else 1.0
         self._motor += share * (max(command, 0.0) - self._motor)
         return self._motor * (1.0 + self._effects.get("thrust_scale", {}).get("error", 0.0))
+
+
+#: The word for a command's name among the parameters of effects.
+_CALLED = {"thrust": "throttle"}
+
+
+def _of(effects: Effects, effect: str, key: str, control: str, absent: float) -> float:
+    """A control's own value of an effect, or that of ``key``, which is meant for all controls."""
+    values = effects.get(effect, {})
+    return values.get(control, values.get(key, absent))
 
 
 def servo_lag(servo: float) -> float:

@@ -122,7 +122,5 @@ def effects_of(text: str) -> dict[str, dict[str, float]]:
     for line in text.splitlines():
         name, *pairs = line.removeprefix("--effect ").split(":")
         values = {key: float(value) for key, value in (pair.split("=") for pair in pairs)}
-        if "inverse_rate" in values:
-            values = {"rate": 1.0 / values["inverse_rate"]}
         found[name] = values
     return found

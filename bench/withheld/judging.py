@@ -164,14 +164,26 @@ def _parameters(label: Mapping[str, Any], said: Mapping[str, Any]) -> list[tuple
     for cause in said["causes"]:
         for key, true in label["effects"].get(cause["effect"], {}).items():
             full = f"{cause['effect']}.{key}"
-            found = cause["parameters"]
-            if key == "rate" and "inverse_rate" in found:
-                value, error = found["inverse_rate"]
-                rows.append((full, 1.0 / true, value, error))
+            found = _with_all_controls(cause["parameters"], key)
+            if key == "rate" and key in found:
+                value, error = found[key]
+                rows.append((full, 1.0 / true, 1.0 / value, error / value**2))
             elif key in found and key not in _SHAPES and not (cause["effect"] == "stuck_surface" and key == "rudder"):
                 value, error = found[key]
                 rows.append((full, _shown(full, true, value, label["servo_lag"]), value, error))
     return rows
+
+
+#: Keys that mean all controls; what is found has a parameter for each control instead.
+_OF_ALL = frozenset({"time_constant", "delay", "rate"})
+
+
+def _with_all_controls(found: Mapping[str, list[float]], key: str) -> Mapping[str, list[float]]:
+    """What was found, and under a key that means all controls the median of theirs by value."""
+    surfaces = [found[name] for name in ("elevator", "aileron", "rudder") if name in found]
+    if key in found or key not in _OF_ALL or not surfaces:
+        return found
+    return {**found, key: sorted(surfaces)[len(surfaces) // 2]}
 
 
 def _shown(name: str, true: float, found: float, servo_lag: float) -> float:

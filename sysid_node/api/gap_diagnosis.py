@@ -14,12 +14,13 @@ from sysid_node.aircraft.model import Derivative
 from sysid_node.api.data_frames import data_frame
 from sysid_node.api.flight_file import FlightFile
 from sysid_node.errors import InputError
+from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.diagnose import diagnose as diagnose_flights
 from sysid_node.gap.document import document
 from sysid_node.gap.flightdata.gap_flight import load_gap_flight
 from sysid_node.report.drawing.plotly_figure import plotly_figure
-from sysid_node.report.files.gap_folder import UNFINISHED, corrected_aircraft, write_gap
+from sysid_node.report.files.gap_folder import UNFINISHED, write_gap
 from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import REPORT
 from sysid_node.report.sections.gap.flight import flight_figures

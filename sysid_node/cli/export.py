@@ -57,11 +57,12 @@ def run(args: argparse.Namespace) -> None:
     left: list[str] = []
     if summary:
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
-    text = _write(args.format, aircraft, args.effect)
+    text, left_out = _write(args.format, aircraft, args.effect)
     write_file(args.out, text)
     if not args.quiet:
         kept = f"; not valid, kept as in the aircraft file: {', '.join(left)}" if left else ""
-        print(f"{args.out}: {aircraft.name} for {args.format}{kept}")
+        lost = f"; {args.format} cannot hold, left out: {', '.join(left_out)}" if left_out else ""
+        print(f"{args.out}: {aircraft.name} for {args.format}{kept}{lost}")
 
 
 def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]]) -> tuple[Aircraft, list[str]]:
@@ -106,11 +107,21 @@ def _summary(estimate: str) -> dict[str, Any] | None:
     raise InputError(f"{path}: not the summary.json of a run (it needs aircraft and derivatives)")
 
 
-def _write(form: str, aircraft: Aircraft, specs: list[str]) -> str:
+def _write(form: str, aircraft: Aircraft, specs: list[str]) -> tuple[str, list[str]]:
+    """The model, and what of the aircraft file its format cannot hold. Raises InputError for an effect asked for."""
     from sysid_node.sim.export.gazebo import gazebo_plugin  # noqa: PLC0415  # JAX takes its time
-    from sysid_node.sim.export.jsbsim import jsbsim_model  # noqa: PLC0415
+    from sysid_node.sim.export.jsbsim import EFFECTS, jsbsim_model  # noqa: PLC0415
     from sysid_node.sim.export.rosflight import rosflight_parameters  # noqa: PLC0415
+    from sysid_node.sim.model import parameters  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
-    effects = Simulator(aircraft).effects(specs) if specs else {}
-    return {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form](aircraft, effects)
+    effects = Simulator(aircraft).effects(specs) if specs or aircraft.effect_values() else {}
+    held = EFFECTS if form == "jsbsim" else ()
+    asked = parameters.parse(specs)
+    left_out = [name for name in effects if name not in held and name not in asked]
+    if form != "jsbsim" and aircraft.tables:
+        left_out.append(f"{len(aircraft.tables)} table{'s' * (len(aircraft.tables) > 1)}")
+    if form == "jsbsim" and effects.get("actuator_lag", {}).get("damping"):
+        left_out.append("damping of actuator_lag (its actuators are of first order)")
+    write = {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form]
+    return write(aircraft, {name: values for name, values in effects.items() if name not in left_out}), left_out

@@ -147,7 +147,7 @@ def _truth(args: argparse.Namespace, sortie: Sortie) -> dict[str, Any]:
         "aircraft": sortie.simulator.aircraft.name,
         "derivatives": derivatives,
         "changes": changes,
-        "effects": sortie.effects,
+        "effects": sortie.all_effects,
         "trim": {
             "airspeed": float(np.linalg.norm(sortie.trim.initial[3:6])),
             "alpha": sortie.trim.alpha,
@@ -169,7 +169,7 @@ def _derivatives(surfaces: str, sortie: Sortie) -> tuple[dict[str, float], list[
     do not change; if its command is recorded, they become zero.
     """
     lossy = LOSSES[:1] if surfaces == "measured" else LOSSES
-    failed = sorted((effect.get("onset", 0.0), name) for name, effect in sortie.effects.items() if name in lossy)
+    failed = sorted((effect.get("onset", 0.0), name) for name, effect in sortie.all_effects.items() if name in lossy)
     end = (len(sortie.flight.outputs) - 1) * sortie.simulator.step
     begin, changes = dict(sortie.derivatives), []
     present = begin
@@ -185,7 +185,7 @@ def _derivatives(surfaces: str, sortie: Sortie) -> tuple[dict[str, float], list[
 
 def _left(sortie: Sortie, effect: str, derivatives: Mapping[str, float]) -> dict[str, float]:
     """The derivatives that a failure changes, as they are after it."""
-    lost = sortie.effects[effect]
+    lost = sortie.all_effects[effect]
     share = {c.symbol: 1.0 - lost[n] for n, c in sortie.simulator.aircraft.controls.items() if lost.get(n)}
     of = {name: name.partition("_")[2] for name in derivatives}
     return {name: share[of[name]] * value for name, value in derivatives.items() if of[name] in share}

@@ -24,6 +24,12 @@ def altitude_of(density: float) -> float:
     return float((1.0 - (density / SEA_LEVEL_DENSITY) ** (1.0 / _EXPONENT)) / _LAPSE)
 
 
+def speed_of_sound(density: Real, xp: Namespace) -> Real:
+    """Speed of sound (m/s) in the standard atmosphere where it has this density (kg/m^3), below 11 km."""
+    temperature = 288.15 * xp.exp(xp.log(density / SEA_LEVEL_DENSITY) / _EXPONENT)  # K
+    return xp.sqrt(1.4 * 287.05287 * temperature)
+
+
 def dynamic_pressure(density: Real, airspeed: Real) -> Real:
     """qbar = rho V^2 / 2 (N/m^2) of density (kg/m^3) and true airspeed (m/s)."""
     return 0.5 * density * airspeed * airspeed

@@ -126,7 +126,7 @@ class Predictor:
         """Sensitivities (N, m, derivatives + initial states) of the measured outputs; rounding errors become zero."""
         simulator, unknowns = self.simulator, np.zeros(len(self.names) + len(_INITIAL))
         arguments = (simulator.layout, simulator.model, unknowns, self.trim.initial, _padded(commands), simulator.step)
-        slopes = np.asarray(slopes_of(*arguments))[: len(commands), self._columns]
+        slopes = np.asarray(slopes_of(*arguments, simulator.neutral()))[: len(commands), self._columns]
         largest = np.abs(slopes / self._sigma[:, None]).max(axis=(0, 1))
         return np.where(largest > _ROUNDING, slopes, 0.0)
 
@@ -137,12 +137,22 @@ def _padded(commands: Array) -> Array:
 
 
 def outputs_of(
-    layout: Layout, model: Model, unknowns: jax.Array, initial: jax.Array, commands: jax.Array, step: float
+    layout: Layout,
+    model: Model,
+    unknowns: jax.Array,
+    initial: jax.Array,
+    commands: jax.Array,
+    step: float,
+    file: jax.Array | None = None,
 ) -> jax.Array:
-    """Outputs (N, 12) with the unknowns, derivatives' errors then initial states', added to their nominal values."""
+    """Outputs (N, 12) with the unknowns, derivatives' errors then initial states', added to their nominal values.
+
+    ``file`` (P,) are the effects of the aircraft file; None: it states none.
+    """
+    nominal = parameters.neutral(layout) if file is None else file
     names = parameters.names(layout)
     index = jnp.array([names.index(f"derivative_error.{name}") for name in layout.derivatives])
-    theta = jnp.asarray(parameters.neutral(layout)).at[index].add(unknowns[: index.size])
+    theta = jnp.asarray(nominal).at[index].add(unknowns[: index.size])
     start = jnp.asarray(initial).at[jnp.array(_INITIAL)].add(unknowns[index.size :])
     calm = jnp.zeros((commands.shape[0], 6))
     inputs = Inputs(commands, calm, calm, jnp.zeros((commands.shape[0], len(OUTPUTS))))

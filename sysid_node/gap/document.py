@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
+from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.calibration import calibrated_probability
@@ -15,6 +19,8 @@ from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.validation.standard_errors import standard_errors, with_standard_error
 from sysid_node.gap.verdict.decision import unexplained_share
 from sysid_node.gap.verdict.next_flight import named
+from sysid_node.sim import Simulator
+from sysid_node.sim.model.parameters import StatedParameter, stated_parameters
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -88,11 +94,18 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "label": cause.candidate.label,
         "station": cause.candidate.station,
         "parameters": parameters(found.attribution.size_fit, cause),
+        **_known(found, cause),
         "probability": cause.probability,
         "gap_after": found.size.after,
         "indistinguishable_from": named(cause),
         "grounds": _grounds(cause),
     }
+
+
+def _known(found: Diagnosis, cause: Cause) -> dict[str, Any]:
+    """What the aircraft file states of a cause's parameters, where it does."""
+    values = believed(cause, found.attribution.size_fit.simulator)
+    return {"believed": values} if values else {}
 
 
 def _doubted(cause: Cause) -> dict[str, Any]:
@@ -119,9 +132,10 @@ def _grounds(cause: Cause) -> dict[str, Any]:
 
 
 def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
-    """Value and standard error of each of a cause's parameters by name, in the simulator's units.
+    """Value and standard error of each of a cause's parameters by name, in the units of the aircraft file's effects.
 
-    ``fit`` holds the cause. A cause that only widens the tolerances of derivatives has these as its parameters.
+    ``fit`` holds the cause. A cause that only widens the tolerances of derivatives has these as its parameters. What
+    acts on controls has a parameter for each control on which the cause acts.
     """
     places = {index: place for place, index in enumerate(fit.indices)}
     entries = cause.candidate.indices
@@ -130,9 +144,29 @@ def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
         ordered = [i for i, shared in nuisances if shared] + [i for i, shared in nuisances if not shared]
         places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
         entries = tuple(i for i in ordered if i in cause.candidate.widened)
-    errors = standard_errors(fit)
-    names = {i: fit.simulator.parameters[i][1].name for i in entries}
-    return {
-        name: with_standard_error(name, float(fit.flights[0].point[i]), float(errors[places[i]]))
-        for i, name in names.items()
-    }
+    errors, point = standard_errors(fit), fit.flights[0].point
+    found = {}
+    for name, parameter in stated_by(cause.candidate, fit.simulator, entries).items():
+        (moved,) = set(parameter.entries) & set(entries)
+        total = float(point[list(parameter.entries)].sum())
+        value, error = with_standard_error(name, total, float(errors[places[moved]]))
+        if not parameter.inverse:
+            found[name] = [value, error]
+        elif value > 0.0:  # of 1 / x
+            found[name] = [1.0 / value, error / value**2]
+    return found
+
+
+def stated_by(candidate: Candidate, simulator: Simulator, entries: Sequence[int]) -> dict[str, StatedParameter]:
+    """The parameters of a candidate as users state them: those that hold one of these entries of the vector."""
+    every = stated_parameters(simulator.layout, candidate.effect)
+    return {name: each for name, each in every.items() if not set(each.entries).isdisjoint(entries)}
+
+
+def believed(cause: Cause, simulator: Simulator) -> dict[str, float]:
+    """What the aircraft file states of a cause's parameters, by name; empty where it does not state the effect."""
+    if cause.candidate.effect not in simulator.aircraft.effect_values():
+        return {}
+    stated = stated_by(cause.candidate, simulator, cause.candidate.entries)
+    values = {name: each.value(simulator.neutral()) for name, each in stated.items()}
+    return {name: value for name, value in values.items() if np.isfinite(value)}

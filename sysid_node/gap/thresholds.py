@@ -132,6 +132,9 @@ class Search:
         "for the first, second and third effect: explanations that it is added to, candidates fitted upon each",
     )
     per_effect: int = _threshold(2, "1", "candidates of one effect that are fitted upon one explanation, at most")
+    penalty: float = _threshold(
+        10.0, "1", "deviance by which a variant of an effect must be better for each parameter that it has more"
+    )
     alternatives: int = _threshold(4, "1", "alternatives to a cause that are fitted")
     sweeps: int = _threshold(3, "1", "times that all causes are compared with their alternatives, at most")
     lead: float = _threshold(

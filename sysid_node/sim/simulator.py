@@ -98,22 +98,31 @@ class Simulator:
         return np.array([table.get(name) or parameter.scale for name, (_, parameter) in pairs])
 
     def neutral(self) -> Array:
-        """The vector (P,) at which every effect is neutral."""
-        return parameters.neutral(self.layout)
+        """The vector (P,) of the aircraft as its file describes it: the file's effects, and no others."""
+        return self._file_vector.copy()
+
+    @cached_property
+    def _file_vector(self) -> Array:
+        values = {name: stated for name, stated in self.aircraft.effect_values().items() if any(stated.values())}
+        return parameters.vector(self.layout, values)
 
     def vector(self, effects: Mapping[str, Mapping[str, float]] | Sequence[str]) -> Array:
         """The vector (P,) of effects, given as ``{effect: {parameter: value}}`` or ``["effect:parameter=value"]``.
 
-        Raises InputError (unknown names, impossible values).
+        A parameter that is given replaces the file's; all others stay as the file states them. Raises InputError
+        (unknown names, impossible values).
         """
         known = effects if isinstance(effects, Mapping) else parameters.parse(effects)
-        return parameters.vector(self.layout, known)
+        return parameters.vector(self.layout, known, self._file_vector)
 
     def effects(self, effects: Mapping[str, Mapping[str, float]] | Sequence[str]) -> dict[str, dict[str, float]]:
-        """The same effects with all of their parameters, as the vector holds them. Raises InputError."""
+        """These effects and the file's with all of their parameters, as users state them. Raises InputError."""
         known = effects if isinstance(effects, Mapping) else parameters.parse(effects)
-        values = parameters.unpack(self.layout, jnp.asarray(parameters.vector(self.layout, known)))
-        return {name: {key: float(value) for key, value in values[name].items()} for name in known}
+        theta = self.vector(known)
+        return {
+            name: parameters.stated(self.layout, theta, name)
+            for name in dict.fromkeys((*self.aircraft.effect_values(), *known))
+        }
 
     def initial(
         self,

@@ -46,9 +46,12 @@ def test_parameters_are_right_within_their_share_or_interval() -> None:
 def test_a_rate_is_compared_by_its_reciprocal_and_a_lag_with_the_servos_own() -> None:
     rate = judge(
         _label("one", {"actuator_rate_limit": {"rate": 0.5}}),
-        _said("explained", ("actuator_rate_limit", 0.9, {"inverse_rate": [2.1, 0.01]}, [])),
+        _said(
+            "explained",
+            ("actuator_rate_limit", 0.9, {"elevator": [0.5, 0.01], "aileron": [0.48, 0.01], "rudder": [0.4, 0.1]}, []),
+        ),
     )
-    assert rate.parameters == (("actuator_rate_limit.rate", 2.0, 2.1, 0.01),)
+    assert rate.parameters == (("actuator_rate_limit.rate", 2.0, 1.0 / 0.48, 0.01 / 0.48**2),)
     lag = judge(
         _label("one", {"actuator_lag": {"time_constant": 0.04}}),
         _said("explained", ("actuator_lag", 0.9, {"time_constant": [0.05, 0.001]}, [])),

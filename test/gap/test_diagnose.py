@@ -13,7 +13,7 @@ def test_a_lag_is_named_with_its_size(lagging) -> None:
     assert lagging.verdict == "explained"
     (cause,) = document(lagging)["causes"]
     assert cause["effect"] == "actuator_lag" and cause["station"] == "actuator"
-    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.08, rel=0.15)
+    assert cause["parameters"]["elevator"][0] == pytest.approx(0.08, rel=0.15)
 
 
 def test_the_gap_closes_on_flight_held_out(lagging) -> None:

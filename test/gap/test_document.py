@@ -50,7 +50,7 @@ def test_parameters_are_sizes_with_their_standard_errors(lagging) -> None:
     """By chance and by 3 % of the size; the lag is the first of the unknowns."""
     (cause,) = lagging.attribution.causes
     fit = lagging.attribution.size_fit
-    value, error = parameters(fit, cause)["time_constant"]
+    value, error = parameters(fit, cause)["elevator"]
     assert value == fit.values[0]
     assert error == pytest.approx(np.hypot(standard_errors(fit)[0], 0.03 * value))
 

@@ -126,12 +126,13 @@ class CandidateFit:
 
     @property
     def stacked(self) -> tuple[Array, Array, Array]:
-        """Values, prior standard deviations and limits of all flights' nuisance parameters; neutral is zero for all."""
+        """Deviations from the file, prior standard deviations and limits of all flights' nuisance parameters."""
         _, shared, separate = self.sizes
         now, sigma, limit = (np.ones(shared + len(self.flights) * separate) for _ in range(3))
         for number, flight in enumerate(self.flights):
             places = flight.nuisances.places(number)
-            now[places] = flight.point[list(flight.nuisances.indices)]
+            indices = list(flight.nuisances.indices)
+            now[places] = flight.point[indices] - self.simulator.neutral()[indices]
             sigma[places], limit[places] = flight.nuisances.sigma, flight.nuisances.limit
         return now, sigma, limit
 
@@ -210,8 +211,9 @@ def stepped(fit: CandidateFit, step: Array) -> CandidateFit:
         indices, limit = list(flight.nuisances.indices), flight.nuisances.limit
         point = flight.point.copy()
         point[chosen] = np.clip(flight.point[chosen] + step[: len(chosen)], low, high)
-        moved = flight.point[indices] + step[len(chosen) + flight.nuisances.places(number)]
-        point[indices] = np.clip(moved, -limit, limit)
+        centre = fit.simulator.neutral()[indices]
+        moved = flight.point[indices] - centre + step[len(chosen) + flight.nuisances.places(number)]
+        point[indices] = centre + np.clip(moved, -limit, limit)
         points.append(point)
     return fit.at(points)
 

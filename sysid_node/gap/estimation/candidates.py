@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import EFFECTS, Simulator
@@ -27,7 +28,13 @@ _OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_la
 _OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")
 
 #: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
-_FIXED = frozenset({"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping"})
+_FIXED = frozenset(
+    {"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping", "actuator_lag.damping"}
+)
+
+#: Effects with a parameter that all controls share and one for each control. There is a candidate of the shared one,
+#: one of each control alone, and one of every control by itself.
+SHARED = tuple(name for name, effect in EFFECTS.items() if effect.shared)
 
 #: Effects that are one candidate for each control, because each control has an onset of its own.
 PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
@@ -49,7 +56,7 @@ class Candidate:
     """An effect that may be to blame: the parameters that are fitted, and the values from which their fit may start."""
 
     effect: str
-    label: str  # the effect, and the control where it is one control's
+    label: str  # the effect, and the control where it is one control's: see ``scope``
     indices: tuple[int, ...]  # none where only priors of nuisances are widened
     starts: tuple[tuple[float, ...], ...]
     widened: tuple[int, ...] = ()  # nuisances whose priors are widened
@@ -58,6 +65,11 @@ class Candidate:
     def entries(self) -> tuple[int, ...]:
         """All entries of the parameter vector that it changes."""
         return (*self.indices, *self.widened)
+
+    @property
+    def scope(self) -> str:
+        """The control, or the coefficient, on which it acts alone; empty where it acts on all."""
+        return self.label.partition(" of ")[2]
 
     @property
     def station(self) -> str:
@@ -80,16 +92,19 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
             found += _per_control(simulator, effect, length)
         else:
             found.append(_whole(simulator, models, effect))
+        if effect in SHARED:
+            found += _variants(simulator, models, effect)
     return found
 
 
 def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> Candidate:
     """The candidate of an effect with all its free parameters."""
     table = [(i, p) for i, (e, p) in enumerate(simulator.parameters)
-             if e == effect and f"{e}.{p.name}" not in _FIXED]  # fmt: skip
-    shaped = dict(_shapes(simulator, models, effect))
+             if e == effect and f"{e}.{p.name}" not in _FIXED
+             and (effect not in SHARED or p.name == EFFECTS[effect].shared)]  # fmt: skip
+    shaped, now = dict(_shapes(simulator, models, effect)), simulator.neutral()
     values = [
-        shaped.get(p.name, (float(np.clip(p.neutral + 0.3 * simulator.scales[i], p.lower, p.upper)),)) for i, p in table
+        shaped.get(p.name, (float(np.clip(now[i] + 0.3 * simulator.scales[i], p.lower, p.upper)),)) for i, p in table
     ]
     return Candidate(effect, effect, tuple(i for i, _ in table), tuple(product(*values)))
 
@@ -104,19 +119,52 @@ def _shapes(
         yield "depth", (0.8,)
         yield from (("a1", (20.0,)), ("CD_X", (0.1,)), ("Cm_X", (-0.05,)))
     if effect == "actuator_rate_limit":
-        fastest = [float(np.abs(np.diff(model.commands[:, :-1], axis=0)).max()) for model in models]
-        speed = max(change * model.simulator.rate for change, model in zip(fastest, models, strict=True))
+        speed = float(np.max([_fastest(model) for model in models]))
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
         # usually one control has backlash; a start that gives it to all of them may fit worse than none
         yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
     if effect in TIME_EFFECTS:
+        believed = _believed(simulator, effect)
         name = "delay" if effect.endswith("delay") else "time_constant"
-        yield name, (0.02, 0.07, 0.2)
+        yield name, tuple(believed + more for more in (0.02, 0.07, 0.2))
     if effect == "structural_mode":
         yield "frequency", (3.5, 5.0, 9.0)
     if effect == "ground_effect":
         yield "height", (0.5, 3.0)
+
+
+def _believed(simulator: Simulator, effect: str) -> float:
+    """What the aircraft file states of the parameter that all controls share, or of the effect's only one."""
+    values = simulator.neutral()
+    return float(next(values[i] for i, (name, p) in enumerate(simulator.parameters) if name == effect and p.switch))
+
+
+def _fastest(model: ResidualModel) -> Array:
+    """The fastest change (controls,) of each command, rad/s."""
+    return np.asarray(np.abs(np.diff(model.commands[:, :-1], axis=0)).max(axis=0) * model.simulator.rate)
+
+
+def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> list[Candidate]:
+    """The candidates of one control alone, for each that moves, and of each of them by itself.
+
+    Their parameters are added to what all controls share.
+    """
+    speeds = np.max([_fastest(model) for model in models], axis=0)
+    controls = [c for c, speed in zip(simulator.layout.controls, speeds, strict=True) if speed > 0.0]
+    if len(controls) < 2:
+        return []
+    indices = tuple(simulator.names.index(f"{effect}.{control}") for control in controls)
+    by_speed = {c: 1.0 / max(float(s), 0.1) for c, s in zip(simulator.layout.controls, speeds, strict=True)}
+    starts = [
+        [by_speed[c] / share for share in (0.4, 0.1)] if effect == "actuator_rate_limit" else [0.03, 0.1]
+        for c in controls
+    ]
+    alone = [
+        Candidate(effect, f"{effect} of {control}", (index,), tuple((start,) for start in own))
+        for control, index, own in zip(controls, indices, starts, strict=True)
+    ]
+    return [*alone, Candidate(effect, f"{effect} of each control", indices, tuple(zip(*starts, strict=True)))]
 
 
 def _per_coefficient(simulator: Simulator) -> list[Candidate]:

@@ -1,26 +1,29 @@
 """Nuisance parameters: errors of the derivatives within their tolerances, biases, and clock offsets within one sample.
 
-Each is a parameter of the simulator's chain with a Gaussian prior about its neutral value, truncated at three standard
-deviations (a clock offset at one sample). The truncation gives the tolerance its meaning: data that determine a
-derivative to a thousandth would overrule any prior, and a shifted centre of gravity would pass as an error of Cm_alpha
-of ten standard deviations. All flights share the derivatives and clock offsets; biases are each flight's own.
+Each is a parameter of the simulator's chain with a Gaussian prior about the aircraft file's value, truncated at three
+standard deviations (a clock offset at one sample). So are the effects that the file states, within their tolerances.
+The truncation gives the tolerance its meaning: data that determine a derivative to a thousandth would overrule any
+prior, and a shifted centre of gravity would pass as an error of Cm_alpha of ten standard deviations. All flights share
+the derivatives, the file's effects and clock offsets; biases are each flight's own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import DELAY_EFFECTS, Aircraft
 from sysid_node.aircraft.names import LATERAL
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.sim import Simulator
+from sysid_node.sim.model.parameters import stated_parameters
 
 #: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a wider prior.
 DERIVATIVE_ERROR = "derivative_error"
@@ -48,7 +51,7 @@ class Nuisances:
 
     indices: tuple[int, ...]
     sigma: Array  # standard deviation of each
-    limit: Array  # largest absolute value of each
+    limit: Array  # largest deviation of each from the aircraft file's value
     shared: NDArray[np.bool_]  # whether all flights have the same value
     widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
 
@@ -102,17 +105,54 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
         )
     lateral = any(m.flight.lateral for m in models)
     sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
+    believed = believed_effects(model.simulator)
+    sigma |= believed
     sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
     sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
     if any(is_gusty(m) for m in models):
         sigma |= _turning_air(aircraft)
     limit = {name: THRESHOLDS.priors.limit * s for name, s in sigma.items()}
+    limit |= {name: min(limit[name], room) for name, room in _room(model.simulator, believed).items()}
     for clock, rate in zip(CLOCKS, (model.flight.actuator_rate, model.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
     names = model.simulator.names
-    shared = np.array([name.startswith(("derivative_error", "unsteady_aerodynamics", *CLOCKS)) for name in sigma])
+    of_aircraft = ("derivative_error", "unsteady_aerodynamics", *CLOCKS, *(f"{name}" for name in believed))
+    shared = np.array([name.startswith(of_aircraft) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
+
+
+#: Effects of the file that are no nuisance: what differs from flight to flight, and the beginning of a failure.
+_NOT_NUISANCES = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise", "derivative_error", *CLOCKS})
+
+
+def believed_effects(simulator: Simulator) -> dict[str, float]:
+    """1 sigma, in the simulator's units, of the parameters of effects that the aircraft file states, by name.
+
+    What the file states without any tolerance, or at the end of a parameter's range, is not among them.
+    """
+    aircraft, values = simulator.aircraft, simulator.neutral()
+    found: dict[str, float] = {}
+    for effect in (*aircraft.effects, *(DELAY_EFFECTS[t] for t, delay in aircraft.delays.items() if delay.value)):
+        stated = aircraft.effects.get(effect, {"delay": None})
+        for name, parameter in stated_parameters(simulator.layout, effect).items():
+            key = f"{effect}.{name}" if effect in aircraft.effects else f"delays.{_TOPIC[effect]}"
+            sigma = aircraft.tolerances.get(key, 0.0) if name in stated else 0.0
+            if parameter.inverse:  # sigma of 1 / x is sigma / x^2
+                sigma *= float(values[list(parameter.entries)].sum()) ** 2
+            if sigma and effect not in _NOT_NUISANCES and name != "onset":
+                found[simulator.names[parameter.entries[-1]]] = sigma
+    return {name: sigma for name, sigma in found.items() if _room(simulator, [name])[name] > 0.0}
+
+
+_TOPIC = {effect: topic for topic, effect in DELAY_EFFECTS.items()}
+
+
+def _room(simulator: Simulator, names: Iterable[str]) -> dict[str, float]:
+    """How far each of these parameters may move both ways from the aircraft file's value within its range."""
+    values, indices = simulator.neutral(), {name: simulator.names.index(name) for name in names}
+    table = {name: simulator.parameters[i][1] for name, i in indices.items()}
+    return {n: float(min(p.upper - values[indices[n]], values[indices[n]] - p.lower)) for n, p in table.items()}
 
 
 def _turning_air(aircraft: Aircraft) -> dict[str, float]:

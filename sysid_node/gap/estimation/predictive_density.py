@@ -189,9 +189,13 @@ def fit_on_other_flight(fit: CandidateFit, flight: HeldOutFlight) -> CandidateFi
 
 
 def exported_parameters(fit: CandidateFit, point: Array) -> Array:
-    """Parameters (P,) of the model that is handed on: the nuisances neutral, except the derivatives' errors."""
+    """Parameters (P,) of the model that is handed on: the nuisances as in the file, except the aircraft's own.
+
+    These are the derivatives' errors and the effects that the file states.
+    """
     simulator, kept = fit.simulator, point.copy()
-    recording = [i for i in fit.nuisances.indices if simulator.parameters[i][0] != DERIVATIVE_ERROR]
+    aircraft = {DERIVATIVE_ERROR, *simulator.aircraft.effects}
+    recording = [i for i in fit.nuisances.indices if simulator.parameters[i][0] not in aircraft]
     kept[recording] = simulator.neutral()[recording]
     return np.asarray(kept)
 

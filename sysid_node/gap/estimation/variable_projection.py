@@ -199,6 +199,7 @@ class VariableProjection:
         for number, flight in enumerate(self.fit.flights):
             point = flight.point.copy()
             point[self.indices] = values
-            point[list(flight.nuisances.indices)] = moved[flight.nuisances.places(number)]
+            indices = list(flight.nuisances.indices)
+            point[indices] = self.fit.simulator.neutral()[indices] + moved[flight.nuisances.places(number)]
             points.append(point)
         return tuple(points)

@@ -12,7 +12,8 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.sim import Simulator
+from sysid_node.sim import EFFECTS, Simulator
+from sysid_node.sim.effects.base import THROTTLE
 
 #: Effects of message stamps. No message is stamped before the instant that it describes: if stamps could be early, then
 #: late commands and late air data could pass for an early IMU, and the three clocks could not be told apart.
@@ -34,14 +35,24 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
         else parameter.lower
         for effect, parameter in table
     ]  # fmt: skip
-    return np.array(lower), np.array([parameter.upper for _, parameter in table])
+    upper = [parameter.upper for _, parameter in table]
+    for place, (effect, parameter) in enumerate(table):
+        shared = EFFECTS[effect].shared
+        if shared and parameter.name in (*simulator.layout.controls, THROTTLE):  # the sum with the shared is bounded
+            known = float(simulator.neutral()[simulator.names.index(f"{effect}.{shared}")])
+            whole = next(p for e, p in simulator.parameters if (e, p.name) == (effect, shared))
+            lower[place], upper[place] = whole.lower - known, whole.upper - known
+    return np.array(lower), np.array(upper)
 
 
 def prior(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
-    """Mean and standard deviation (K,) of the Gaussian prior of these entries, in the parameters' own units."""
+    """Mean and standard deviation (K,) of the Gaussian prior of these entries, in the parameters' own units.
+
+    The mean is the aircraft file's value.
+    """
     parameters = [simulator.parameters[i][1] for i in indices]
     sigma = [
         _ONSET_SIGMA if parameter.name == "onset" else THRESHOLDS.priors.scale * simulator.scales[i]
         for i, parameter in zip(indices, parameters, strict=True)
     ]
-    return np.array([parameter.neutral for parameter in parameters]), np.array(sigma)
+    return simulator.neutral()[list(indices)], np.array(sigma)

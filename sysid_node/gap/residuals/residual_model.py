@@ -37,6 +37,7 @@ from sysid_node.gap.residuals.predictions import (
 )
 from sysid_node.gap.residuals.windowed_spectra import Complex, Windows
 from sysid_node.sim import Simulator
+from sysid_node.sim.model import parameters
 from sysid_node.sim.prediction.coefficients import COEFFICIENTS
 
 #: Directions along which a prediction is differentiated at once: as many as most effects have parameters, or as many as
@@ -189,7 +190,7 @@ class ResidualModel:
 
     def _acting(self, theta: Array) -> NDArray[np.bool_]:
         """Which parameters (P,) are not neutral."""
-        return np.asarray(theta != self.simulator.neutral())
+        return np.asarray(theta != parameters.neutral(self.simulator.layout))
 
     def _slopes_by_derivative(self, theta: Array) -> Complex:
         """Derivatives (W, L, 6, D) of the coefficients by each derivative of the aircraft file."""

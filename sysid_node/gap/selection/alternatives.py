@@ -42,22 +42,28 @@ def replace_stepwise(
     ``always`` tried; some are ``barred`` by label from taking a cause's place.
     """
     fitted = [each.added for stage in stages for each in stage if each.added]
-    pool = list({candidate.label: candidate for candidate in (*fitted, *always)}.values())
+    untried = [candidate for candidate in always if candidate.label not in {each.label for each in fitted}]
+    pool = [*{candidate.label: candidate for candidate in fitted}.values(), *untried]
     for _ in range(THRESHOLDS.search.sweeps):
-        positions = _positions(fitter, base, chosen, stages[0], pool)
+        positions = _positions(fitter, base, chosen, stages[0], pool, untried)
         step = next_step([_Position(base, chosen, each) for each in positions], barred)
         if step is None:
             return chosen, positions
         position = positions[step.position]
         chosen = position.without if step.alternative is None else position.alternatives[step.alternative]
-    return chosen, _positions(fitter, base, chosen, stages[0], pool)
+    return chosen, _positions(fitter, base, chosen, stages[0], pool, untried)
 
 
 def _positions(
-    fitter: CandidateFitter, base: FittedSet, chosen: FittedSet, first: list[FittedSet], pool: list[Candidate]
+    fitter: CandidateFitter,
+    base: FittedSet,
+    chosen: FittedSet,
+    first: list[FittedSet],
+    pool: list[Candidate],
+    untried: list[Candidate],
 ) -> tuple[CauseAlternatives, ...]:
     """Every cause of an explanation with its alternatives, fitted."""
-    return tuple(_alternatives(fitter, base, chosen, cause, first, pool) for cause in chosen.fit.candidates)
+    return tuple(_alternatives(fitter, base, chosen, cause, first, pool, untried) for cause in chosen.fit.candidates)
 
 
 def _alternatives(
@@ -67,18 +73,30 @@ def _alternatives(
     cause: Candidate,
     first: list[FittedSet],
     pool: list[Candidate],
+    untried: list[Candidate],
 ) -> CauseAlternatives:
     """A cause with the likeliest alternatives; where the cause delays the response, with all that delay it.
 
+    What delays the response of one control is compared with what delays that control's, or all controls'.
     Alternatives to a single cause were fitted in the first stage of the forward selection.
     """
     others = [candidate for candidate in chosen.fit.candidates if candidate is not cause]
     without = fitter.fit_set(chosen.fit, others) if others else base
-    rest = [candidate for candidate in pool if candidate.effect not in without.fit.effects]
+    rest = [
+        candidate
+        for candidate in pool
+        if candidate.effect not in without.fit.effects
+        and (candidate not in untried or candidate.scope in ("", cause.scope) or candidate.effect == cause.effect)
+    ]
     screened = fitter.screen_upon([without], rest, lambda share, text: None)
     likely = screened[: THRESHOLDS.search.alternatives] if others else []
     rest_screened = screened[len(likely) :]
-    delays = [p for p in rest_screened if {p.screened.candidate.effect, cause.effect} <= RESPONSE_DELAYS]
+    delays = [
+        pair
+        for pair in rest_screened
+        if {pair.screened.candidate.effect, cause.effect} <= RESPONSE_DELAYS
+        and pair.screened.candidate.scope in ("", cause.scope)
+    ]
     fitted = fitter.fit_screened([*likely, *delays], lambda share, text: None)
     by_label = {} if others else {each.added.label: each for each in first if each.added}
     by_label |= {each.added.label: each for _, each in fitted if each.added}

@@ -43,7 +43,9 @@ class Comparison:
         added = self.fitted.added
         if added is None or added.effect not in TIME_EFFECTS:
             return None
-        return float(self.fitted.fit.flights[0].point[added.indices[0]])
+        entries = list(added.indices)
+        changes = self.fitted.fit.flights[0].point[entries] - self.fitted.fit.simulator.neutral()[entries]
+        return float(changes[np.abs(changes).argmax()])
 
     @property
     def sample_period(self) -> float:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
-from sysid_node.gap.estimation.candidates import PER_CONTROL, Candidate
+from sysid_node.gap.estimation.candidates import PER_CONTROL, SHARED, Candidate
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.gap.selection.fitted_set import FittedSet
@@ -71,16 +71,40 @@ def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidat
 def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Thresholds = THRESHOLDS) -> list[ScreenedPair]:
     """Of pairs, the best first, at most so many for each explanation, and a few of each effect.
 
-    An effect may act on several controls or coefficients, each of them a candidate; others must have room, too.
+    An effect may act on several controls or coefficients, each of them a candidate; others must have room, too. A
+    second variant of an effect that all controls may share takes no room.
     """
     counts: Counter[tuple[int, str]] = Counter()
     kept = []
-    for pair in pairs:
+    for pair in _likely_variants(pairs, thresholds):
         explanation, effect = id(pair.explanation), pair.screened.candidate.effect
         if counts[explanation, ""] < most and counts[explanation, effect] < thresholds.search.per_effect:
-            counts.update([(explanation, ""), (explanation, effect)])
+            again = effect in SHARED and counts[explanation, effect] > 0
+            counts.update([(explanation, effect), *([] if again else [(explanation, "")])])
             kept.append(pair)
     return kept
+
+
+def _likely_variants(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> list[ScreenedPair]:
+    """The pairs without the less likely variants of effects that all controls may share.
+
+    Such an effect may act on all controls alike, on one, or on each by itself. Its variants are compared by their
+    deviance, with a penalty for every parameter; the best is kept, and the one that acts on all alike, so that another
+    is chosen only where it predicts better.
+    """
+
+    def penalised(pair: ScreenedPair) -> float:
+        return pair.screened.deviance + thresholds.search.penalty * len(pair.screened.candidate.indices)
+
+    best: dict[tuple[int, str], ScreenedPair] = {}
+    for pair in sorted(pairs, key=penalised):
+        best.setdefault((id(pair.explanation), pair.screened.candidate.effect), pair)
+    chosen = {id(pair) for pair in best.values()}
+    return [
+        pair
+        for pair in pairs
+        if pair.screened.candidate.effect not in SHARED or not pair.screened.candidate.scope or id(pair) in chosen
+    ]
 
 
 def with_found_onsets(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:

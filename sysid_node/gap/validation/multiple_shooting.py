@@ -68,7 +68,7 @@ def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scala
     """The readings with parameters (P,) beside a flight; a pure function of arrays, compiled."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
     samples = corrected_motion(chain, course.motion)
-    arriving = command.arrive(chain.effects, course.commands, step)
+    arriving = command.arrive(layout, chain.effects, course.commands, step)
     air = _air(samples, course.begins, step)
     gusts = jnp.concatenate([air + course.moving, course.turning], axis=1)
     starts = _starts(samples, course)

@@ -32,6 +32,7 @@ from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
+from sysid_node.sim.model.parameters import stated
 
 #: Amplitude of the proposed deflections, as a share of each surface's limit, unless the words say otherwise.
 _USUAL = 0.2
@@ -168,12 +169,10 @@ def _symbols(simulator: Simulator) -> tuple[str, ...]:
 
 def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
     """The effects that act at parameters (P,), with their parameters within their bounds."""
-    neutral, found = simulator.neutral(), dict[str, dict[str, float]]()
-    acting = {e for i, (e, p) in enumerate(simulator.parameters) if p.switch and point[i] != neutral[i]}
-    for i, (effect, parameter) in enumerate(simulator.parameters):
-        if effect in acting:
-            found.setdefault(effect, {})[parameter.name] = float(np.clip(point[i], parameter.lower, parameter.upper))
-    return found
+    neutral = simulator.neutral()
+    bounded = np.array([np.clip(x, p.lower, p.upper) for x, (_, p) in zip(point, simulator.parameters, strict=True)])
+    acting = {e: p for i, (e, p) in enumerate(simulator.parameters) if p.switch and point[i] != neutral[i]}
+    return {effect: stated(simulator.layout, bounded, effect) for effect in acting}
 
 
 def _separation(

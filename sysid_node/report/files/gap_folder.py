@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 from sysid_node.aircraft.dump import dump_aircraft
-from sysid_node.aircraft.model import Aircraft
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
+from sysid_node.gap.correction import corrected_aircraft, effect_options
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.report.files.gap_flights import FLIGHTS, write_flights
@@ -36,27 +35,3 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
         write_gap_report(folder / "report.html", found)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder as --out") from None
-
-
-def corrected_aircraft(found: Diagnosis) -> Aircraft:
-    """The aircraft file with the derivatives as the flights have them, within their tolerances."""
-    fit = found.attribution.corrected
-    names, point = fit.simulator.names, fit.flights[0].point
-    derivatives = {
-        n: replace(d, value=float(d.value + point[names.index(f"derivative_error.{n}")]))
-        for n, d in found.aircraft.derivatives.items()
-    }
-    return replace(found.aircraft, derivatives=derivatives)
-
-
-def effect_options(found: Diagnosis) -> list[str]:
-    """The causes as ``sysid simulate --effect`` takes them; the derivatives' errors are in the corrected file."""
-    fit = found.attribution.corrected
-    simulator = fit.simulator
-    options: dict[str, list[str]] = {}
-    for cause in found.attribution.causes:
-        indices = cause.candidate.entries
-        pairs = [f"{simulator.parameters[i][1].name}={fit.flights[0].point[i]:.6g}" for i in indices]
-        if cause.candidate.effect != "derivative_error":
-            options.setdefault(cause.candidate.effect, []).extend(pairs)
-    return [":".join([effect, *dict.fromkeys(pairs)]) for effect, pairs in options.items()]

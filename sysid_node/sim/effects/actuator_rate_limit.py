@@ -1,9 +1,9 @@
-"""A limit to the rate of every actuator."""
+"""A limit to the rate of the actuators."""
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
-from sysid_node.sim.model.layout import Scalar, Values
+from sysid_node.sim.effects.base import Effect, Parameter, each_control
+from sysid_node.sim.model.layout import Scalar
 from sysid_node.sim.signals.smooth import soft_clip
 
 EFFECT = Effect(
@@ -12,12 +12,13 @@ EFFECT = Effect(
     summary="Surfaces move no faster than a rate.",
     equation="x' = x + clip(u - x, -+ rate step), the clip's corner rounded: d / (1 + (d / limit)^16)^(1/16)",
     source="Klyde, McRuer & Myers (1997), J. Guidance 20(1) (rate-limited actuators)",
-    parameters=fixed(
+    parameters=each_control(
         Parameter("inverse_rate", "s/rad", "1 / largest rate", 0.5, lower=0.0, upper=50.0, reciprocal="rate")
     ),
+    shared="inverse_rate",
 )
 
 
-def advance(values: Values, x: Scalar, u: Scalar, step: Scalar) -> Scalar:
-    """The position (rad) one step (s) later, from x towards u (rad)."""
-    return x + soft_clip(u - x, values["inverse_rate"] / step)
+def advance(inverse_rate: Scalar, x: Scalar, u: Scalar, step: Scalar) -> Scalar:
+    """The position (rad) one step (s) later, from x towards u (rad); ``inverse_rate`` is in s/rad."""
+    return x + soft_clip(u - x, inverse_rate / step)

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from sysid_node.sim.model.layout import Layout
+import jax.numpy as jnp
+
+from sysid_node.sim.model.layout import Layout, Scalar, Values
 
 #: The chain, in the order in which a command becomes a message.
 STATIONS = (
@@ -51,6 +53,13 @@ class Effect:
     equation: str
     source: str
     parameters: Callable[[Layout], tuple[Parameter, ...]]
+    shared: str = (
+        ""  # the parameter that all controls share, to which each control's own is added: see ``each_control``
+    )
+
+
+#: Name of the throttle among the controls that have a parameter of their own.
+THROTTLE = "throttle"
 
 
 def fixed(*parameters: Parameter) -> Callable[[Layout], tuple[Parameter, ...]]:
@@ -68,6 +77,33 @@ def per_control(
         return (*switches, *others)
 
     return parameters
+
+
+def each_control(
+    shared: Parameter, *others: Parameter, throttle: bool = False
+) -> Callable[[Layout], tuple[Parameter, ...]]:
+    """What all controls share, what each has in addition, named after it, and the ``others``.
+
+    A control's value is ``of_control``: the sum of both. One parameter then moves all controls, and another one alone,
+    so that both can be fitted. Users state the sum for each control, see ``stated``.
+    """
+    size = shared.upper - shared.lower
+
+    def parameters(layout: Layout) -> tuple[Parameter, ...]:
+        names = (*layout.controls, *((THROTTLE,) if throttle else ()))
+        own = (
+            Parameter(c, shared.unit, f"{shared.meaning}, {c}: added", shared.scale, lower=-size, upper=size)
+            for c in names
+        )
+        return (shared, *own, *others)
+
+    return parameters
+
+
+def of_control(values: Values, shared: str, control: str) -> Scalar:
+    """The value of one control: what all share and its own, not negative."""
+    total = values[shared] + values[control]
+    return jnp.where(total >= 0.0, total, 0.0)  # its derivative at zero is one; that of a maximum would be a half
 
 
 #: The parameter of effects that begin during a flight.

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, Table
 from sysid_node.aircraft.names import COEFFICIENTS, split_derivative
 from sysid_node.errors import InputError
 from sysid_node.sim.export.cells import finite, plain
@@ -119,7 +119,7 @@ def _flight_control(root: Element, aircraft: Aircraft, effects: Effects) -> None
     for name, surface in aircraft.controls.items():
         actuator = SubElement(channel, "actuator", name=f"fcs/{name}-position-rad")
         _text(actuator, "input", f"fcs/{name}-cmd-rad")
-        _actuator_dynamics(actuator, effects)
+        _actuator_dynamics(actuator, name, effects)
         if surface.limit is not None:
             clip = SubElement(actuator, "clipto")
             _text(clip, "min", -surface.limit)
@@ -130,20 +130,18 @@ def _flight_control(root: Element, aircraft: Aircraft, effects: Effects) -> None
     gain = SubElement(channel, "pure_gain", name="fcs/thrust-lbs")
     _text(gain, "input", "fcs/throttle-cmd-norm")
     _text(gain, "gain", (throttle.max_thrust or 1.0) * _NEWTON)
-    delay = effects.get("command_delay", {}).get("delay", 0.0)
+    delay = effects.get("command_delay", {}).get("throttle", 0.0)
     if delay:
         _text(gain, "delay", delay)
     _text(gain, "output", "external_reactions/thrust/magnitude")
 
 
-def _actuator_dynamics(actuator: Element, effects: Effects) -> None:
-    tau = effects.get("actuator_lag", {}).get("time_constant", 0.0)
-    inverse_rate = effects.get("actuator_rate_limit", {}).get("inverse_rate", 0.0)
-    delay = effects.get("command_delay", {}).get("delay", 0.0)
+def _actuator_dynamics(actuator: Element, control: str, effects: Effects) -> None:
+    tau, rate, delay = (effects.get(name, {}).get(control, 0.0) for name in EFFECTS[:3])
     if tau:
         _text(actuator, "lag", 1.0 / tau)
-    if inverse_rate:
-        _text(actuator, "rate_limit", 1.0 / inverse_rate)
+    if rate:
+        _text(actuator, "rate_limit", rate)
     if delay:
         _text(actuator, "delay", delay)
 
@@ -187,6 +185,40 @@ def _coefficient(aerodynamics: Element, aircraft: Aircraft, coefficient: str, er
             _text(_product(total, "velocities/vt-fps"), "value", value / speed)
         else:
             _text(_product(total, *{**_REGRESSORS, **positions}[regressor]), "value", value)
+    for table in aircraft.tables:
+        if table.coefficient == coefficient:
+            _table(total, table, positions)
+
+
+#: What a table may be over: JSBSim's property, and its units in one of ours.
+_VARIABLES = {
+    "alpha": ("aero/alpha-rad", 1.0),
+    "beta": ("aero/beta-rad", 1.0),
+    "V": ("velocities/vt-fps", 1.0 / 0.3048),
+    "Mach": ("velocities/mach", 1.0),
+}
+
+
+def _table(parent: Element, table: Table, positions: Mapping[str, tuple[str, ...]]) -> None:
+    """A lookup table. Raises InputError where it is over a rate, which JSBSim has in other units."""
+    variables = {**_VARIABLES, **{symbol: (place, 1.0) for symbol, (place,) in positions.items()}}
+    element = SubElement(parent, "table")
+    scales = []
+    for over, lookup in zip(table.over, ("row", "column"), strict=False):
+        if over not in variables:
+            raise InputError(
+                f"table over {over!r}: cannot be exported to jsbsim; those that can: {', '.join(variables)}"
+            )
+        place, scale = variables[over]
+        scales.append(scale)
+        _text(element, "independentVar", place, lookup=lookup)
+    rows = [[x * scales[0]] for x in table.points[0]]
+    for row, values in zip(rows, table.values, strict=True):
+        row.extend(values if isinstance(values, tuple) else (values,))
+    lines = [" ".join(map(repr, row)) for row in rows]
+    if len(table.over) == 2:
+        lines.insert(0, " ".join(repr(x * scales[1]) for x in table.points[1]))
+    _text(element, "tableData", "\n" + "\n".join(lines) + "\n")
 
 
 def _product(parent: Element, *properties: str) -> Element:

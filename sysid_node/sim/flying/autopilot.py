@@ -134,7 +134,7 @@ def _fly_held(
         if given is not None:
             commanded = jnp.where(given[state.sample], commanded, state.history[-1])
         past = jnp.concatenate([state.history[1:], commanded[None]])
-        arriving = command.arrive_from_history(chain.effects, past, step)
+        arriving = command.arrive_from_history(layout, chain.effects, past, step)
         integral = state.integral + jnp.where(saturated, 0.0, error * step)
         return commanded, arriving, _AutopilotState(integral, state.sample + 1, past)
 

@@ -163,7 +163,7 @@ def _advance(
     chain.effects["sensor_noise"] = {"scale": jnp.ones(())}  # the noise is already scaled
     gusts = airflow.gusts(model, chain.effects, gust, jnp.zeros(6), time)
     past = jnp.concatenate([carried.history[1:], commands[None]])
-    arriving = command.arrive_from_history(chain.effects, past, step)
+    arriving = command.arrive_from_history(layout, chain.effects, past, step)
     follow: Pilot = lambda state, outputs, planned: (planned, planned, outputs)  # noqa: E731
     # the readings are returned through the pilot's state
     carry, (_, state, _, moved) = advance(chain, follow, carried.carry._replace(pilot=()), arriving, gusts, time, noise)

@@ -66,7 +66,7 @@ def rollout(
 ) -> SimulatedFlight:
     """The open-loop flight of parameters (P,) from the body's state (13,); pure. ``step`` is 1 / rate, s."""
     chain = Chain.of(layout, model, theta, step, -initial[2])
-    arriving = command.arrive(chain.effects, inputs.commands, step)
+    arriving = command.arrive(layout, chain.effects, inputs.commands, step)
     follow: Pilot = lambda state, outputs, planned: (planned, planned, state)  # noqa: E731
     flight = fly(chain, initial, inputs._replace(commands=arriving), follow, ())
     return flight._replace(commands=inputs.commands)
@@ -99,7 +99,9 @@ def advance(
     truth, probe, reading = _read(chain, carry, motion)
     seen = sensors.noisy(chain.model, chain.effects, reading, noise)
     given, arriving, pilot_state = pilot(carry.pilot, seen, planned)
-    actuators = actuator.advance(chain.layout, chain.model, chain.effects, carry.actuators, arriving[:-1], h)
+    actuators = actuator.advance(
+        chain.layout, chain.model, chain.effects, chain.servos, carry.actuators, arriving[:-1], h
+    )
     motor_command = propulsion.commanded(chain.model, arriving[-1])
     motor = propulsion.advance(chain.effects, carry.motor, carry.motor_command, motor_command, h)
     drive, surfaces = drive_of(chain, actuators.position, motor, gusts, time)

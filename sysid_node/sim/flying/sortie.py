@@ -14,7 +14,7 @@ from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
 from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model.layout import OUTPUTS
-from sysid_node.sim.model.parameters import parse
+from sysid_node.sim.model.parameters import parse, stated
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 from sysid_node.sim.simulator import Simulator
 
@@ -53,8 +53,14 @@ class Sortie:
     @property
     def derivatives(self) -> dict[str, float]:
         """The true derivatives: the file's plus ``derivative_error``."""
-        error = self.effects.get("derivative_error", {})
-        return {name: d.value + error.get(name, 0.0) for name, d in self.simulator.aircraft.derivatives.items()}
+        error = stated(self.simulator.layout, self.theta, "derivative_error")
+        return {name: d.value + error[name] for name, d in self.simulator.aircraft.derivatives.items()}
+
+    @property
+    def all_effects(self) -> dict[str, dict[str, float]]:
+        """The effects flown: those asked for as they were stated, and the aircraft file's as they were flown."""
+        filed = (name for name in self.simulator.aircraft.effect_values())
+        return {**{name: stated(self.simulator.layout, self.theta, name) for name in filed}, **self.effects}
 
     @property
     def command_places(self) -> NDArray[np.intp]:

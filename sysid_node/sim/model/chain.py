@@ -19,13 +19,14 @@ from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters, unpack
 from sysid_node.sim.model.state import MODE, MODE_RATE, SEPARATION, body_state
 from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
+from sysid_node.sim.stations.actuator import Servos
 from sysid_node.sim.stations.airflow import Air
 
 
 @partial(
     jax.tree_util.register_dataclass,
     meta_fields=["layout"],
-    data_fields=["model", "effects", "body", "step", "altitude"],
+    data_fields=["model", "effects", "body", "servos", "step", "altitude"],
 )
 @dataclass(frozen=True)
 class Chain:
@@ -35,6 +36,7 @@ class Chain:
     model: Model
     effects: dict[str, Values]
     body: MassProperties
+    servos: Servos
     step: Scalar  # s
     altitude: Scalar  # m, at the start
 
@@ -42,7 +44,8 @@ class Chain:
     def of(cls, layout: Layout, model: Model, theta: Parameters, step: Scalar, altitude: Scalar) -> Chain:
         """The chain of a parameter vector (P,)."""
         effects = unpack(layout, theta)
-        return cls(layout, model, effects, mass.properties(model, effects), step, altitude)
+        servos = Servos.of(layout, effects, step)
+        return cls(layout, model, effects, mass.properties(model, effects), servos, step, altitude)
 
 
 class Drive(NamedTuple):

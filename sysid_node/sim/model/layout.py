@@ -34,6 +34,7 @@ class Layout:
     controls: tuple[str, ...]  # aerodynamic controls: "elevator", ...
     symbols: tuple[str, ...]  # their symbols: "de", ...
     derivatives: tuple[str, ...]  # "CL_0", ...
+    tables: tuple[tuple[str, tuple[str, ...]], ...] = ()  # coefficient and variables of each lookup table
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -66,6 +67,7 @@ class Model(NamedTuple):
     imu: Scalar  # (3,) m from the CG, FRD
     air_data: Scalar  # (3,)
     noise: Scalar  # (12,) 1 sigma of each output
+    tables: tuple[tuple[Scalar, ...], ...] = ()  # points of each variable, then the values, of each lookup table
 
 
 #: What the sensors measure, in the order of ``SimulatedFlight.outputs``. Units of FlightRecord's columns.
@@ -76,7 +78,8 @@ _NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "a
 
 def layout_of(aircraft: Aircraft) -> Layout:
     """The layout of this aircraft."""
-    return Layout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives))
+    tables = tuple((table.coefficient, table.over) for table in aircraft.tables)
+    return Layout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives), tables)
 
 
 def model_of(aircraft: Aircraft) -> Model:
@@ -108,7 +111,10 @@ def model_of(aircraft: Aircraft) -> Model:
         "air_data": aircraft.sensors.air_data,
         "noise": [aircraft.noise[name] for name in _NOISE_OF],
     }
-    return Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})
+    tables = tuple(
+        tuple(jnp.asarray(part, dtype=float) for part in (*table.points, table.values)) for table in aircraft.tables
+    )
+    return Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()}, tables=tables)
 
 
 def reference_flight(aircraft: Aircraft) -> tuple[float, float]:

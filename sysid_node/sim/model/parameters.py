@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 
 import jax
@@ -11,8 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.errors import InputError
 from sysid_node.sim.effects import EFFECTS, Parameter
+from sysid_node.sim.effects.base import THROTTLE
 from sysid_node.sim.model.layout import Layout, Scalar, Values
 from sysid_node.suggestion import did_you_mean
 
@@ -47,27 +50,113 @@ def neutral(layout: Layout) -> NDArray[np.float64]:
     return np.array([p.neutral for _, p in table(layout)])
 
 
-def vector(layout: Layout, effects: Mapping[str, Mapping[str, float]]) -> NDArray[np.float64]:
-    """The vector (P,) with these effects and all others neutral.
+def vector(
+    layout: Layout, effects: Mapping[str, Mapping[str, float]], base: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """The vector (P,) with these effects; what is not given stays as in ``base`` (default: every effect neutral).
 
     Raises InputError on an unknown effect or parameter, an impossible value, or an effect that is named but stays
     neutral.
     """
-    theta = neutral(layout)
+    theta = neutral(layout) if base is None else base.copy()
+    before = theta.copy()
     index = {name: i for i, name in enumerate(names(layout))}
     for effect, values in effects.items():
         known = {p.name: p for p in _parameters(layout, effect)}
-        given: set[str] = set()
-        for key, value in values.items():
-            parameter, inner = _resolve(effect, known, key, value)
-            if parameter.name in given:
-                raise InputError(f"effect {effect}: {parameter.name!r} is given twice, also as {key!r}; keep one")
-            given.add(parameter.name)
-            theta[index[f"{effect}.{parameter.name}"]] = inner
+        for name, inner in _changes(layout, effect, known, values, before).items():
+            theta[index[f"{effect}.{name}"]] = inner
         switches = [p for p in known.values() if p.switch]
-        if all(theta[index[f"{effect}.{p.name}"]] == p.neutral for p in switches):
+        if all(theta[i] == before[i] == p.neutral for p in switches for i in [index[f"{effect}.{p.name}"]]):
             raise InputError(_does_nothing(effect, switches))
     return theta
+
+
+def _changes(
+    layout: Layout,
+    effect: str,
+    known: Mapping[str, Parameter],
+    values: Mapping[str, float],
+    base: NDArray[np.float64],
+) -> dict[str, float]:
+    """New entries of the vector by parameter, from the values of one effect as they are stated."""
+    shared = EFFECTS[effect].shared
+    meant = {
+        key: _resolve(effect, known, key, value) for key, value in values.items() if key not in _controls(effect, known)
+    }
+    _check_given_once(effect, meant)
+    if not shared:
+        return {parameter.name: inner for parameter, inner in meant.values()}
+    entries = stated_parameters(layout, effect)
+    totals = {name: float(base[list(each.entries)].sum()) for name, each in entries.items() if len(each.entries) > 1}
+    changed: dict[str, float] = {}
+    # first what is meant for all controls, so that a control that is named beside it keeps its own value
+    for key in sorted(values, key=lambda key: key in totals):
+        if key in totals:
+            totals[key] = _value_of_control(effect, known[shared], key, values[key])
+            continue
+        parameter, inner = meant[key]
+        if parameter.name == shared:
+            totals = dict.fromkeys(totals, inner)
+        else:
+            changed[parameter.name] = inner
+    least = min(totals.values())
+    return {**changed, shared: least, **{name: total - least for name, total in totals.items()}}
+
+
+def _controls(effect: str, known: Mapping[str, Parameter]) -> set[str]:
+    """The parameters of an effect that are added to the one that all controls share."""
+    names = EFFECT_NAMES[effect]
+    return set(known) - {EFFECTS[effect].shared} - {p.name for p in names.fixed} if EFFECTS[effect].shared else set()
+
+
+def _check_given_once(effect: str, meant: Mapping[str, tuple[Parameter, float]]) -> None:
+    """Raise InputError where two keys mean the same parameter."""
+    given: dict[str, str] = {}
+    for key, (parameter, _) in meant.items():
+        if parameter.name in given:
+            raise InputError(f"effect {effect}: {parameter.name!r} is given twice, also as {key!r}; keep one")
+        given[parameter.name] = key
+
+
+def _value_of_control(effect: str, shared: Parameter, control: str, value: float) -> float:
+    """What the vector's entries of a control add up to, from the value that is stated for it."""
+    own = replace(shared, name="", reciprocal=control) if shared.reciprocal else replace(shared, name=control)
+    return _resolve(effect, {own.name: own}, control, value)[1]
+
+
+@dataclass(frozen=True)
+class StatedParameter:
+    """A parameter as users state it: the sum of entries of the vector, or the inverse of that sum."""
+
+    entries: tuple[int, ...]
+    inverse: bool = False
+
+    def value(self, theta: Scalar | NDArray[np.float64]) -> float:
+        """Its value at a vector (P,); infinite where the inverse is zero."""
+        total = float(sum(theta[i] for i in self.entries))
+        if not self.inverse:
+            return total
+        return 1.0 / total if total else math.inf
+
+
+@cache
+def stated_parameters(layout: Layout, effect: str) -> dict[str, StatedParameter]:
+    """The parameters of an effect by the names by which users state them: those that act on a control by its name."""
+    index = {p.name: i for i, (name, p) in enumerate(table(layout)) if name == effect}
+    shared = EFFECTS[effect].shared
+    if not shared:
+        return {name: StatedParameter((i,)) for name, i in index.items()}
+    inverse = bool(table(layout)[index[shared]][1].reciprocal)
+    controls = {c: (index[shared], index[c]) for c in (*layout.controls, THROTTLE) if c in index}
+    others = {name: StatedParameter((i,)) for name, i in index.items() if name != shared and name not in controls}
+    return {**{c: StatedParameter(entries, inverse) for c, entries in controls.items()}, **others}
+
+
+def stated(layout: Layout, theta: Scalar | NDArray[np.float64], effect: str) -> dict[str, float]:
+    """The parameters of an effect as users state them, at a vector (P,); what is neutral on a control is left out."""
+    shared = EFFECTS[effect].shared
+    values = {name: parameter.value(theta) for name, parameter in stated_parameters(layout, effect).items()}
+    return {name: value for name, value in values.items() if not shared or (value and math.isfinite(value))}
 
 
 def parse(specs: Sequence[str]) -> dict[str, dict[str, float]]:

@@ -6,11 +6,14 @@ python -m sysid_node.sim.pages.effects_page [--out docs/reference]
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter
 from sysid_node.sim.flying.trim import trim_flight
@@ -84,6 +87,13 @@ X = 1e-4. Lags are solved exactly for inputs linear between samples: at a time c
 derivative there is that of a delay. An effect whose limit is infinite is held by its inverse (`inverse_rate`);
 `rate=0.4` may be said too. A rate limit that does not act has no slope: start an optimiser from its plausible size.
 
+`actuator_lag`, `actuator_rate_limit` and `command_delay` have a value for each control, named after it:
+`actuator_lag:elevator=0.12`. The first key of their tables means all controls at once; a control that is named beside
+it keeps its own value: `actuator_lag:time_constant=0.03:elevator=0.12`.
+
+An aircraft file may state effects, too ([The aircraft file](aircraft_file.md)). They are what the simulator flies by
+default. A parameter that `--effect` states replaces the file's; all others stay as the file states them.
+
 Pictures: doublets of {aircraft} on elevator (1 s), aileron (3.5 s) and rudder (5.5 s), more thrust from 7.5 s on; grey
 without the effect, blue with it; of all readings the two that change most, by their own range.
 """
@@ -114,6 +124,8 @@ def _section(simulator: Simulator, effect: Effect) -> str:
     parameters = effect.parameters(simulator.layout)
     if effect.name == "derivative_error":
         rows = ["| the derivative's name | per unit of its regressor | 0 | the file's tolerance | any | added to it |"]
+    elif effect.shared:
+        rows = _rows_of_controls(effect, parameters)
     else:
         rows = [_row(parameter) for parameter in parameters]
     return "\n".join(
@@ -127,6 +139,22 @@ def _section(simulator: Simulator, effect: Effect) -> str:
             f"![{effect.name}](effects/{effect.name}.svg)\n`--effect {effect.name}:{EXAMPLES[effect.name]}`\n",
         ]
     )
+
+
+def _rows_of_controls(effect: Effect, parameters: Sequence[Parameter]) -> list[str]:
+    """The rows of what all controls share, of each control, and of the rest."""
+    shared, names = parameters[0], EFFECT_NAMES[effect.name]
+    known, (own,) = {p.name for p in names.fixed}, names.each
+    rows = [_row(replace(shared, meaning=f"{shared.meaning}, all controls"))]
+    for parameter in parameters[1:]:
+        if parameter.name in known:
+            rows.append(_row(parameter))
+            continue
+        neutral, scale = (1.0 / x if shared.reciprocal and x else x for x in (shared.neutral, shared.scale))
+        size = f"{'inf' if shared.reciprocal else f'{neutral:g}'} | {scale:g} | {own.lower:g} to {own.upper:g}"
+        meaning = f"largest {shared.reciprocal}" if shared.reciprocal else shared.meaning
+        rows.append(f"| {parameter.name} | {own.unit} | {size} | {meaning}, {parameter.name} alone |")
+    return rows
 
 
 def _row(p: Parameter) -> str:

@@ -46,9 +46,17 @@ def _actuators(chain: Chain, commands: Scalar, acts: EffectActs) -> Scalar:
         play = effects["actuator_backlash"]
         return jnp.stack([actuator_backlash.advance(play, name, x[i], u[i]) for i, name in enumerate(controls)])
 
+    def follow() -> Scalar:
+        def step(last: tuple[Scalar, Scalar, Scalar], now: Scalar) -> tuple[tuple[Scalar, Scalar, Scalar], Scalar]:
+            x, rate, before = last
+            x, rate = actuator_lag.advance(chain.servos.lag, x, rate, before, now, h)
+            return (x, rate, now), x
+
+        return jax.lax.scan(step, (limited[0], jnp.zeros_like(limited[0]), limited[0]), limited)[1]
+
     limited = jnp.clip(commands, -chain.model.limits, chain.model.limits)
-    lag, rate = (partial(e.advance, effects[e.EFFECT.name]) for e in (actuator_lag, actuator_rate_limit))
-    position = _lagged(acts("actuator_lag"), lambda x, before, now: lag(x, before, now, h), limited)
+    rate = partial(actuator_rate_limit.advance, chain.servos.inverse_rate)
+    position = evaluate_if(acts("actuator_lag"), follow, lambda: limited)
     position = _carried(acts("actuator_backlash"), linked, position)
     return _carried(acts("actuator_rate_limit"), lambda x, u: rate(x, u, h), position)
 

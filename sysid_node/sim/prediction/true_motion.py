@@ -42,7 +42,7 @@ def true_motion(chain: Chain, signals: MeasuredSignals) -> TrueMotion:
         velocity = Vector(*velocity_from(velocity_of(flow.T, jnp), rates, arm))
     _, alpha, _ = flow_angles(velocity, jnp)
     return TrueMotion(
-        command=command.arrive(effects, signals.commands, step),
+        command=command.arrive(chain.layout, effects, signals.commands, step),
         velocity=velocity,
         rates=rates,
         density=signals.density,

@@ -17,6 +17,24 @@ def shift_linear(series: Scalar, samples: Scalar) -> Scalar:
     return (1.0 - s) * a + s * b
 
 
+def shift_columns(series: Scalar, samples: Scalar) -> Scalar:
+    """``shift_linear`` of each column of a series (N, m) by samples (m,) of its own."""
+    whole = jnp.floor(-samples)
+
+    def together() -> Scalar:
+        _, (a, b) = _neighbours(series, samples[0], 0, 2)
+        s = -samples - whole
+        return (1.0 - s) * a + s * b
+
+    # slices of the whole array are quicker than a gather; they need the same whole number of samples in all columns
+    shifted: Scalar = jax.lax.cond(
+        jnp.all(whole == whole[0]),
+        together,
+        lambda: jax.vmap(shift_linear, in_axes=(1, 0), out_axes=1)(series, samples),
+    )
+    return shifted
+
+
 def shift_cubic(series: Scalar, samples: Scalar) -> Scalar:
     """``series`` (N, ...) at k - samples, Catmull-Rom cubic between samples, constant beyond the ends; for motion.
 

@@ -18,6 +18,8 @@ from sysid_node.sim.effects import (
     control_effectiveness_loss,
     stuck_surface,
 )
+from sysid_node.sim.effects.actuator_lag import Transition
+from sysid_node.sim.effects.base import of_control
 from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
 
 
@@ -26,6 +28,7 @@ class ActuatorState(NamedTuple):
 
     command: Scalar  # of the last sample
     lagged: Scalar
+    lag_rate: Scalar  # rad/s
     linked: Scalar  # after the free play
     position: Scalar  # after the rate limit
 
@@ -33,23 +36,54 @@ class ActuatorState(NamedTuple):
 def start(model: Model, command: Scalar) -> ActuatorState:
     """The state at rest on a command (controls,), rad."""
     limited = jnp.clip(command, -model.limits, model.limits)
-    return ActuatorState(limited, limited, limited, limited)
+    return ActuatorState(limited, limited, jnp.zeros_like(limited), limited, limited)
+
+
+def lags(layout: Layout, effects: dict[str, Values], step: Scalar) -> Transition:
+    """The transitions (controls,) of the actuators' lags over one sample (``step`` s)."""
+    values = effects["actuator_lag"]
+    tau = jnp.stack([of_control(values, "time_constant", control) for control in layout.controls])
+    return actuator_lag.transition(tau, values["damping"], step)
+
+
+def rate_limits(layout: Layout, effects: dict[str, Values]) -> Scalar:
+    """The inverse (controls,) of the largest rates, s/rad."""
+    values = effects["actuator_rate_limit"]
+    return jnp.stack([of_control(values, "inverse_rate", control) for control in layout.controls])
+
+
+class Servos(NamedTuple):
+    """What is constant of the actuators during a flight; each (controls,)."""
+
+    lag: Transition
+    inverse_rate: Scalar  # s/rad
+
+    @classmethod
+    def of(cls, layout: Layout, effects: dict[str, Values], step: Scalar) -> Servos:
+        """The actuators with these effects, at samples every ``step`` s."""
+        return cls(lags(layout, effects, step), rate_limits(layout, effects))
 
 
 def advance(
-    layout: Layout, model: Model, effects: dict[str, Values], state: ActuatorState, command: Scalar, step: Scalar
+    layout: Layout,
+    model: Model,
+    effects: dict[str, Values],
+    servos: Servos,
+    state: ActuatorState,
+    command: Scalar,
+    step: Scalar,
 ) -> ActuatorState:
     """The state one sample (``step`` s) later; ``command`` (controls,) is that of the new sample, rad."""
     limited = jnp.clip(command, -model.limits, model.limits)
-    lagged, linked, position = [], [], []
-    for i, control in enumerate(layout.controls):
-        lag = actuator_lag.advance(effects["actuator_lag"], state.lagged[i], state.command[i], limited[i], step)
-        link = actuator_backlash.advance(effects["actuator_backlash"], control, state.linked[i], lag)
-        reach = actuator_rate_limit.advance(effects["actuator_rate_limit"], state.position[i], link, step)
-        lagged.append(lag)
-        linked.append(link)
-        position.append(reach)
-    return ActuatorState(limited, jnp.stack(lagged), jnp.stack(linked), jnp.stack(position))
+    lagged, rate = actuator_lag.advance(servos.lag, state.lagged, state.lag_rate, state.command, limited, step)
+    linked = jnp.stack(
+        [
+            actuator_backlash.advance(effects["actuator_backlash"], control, state.linked[i], lagged[i])
+            for i, control in enumerate(layout.controls)
+        ]
+    )
+    position = actuator_rate_limit.advance(servos.inverse_rate, state.position, linked, step)
+    return ActuatorState(limited, lagged, rate, linked, position)
 
 
 def positions(layout: Layout, effects: dict[str, Values], actuators: Scalar, time: Scalar) -> list[Scalar]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from sysid_node.dynamics.airflow import stability_axes
+from sysid_node.dynamics.atmosphere import speed_of_sound
 from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, regressors, with_polar
 from sysid_node.dynamics.forces import force_and_moment
+from sysid_node.dynamics.lookup import interpolate
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import (
     control_nonlinearity,
@@ -38,6 +40,8 @@ def regressors_of(layout: Layout, model: Model, air: Air, deflections: list[Scal
     """Every regressor by name except CL^2; rates are non-dimensional."""
     flow, one = (air.speed, air.alpha, air.beta), jnp.ones_like(air.speed)
     state = regressors(flow, air.rates, model.span, model.chord, model.airspeed, one)
+    if any("Mach" in over for _, over in layout.tables):
+        state["Mach"] = air.speed / speed_of_sound(air.density, jnp)
     return state | dict(zip(layout.symbols, deflections, strict=True))
 
 
@@ -54,7 +58,7 @@ def coefficients(
     def linear(coefficient: str) -> Scalar:
         terms = ((derivative[name] + error[name], regressor) for name, regressor in layout.terms(coefficient))
         total: Scalar = linear_coefficient(terms, x, jnp.zeros_like(x["alpha"]))
-        return total
+        return total + looked_up(layout, model, coefficient, x) if layout.tables else total
 
     alpha = x["alpha"] - model.alpha
     ground = ground_effect.share(effects["ground_effect"], climb, model.span)
@@ -78,6 +82,16 @@ def coefficients(
         + ground_effect.pitching_moment(effects["ground_effect"], ground, CL),
         Cn=linear("Cn") + Cn_0 + lateral_alpha_coupling.yawing_moment(coupling, alpha, x["beta"]),
     )
+
+
+def looked_up(layout: Layout, model: Model, coefficient: str, x: dict[str, Scalar]) -> Scalar:
+    """What the aircraft file's lookup tables add to a coefficient; ``x`` are the regressors."""
+    total = jnp.zeros_like(x["alpha"])
+    for (name, over), (*points, values) in zip(layout.tables, model.tables, strict=True):
+        if name == coefficient:
+            at = [x[variable] * model.airspeed if variable == "V" else x[variable] for variable in over]
+            total = total + interpolate(points, values, at, jnp)
+    return total
 
 
 def of_alpha_rate(model: Model, effects: dict[str, Values], air: Air, rate: Scalar) -> Coefficients:

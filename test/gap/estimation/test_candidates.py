@@ -30,6 +30,14 @@ def test_effects_with_an_onset_are_candidates_of_each_control(candidates, plain_
         assert [c.label for c in candidates if c.effect == effect] == [f"{effect} of {control}" for control in controls]
 
 
+def test_lags_limits_and_delays_act_on_all_controls_on_one_or_on_each(candidates, plain_model) -> None:
+    controls, names = plain_model.simulator.layout.controls, plain_model.simulator.names
+    for effect in ("actuator_lag", "actuator_rate_limit", "command_delay"):
+        found = {c.scope: [names[i].partition(".")[2] for i in c.indices] for c in candidates if c.effect == effect}
+        alone = {control: [control] for control in controls}
+        assert found == {"": [EFFECTS[effect].shared], **alone, "each control": list(controls)}
+
+
 def test_derivatives_are_candidates_by_coefficient(candidates, plain_model) -> None:
     names = plain_model.simulator.names
     for candidate in (c for c in candidates if c.effect == "derivative_error"):

@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from sysid_node.gap.estimation.candidate_fit import linearised, unfitted
-from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
+from sysid_node.aircraft.model import UncertainValue
+from sysid_node.gap.estimation.candidate_fit import linearised, stepped, unfitted
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, believed_effects, nuisances_of
 from sysid_node.gap.estimation.predictive_density import held_out_evidence
 from sysid_node.gap.residuals.air_motion import is_gusty
+from sysid_node.sim import Simulator
 
 
 def test_calm_and_gusty_flights_are_judged_together(aircraft, plain_model) -> None:
@@ -25,3 +28,49 @@ def test_flights_without_lateral_instruments_are_judged_beside_others(aircraft, 
     names = [nuisances_of(aircraft, model, (plain_model, alone)).indices for model in (plain_model, alone)]
     assert names[0] == names[1]
     assert len(nuisances_of(aircraft, alone).indices) < len(names[0])
+
+
+def stating(aircraft, **kind):
+    """The aircraft with an effect of each kind among its file's."""
+    effects = {
+        "actuator_lag": {"elevator": UncertainValue(0.03, 0.006), "aileron": UncertainValue(0.05)},
+        "actuator_rate_limit": {"elevator": UncertainValue(4.0, 0.5)},
+        "mass_error": {"error": UncertainValue(0.1, 0.02)},
+        "motor_lag": {"time_constant": UncertainValue(0.02, 0.02)},
+        "control_effectiveness_loss": {"elevator": UncertainValue(0.3, 0.05), "onset": UncertainValue(4.0, 0.1)},
+    }
+    return replace(aircraft, effects=effects, **kind)
+
+
+def test_a_stated_effect_is_a_nuisance_within_its_tolerance(aircraft, plain_model) -> None:
+    simulator = Simulator(stating(aircraft), 50.0)
+    found = nuisances_of(simulator.aircraft, replace(plain_model, simulator=simulator))
+    sigma, limit = (
+        dict(zip([simulator.names[i] for i in found.indices], x, strict=True)) for x in (found.sigma, found.limit)
+    )
+    shared = dict(zip([simulator.names[i] for i in found.indices], found.shared, strict=True))
+    assert (sigma["actuator_lag.elevator"], limit["actuator_lag.elevator"]) == (0.006, pytest.approx(0.018))
+    assert sigma["actuator_lag.aileron"] == pytest.approx(0.01)  # the default: a fifth
+    assert sigma["actuator_rate_limit.elevator"] == pytest.approx(0.5 / 4.0**2)  # of the inverse
+    assert (sigma["mass_error.error"], limit["mass_error.error"]) == (0.02, pytest.approx(0.06))
+    assert limit["motor_lag.time_constant"] == pytest.approx(0.02)  # no time is negative
+    assert sigma["control_effectiveness_loss.elevator"] == 0.05
+    assert "control_effectiveness_loss.onset" not in sigma
+    assert shared["mass_error.error"] and not shared["imu_bias.p"]
+
+
+def test_an_ideal_file_has_no_nuisance_but_what_it_states(aircraft) -> None:
+    found = believed_effects(Simulator(stating(aircraft, ideal=True), 50.0))
+    assert "actuator_lag.aileron" not in found and found["actuator_lag.elevator"] == 0.006
+
+
+def test_all_start_at_the_files_values(aircraft, plain_model) -> None:
+    simulator = Simulator(stating(aircraft), 50.0)
+    model = replace(plain_model, simulator=simulator)
+    fit = unfitted([model], nuisances_of(simulator.aircraft, model))
+    now, _, limit = fit.stacked
+    np.testing.assert_array_equal(now, 0.0)
+    np.testing.assert_array_equal(fit.flights[0].point, simulator.neutral())
+    moved = stepped(fit, np.full(now.size, 1e3)).flights[0].point
+    indices = list(fit.nuisances.indices)
+    np.testing.assert_allclose(moved[indices], simulator.neutral()[indices] + limit[fit.nuisances.places(0)])

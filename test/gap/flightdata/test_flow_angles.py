@@ -80,7 +80,7 @@ def test_a_lag_is_named_without_vanes(aircraft, make_flight) -> None:
     found = diagnose(aircraft, flights[:1], flights[1:])
     (cause,) = document(found)["causes"]
     assert found.verdict == "explained" and cause["effect"] == "actuator_lag"
-    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.1, rel=0.15)
+    assert cause["parameters"]["elevator"][0] == pytest.approx(0.1, rel=0.15)
     assert not {"alpha", "beta"} & found.size.per_channel.keys()
 
 

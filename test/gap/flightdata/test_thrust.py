@@ -46,7 +46,7 @@ def test_a_lag_is_named_and_forward_motion_left_out(aircraft, make_flight) -> No
     found = diagnose(aircraft, flights[:1], flights[1:])
     (cause,) = document(found)["causes"]
     assert found.verdict == "explained" and cause["effect"] == "actuator_lag"
-    assert cause["parameters"]["time_constant"][0] == pytest.approx(0.1, rel=0.15)
+    assert cause["parameters"]["elevator"][0] == pytest.approx(0.1, rel=0.15)
     assert not {"ax", "V"} & found.size.per_channel.keys()
     assert "Thrust was not recorded" in paragraph(found)
 

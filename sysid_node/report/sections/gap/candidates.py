@@ -7,7 +7,7 @@ from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.report.sections.gap.names import units_of
+from sysid_node.report.sections.gap.names import alike, units_of
 from sysid_node.report.wording.names import words_of
 from sysid_node.report.wording.numbers import NONE, likely, number, with_interval
 
@@ -43,7 +43,11 @@ def _doubted(cause: Mapping[str, Any]) -> str:
 def _parameters(cause: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Name, value with its 95 % interval, and unit of each of a cause's parameters."""
     units = units_of(cause["effect"])
-    return [(words_of(n), with_interval(v, 1.96 * e), units.get(n, "")) for n, (v, e) in cause["parameters"].items()]
+    filed = alike(cause.get("believed", {}))
+    return [
+        (words_of(n), with_interval(v, 1.96 * e), units.get(n, "") + (f" (file: {filed[n]:.3g})" if n in filed else ""))
+        for n, (v, e) in alike(cause["parameters"]).items()
+    ]
 
 
 def _confusion(found: Diagnosis) -> Mapping[str, Any]:

@@ -11,7 +11,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.validation.simulation_error import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
-from sysid_node.report.sections.gap.names import WORDS, percent, units_of
+from sysid_node.report.sections.gap.names import WORDS, alike, percent, units_of
 from sysid_node.report.wording.names import words_of
 from sysid_node.report.wording.numbers import likely, number, with_interval
 
@@ -149,13 +149,16 @@ def _cause(cause: Mapping[str, Any]) -> str:
     units = units_of(cause["effect"])
     shown = [
         f"{words_of(name)} {with_interval(value, 1.96 * error)} {units.get(name, '')}".strip()
-        for name, (value, error) in cause["parameters"].items()
+        for name, (value, error) in alike(cause["parameters"]).items()
         if abs(value) > 2.0 * error
     ]
+    filed = [f"{words_of(n)} {number(v, 3)}" for n, v in alike(cause.get("believed", {})).items()]
+    if filed:
+        shown = [*shown[:4], f"the aircraft file says {', '.join(filed[:4])}"]
     rivals = cause["indistinguishable_from"]
     alternatives = f"; or {', '.join(words_of(r) for r in rivals)}" if rivals else ""
     probability = f"probability {likely(cause['probability'])}"
-    return f"{words_of(cause['label'])} ({'; '.join([*shown[:4], probability])}{alternatives})"
+    return f"{words_of(cause['label'])} ({'; '.join([*shown[:5], probability])}{alternatives})"
 
 
 _SENTENCES = (_size, _findings, _air_motion, _unmeasured, _left_out)
