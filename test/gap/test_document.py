@@ -24,7 +24,7 @@ def test_what_is_doubted_is_told(lagging) -> None:
     assert [c["effect"] for c in document(found)["doubted"]] == ["actuator_lag"]
     assert document(found)["doubted"][0]["parameters"] == document(lagging)["causes"][0]["parameters"]
     assert re.match(
-        r"actuator lag \(probability over 0\.99; time constant 0\.0[78]\S* ± \S+ s\)", candidates(found)["doubted"]
+        r"actuator lag \(probability over 0\.99; all controls 0\.0[78]\S* ± \S+ s\)", candidates(found)["doubted"]
     )
     assert not candidates(lagging)["doubted"]
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from numpy.typing import NDArray
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
@@ -25,7 +26,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.parameter import Parameter
 from sysid_node.ros.support.conversion import NANOSECONDS, header, stamp_message
 from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
-from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim import EFFECTS, Simulator, trim_flight
 from sysid_node.sim.flying import live
 from sysid_node.sim.flying.live import LiveConditions, LiveReading
 from sysid_node.sim.flying.pace import Pace
@@ -37,7 +38,8 @@ PARAMETERS = (
         "effects",
         "actuator_lag:time_constant=0.05",
         "",
-        "What makes the aircraft differ from its file: name:key=value, several with a space between. Change in flight.",
+        "What makes the aircraft differ from its file: name:key=value, several with a space between. Change in flight. "
+        "It replaces what the file states of the same; the default does not where the file states actuator_lag.",
         "To let something fail: control_effectiveness_loss:elevator=0.6 (docs: Effects).",
     ),
     Parameter(
@@ -83,7 +85,7 @@ class FlightSimulator(LoopNode):
         values = self.values
         self._simulator = Simulator(self.aircraft, values["rate"])
         self._trim = trim_flight(self._simulator)
-        self._theta = live.vector(self._simulator, values["effects"].split())
+        self._theta = self._first_effects(values["effects"])
         self._air = LiveConditions(values["turbulence"], noise=values["noise"], seed=int(values["seed"]))
         self._actuation, self._allocation = Actuation.of(self.aircraft), Allocation.of(self.aircraft)
         self._steps, self._commands, self._refused = Durations(), 0, 0
@@ -122,6 +124,14 @@ class FlightSimulator(LoopNode):
         self._pose = self.create_publisher(PoseStamped, "pose", 10)
         self._sim_time = self.create_publisher(ClockMessage, "/clock", 10) if self.values["speed"] != 1.0 else None
         self.hear(JointState, COMMAND, self._on_command, LATEST, needed=False)
+
+    def _first_effects(self, effects: str) -> NDArray[np.float64]:
+        """The parameters (P,) of the parameter ``effects``, whose default gives way to servos that the file states."""
+        usual = effects == PARAMETERS[1].default and "actuator_lag" in self.aircraft.effects
+        unsent = [name for name in self.aircraft.effect_values() if EFFECTS[name].station == "clock"]
+        if unsent:
+            self.get_logger().warning(f"the aircraft file's {', '.join(unsent)} are left out: stamps are those of now")
+        return live.vector(self._simulator, [] if usual else effects.split())
 
     def changed(self, values: Mapping[str, Any]) -> None:
         """Take new effects; they act from the next sample on."""
