@@ -1,9 +1,10 @@
 """Imperfections estimated along with the derivatives, and what they do to these.
 
 With the imperfections kappa the residual of coefficient c is r_c + Z_c kappa, Z_c = d(y_c - X_c theta_c) / d kappa: an
-imperfection is a further regressor, shared by all equations, with a prior N(0, tolerance^2). The joint estimate follows
-by the partitioned inverse (mixed estimation of Theil & Goldberger, JASA 56, 1961; consider parameters of Schmidt, 1966,
-that the data may tell of: Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, ch. VIII):
+imperfection is a further regressor, shared by all equations, with a prior N(0, tolerance^2). In Z_c the model's
+prediction stands for the coefficients, which hold the residuals' noise. The joint estimate follows by the partitioned
+inverse (mixed estimation of Theil & Goldberger, JASA 56, 1961; consider parameters of Schmidt, 1966, that the data may
+tell of: Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, ch. VIII):
 
     J_c   = (V'X)^-1 V'Z_c                                  what kappa moves theta_c by, per unit
     D_c   = P (Z_c - X_c J_c)
@@ -78,8 +79,9 @@ def consider(
     columns, place = changes.columns, np.array([changes.columns.place(i) for i in range(equations.width)])
     N, v = columns.width, np.zeros((columns.width, len(equations.coefficients)))
     v[place] = misfits(equations, solution.theta)
-    Z = np.tensordot(v.T, changes.signals, axes=(1, 1)) * sigmas[:, None]  # (C, K, 2N), per tolerance
     X, V = place[equations.columns], place[equations.instruments]
+    Z = np.tensordot(v.T, changes.signals, axes=(1, 1)) * sigmas[:, None]  # (C, K, 2N), per tolerance
+    _predict_outputs(Z, equations, solution, place)
     normal = gram[V[:, None], X] * equations.same_block
     inverse = np.linalg.inv(normal + equations.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
     J = inverse @ (gram[V] @ Z.swapaxes(1, 2) * equations.belongs.T[:, :, None])  # (C, P, K)
@@ -100,6 +102,21 @@ def consider(
     estimate, covariance = _posterior(information, score, centre / sigmas)
     jacobian = _jacobian(equations, changes, v, J, sigmas, means)
     return Considered(sigmas * estimate, sigmas[:, None] * covariance * sigmas, jacobian / sigmas[:, None, None])
+
+
+def _predict_outputs(Z: Array, equations: NormalEquations, solution: Solution, place: NDArray[np.intp]) -> None:
+    """Put the model's prediction in the place of the coefficients themselves in Z (C, K, 2N), and of their rates.
+
+    A coefficient holds the noise of its own residual. Z would then correlate with the residuals, and an imperfection
+    that makes all coefficients smaller would seem to explain noise.
+    """
+    N = Z.shape[-1] // 2
+    for c, output in enumerate(place[equations.outputs].tolist()):
+        own = np.flatnonzero(equations.belongs[:, c])
+        columns, theta = place[equations.columns[own]], solution.theta[own, c]
+        for offset in (0, N):
+            Z[..., offset + columns] += Z[..., offset + output, None] * theta
+            Z[..., offset + output] = 0.0
 
 
 def _projection(
