@@ -4,16 +4,17 @@
     start(state, time)
     deflections = step(state, time, flight)        # (controls,) rad, at every command
     receive_estimates(state, time, precision)      # whenever estimates come
+    receive_faults(state, time, faults)            # whenever faults are reported
 
 It stops when the derivatives asked for are accurate enough. With the setting ``watch`` it begins again when one of them
-is no longer valid. It stops at once, with no deflection, where a limit is exceeded or a sensor is silent. ``events``
-lists what it did and when.
+is no longer valid, and when a fault of a surface or of the airframe is reported. It stops at once, with no deflection,
+where a limit is exceeded or a sensor is silent. ``events`` lists what it did and when.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 RATE = 200.0  # Hz, at which the manoeuvre is sampled
 RESET_DELAY = 1.5  # s of renewed excitation after which the estimates are reset
 INVALID_TIME = 0.5  # s for which a derivative must be invalid before excitation begins again
+LOST_TIME = 2.0  # s for which it must be, while excitation is under way, before the estimates are reset
+LEAST_BETWEEN_RESETS = 15.0  # s, so that estimates have the time to become valid
 EVENTS = 1000  # number of events that are kept
 
 
@@ -61,13 +64,22 @@ class ExciterState:
     begun: float = math.nan  # s; NaN = not exciting
     missing: tuple[str, ...] = ()  # derivatives that are not accurate enough
     unknown_since: float = math.nan
-    armed: bool = False  # whether excitation may begin again
-    outdated: bool = False  # whether the estimates use data from before a change of the aircraft
+    armed: bool = False  # whether excitation may begin again when a derivative is no longer valid
+    watching: bool = False  # whether it may when a fault is reported: also after it was given up
+    outdated_since: float = math.nan  # s, since when estimates use data from before a change; NaN: they do not
+    reset_at: float = -math.inf  # s, of the last reset of the estimates
+    known: frozenset[str] = frozenset()  # derivatives that have been valid since the last reset
+    faults: frozenset[str] = frozenset()  # that are reported now
 
     @property
     def active(self) -> bool:
         """Whether excitation is under way."""
         return not math.isnan(self.begun)
+
+    @property
+    def outdated(self) -> bool:
+        """Whether the estimates use data from before a change of the aircraft."""
+        return not math.isnan(self.outdated_since)
 
 
 def init(aircraft: Aircraft, settings: ExcitationSettings) -> ExciterState:
@@ -91,7 +103,7 @@ def start(state: ExciterState, time: float) -> None:
     """Begins excitation at a time (s). Raises InputError where it is under way already."""
     if state.active:
         raise InputError("excitation is under way; stop it first")
-    state.begun, state.armed = time, state.settings.watch
+    state.begun, state.armed, state.watching = time, state.settings.watch, state.settings.watch
     _log(state, time, "begun")
 
 
@@ -99,33 +111,67 @@ def stop(state: ExciterState, time: float, why: str) -> None:
     """Ends excitation at a time (s); it does not begin again by itself."""
     if state.active:
         _end(state, time, why)
-    state.armed = False
+    state.armed = state.watching = False
 
 
 def receive_estimates(state: ExciterState, time: float, precision: Mapping[str, float]) -> bool:
     """Whether the estimates should be reset, given their ``precision`` at a time (s).
 
     ``precision``: half of each 95 % interval over the size of its derivative, infinite where it is not valid. A reset
-    is asked for once each time that excitation begins again by itself: the aircraft has changed, and data from before
-    and during the change bias the estimates.
+    is asked for once each time that excitation begins again by itself, and where a derivative that was valid is not any
+    more while excitation is under way: the aircraft has changed, and data from before and during the change bias the
+    estimates. Without the reset they may contradict each other for as long as the data from before count.
     """
     accuracy = state.settings.accuracy
     state.missing = tuple(n for n in state.settings.derivatives if not precision.get(n, math.inf) <= accuracy)
-    if state.active:
-        if state.outdated and time - state.begun >= RESET_DELAY:
-            state.outdated = False
-            _log(state, time, "estimates begun anew")
-            return True
-        if not (state.missing or state.outdated):
-            _end(state, time, "known")
-        return False
     # excitation begins again for invalid derivatives only, not for those that have become less accurate
     invalid = [n for n in state.settings.derivatives if not math.isfinite(precision.get(n, math.inf))]
-    state.unknown_since = (time if math.isnan(state.unknown_since) else state.unknown_since) if invalid else math.nan
+    lost = sorted(state.known.intersection(invalid)) if state.active else invalid
+    state.known |= frozenset(state.settings.derivatives) - frozenset(invalid)
+    state.unknown_since = (time if math.isnan(state.unknown_since) else state.unknown_since) if lost else math.nan
+    if state.active:
+        return _judge_active(state, time, lost)
     if state.armed and time - state.unknown_since >= INVALID_TIME:
-        state.begun, state.outdated = time, True
-        _log(state, time, f"begun again: {', '.join(invalid)} no longer known")
+        _begin_again(state, time, f"{', '.join(lost)} no longer known")
     return False
+
+
+def receive_faults(state: ExciterState, time: float, faults: Iterable[str]) -> None:
+    """Take the faults of surfaces and of the airframe that are reported at a time (s), in words that do not change.
+
+    Faults are found sooner than the estimates notice a change: without excitation little tells the old aircraft from
+    the new one, and estimates stay valid although they are wrong.
+    """
+    new, state.faults = sorted(set(faults) - state.faults), frozenset(faults)
+    if not new or not state.watching:
+        return
+    if state.active:
+        state.outdated_since = time
+        _log(state, time, f"goes on: {', '.join(new)}")
+    else:
+        _begin_again(state, time, ", ".join(new))
+        state.armed = True
+
+
+def _judge_active(state: ExciterState, time: float, lost: Sequence[str]) -> bool:
+    """Whether the estimates should be reset while excitation is under way; ends it where all is known."""
+    may_reset = time - state.reset_at >= LEAST_BETWEEN_RESETS
+    if state.armed and may_reset and not state.outdated and time - state.unknown_since >= LOST_TIME:
+        state.outdated_since = time
+        _log(state, time, f"goes on: {', '.join(lost)} no longer known")
+    if state.outdated and time - state.outdated_since >= RESET_DELAY:
+        state.outdated_since, state.unknown_since = math.nan, math.nan
+        state.reset_at, state.known = time, frozenset()
+        _log(state, time, "estimates begun anew")
+        return True
+    if not (state.missing or state.outdated):
+        _end(state, time, "known")
+    return False
+
+
+def _begin_again(state: ExciterState, time: float, why: str) -> None:
+    state.begun = state.outdated_since = time
+    _log(state, time, f"begun again: {why}")
 
 
 def step(state: ExciterState, time: float, flight: FlightCondition) -> Array:
@@ -135,7 +181,8 @@ def step(state: ExciterState, time: float, flight: FlightCondition) -> Array:
         if exceeded:
             stop(state, time, f"aborted: {exceeded}")
         elif time - state.begun > state.settings.longest:
-            stop(state, time, f"given up: {', '.join(state.missing)} not known")
+            _end(state, time, f"given up: {', '.join(state.missing)} not known")
+            state.armed = False
     if not state.active:
         return np.zeros(state.table.shape[1])
     row: Array = state.table[round(max(time - state.begun, 0.0) * RATE) % len(state.table)]
@@ -162,8 +209,7 @@ def _exceeded_limit(state: ExciterState, flight: FlightCondition) -> str:
 
 def _end(state: ExciterState, time: float, why: str) -> None:
     _log(state, time, f"{why} after {time - state.begun:.1f} s")
-    state.begun = state.unknown_since = math.nan
-    state.outdated = False
+    state.begun = state.unknown_since = state.outdated_since = math.nan
 
 
 def _log(state: ExciterState, time: float, text: str) -> None:

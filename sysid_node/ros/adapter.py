@@ -36,7 +36,7 @@ from sysid_node.parameter import Parameter, annotated_yaml, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.diagnostics import Source
-from sysid_node.ros.support.spin import run_node
+from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 #: Autopilots' bridges publish best effort. The queue is deep enough for a burst after a pause of the process.
 INPUT_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -103,11 +103,11 @@ class AdapterNode(Node):
         self._monitors = [self._listen(kind, topic) for topic, kind in kinds.items()]
         self.add_on_set_parameters_callback(_refuse)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_timer(1.0, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(1.0, while_ros_is_up(self, self._on_tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _listen(self, kind: Any, topic: str) -> TopicMonitor:
         monitor = TopicMonitor(topic)
-        subscription = self.create_subscription(kind, topic, self._on(topic, monitor), INPUT_QOS)
+        subscription = self.create_subscription(kind, topic, while_ros_is_up(self, self._on(topic, monitor)), INPUT_QOS)
         monitor.name = subscription.topic_name
         if subscription.topic_name in {publisher.topic_name for publisher, _ in self._out.values()}:
             raise InputError(

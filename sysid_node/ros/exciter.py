@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates
@@ -20,6 +20,7 @@ from sysid_node.excite import exciter
 from sysid_node.excite.exciter import FlightCondition
 from sysid_node.excite.exciter_settings import RANGES, ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
+from sysid_node.faults.types import DAMAGE, HARD_OVER, LOSS, NOT_FOLLOWING, SHIFTED, STUCK
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.topics import AIR_DATA, IMU
@@ -51,7 +52,7 @@ PARAMETERS = (
         "watch",
         _DEFAULT.watch,
         "",
-        "Whether it begins again by itself when one of them is no longer known.",
+        "Whether it begins again by itself when one of them is no longer known, or a fault is reported.",
         "true beside an adaptive controller.",
     ),
     _setting("accuracy", "", "Half of an interval over the derivative's size, with which it is known.", "As needed."),
@@ -65,6 +66,8 @@ PARAMETERS = (
     _setting("most_load_factor", "", "Load factor above which it aborts.", "For every aircraft."),
 )
 PERIOD = 0.01  # s between its messages
+FAULTS = "fault_monitor/faults"
+AIRCRAFT_FAULTS = frozenset({LOSS, STUCK, HARD_OVER, SHIFTED, NOT_FOLLOWING, DAMAGE})
 STALE = 0.2  # s without a sensor's message, after which the manoeuvre is aborted
 
 
@@ -84,6 +87,7 @@ class Exciter(LoopNode):
         self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
         self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10)
+        self.hear(DiagnosticArray, FAULTS, self._on_faults, 10, needed=False)
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.every(PERIOD, self._on_time)
@@ -111,6 +115,13 @@ class Exciter(LoopNode):
         precision = relative_precision(known.values(), self.aircraft)
         if exciter.receive_estimates(self._state, self._now, precision) and self._reset.service_is_ready():
             self._reset.call_async(Trigger.Request())
+        self._log_events()
+
+    def _on_faults(self, message: Any) -> None:
+        """Faults of surfaces and of the airframe; those of sensors are no reason to move the surfaces."""
+        named = [{pair.key: pair.value for pair in status.values} for status in message.status]
+        kinds = {f"{one.get('part')}: {one.get('kind')}" for one in named if one.get("kind") in AIRCRAFT_FAULTS}
+        exciter.receive_faults(self._state, self._now, kinds)
         self._log_events()
 
     def _on_time(self) -> None:

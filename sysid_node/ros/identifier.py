@@ -41,7 +41,7 @@ from sysid_node.ros.support.diagnostics import Source, lag_level, lag_words, rej
 from sysid_node.ros.support.lifecycle import CarefulNode
 from sysid_node.ros.support.loop_node import SENSOR_QOS, UNHEARD, expected_joints, full_name, say
 from sysid_node.ros.support.message_types import fields_of
-from sysid_node.ros.support.spin import run_node
+from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 DIAGNOSTICS = 1.0  # s between diagnostics
 TICK = 0.2  # s between checks of whether diagnostics are overdue because no estimate was published
@@ -63,7 +63,7 @@ class Identifier(CarefulNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._reported = -math.inf  # s, time.monotonic of the last diagnostics
         # A steady clock: diagnostics continue while simulated time stands still.
-        self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(TICK, while_ros_is_up(self, self._on_tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, "~/reset", self.answered(self.reset))
         self.create_service(Trigger, "~/save", self.answered(self.save))
         if self.get_parameter("autostart").value:

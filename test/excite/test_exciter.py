@@ -131,3 +131,65 @@ def test_other_manoeuvres(kind: str) -> None:
     exciter.start(state, 0.0)
     flown = np.array([exciter.step(state, t, LEVEL) for t in np.arange(0.0, 5.0, 0.01)])
     assert np.abs(flown).max() == pytest.approx(0.03)
+
+
+def watched(longest: float = 60.0) -> exciter.ExciterState:
+    """Under way since 0 s, with all known once."""
+    state = exciter.init(AIRCRAFT, ExcitationSettings(watch=True, longest=longest))
+    exciter.start(state, 0.0)
+    return state
+
+
+def test_a_reported_fault_begins_it_at_once_although_the_estimates_are_still_called_valid() -> None:
+    """Without excitation estimates stayed valid for 16 s after the monitor had named a lost elevator."""
+    state = watched()
+    exciter.receive_estimates(state, 5.0, KNOWN)
+    assert not state.active
+    exciter.receive_faults(state, 30.0, ["elevator: loss of effectiveness"])
+    assert state.active
+    assert last(state) == "begun again: elevator: loss of effectiveness"
+    assert not exciter.receive_estimates(state, 31.4, KNOWN)
+    assert exciter.receive_estimates(state, 31.6, KNOWN), "data from before the failure are forgotten"
+    exciter.receive_faults(state, 31.7, ["elevator: loss of effectiveness"])
+    exciter.receive_estimates(state, 36.0, KNOWN)
+    assert not state.active, "the same fault is no news"
+
+
+def test_a_fault_while_it_is_under_way_has_the_estimates_begun_anew() -> None:
+    state = watched()
+    exciter.receive_faults(state, 10.0, ["aileron: stuck surface"])
+    assert state.active
+    assert exciter.receive_estimates(state, 11.6, UNKNOWN)
+
+
+def test_after_it_gave_up_a_fault_begins_it_again_but_not_after_a_limit_or_a_request() -> None:
+    state = watched(longest=5.0)
+    exciter.step(state, 5.1, LEVEL)
+    assert last(state).startswith("given up")
+    exciter.receive_faults(state, 20.0, ["elevator: loss of effectiveness"])
+    assert state.active
+    exciter.step(state, 20.1, LEVEL._replace(roll=2.0))
+    exciter.receive_faults(state, 30.0, ["rudder: loss of effectiveness"])
+    assert not state.active
+
+
+def test_without_watching_a_fault_changes_nothing(state: exciter.ExciterState) -> None:
+    exciter.start(state, 0.0)
+    exciter.stop(state, 1.0, "stopped")
+    exciter.receive_faults(state, 2.0, ["elevator: loss of effectiveness"])
+    assert not state.active
+
+
+def test_what_is_no_longer_valid_while_it_is_under_way_has_the_estimates_begun_anew() -> None:
+    """Else data of both aircraft contradict each other, for 8 to 18 s in flight."""
+    state = watched()
+    nearly = {**KNOWN, "Cn_dr": 0.2}  # valid, not yet accurate: excitation goes on
+    exciter.receive_estimates(state, 20.0, nearly)
+    lost = {**nearly, "Cm_de": math.inf}
+    assert not exciter.receive_estimates(state, 20.1, lost)
+    assert not exciter.receive_estimates(state, 21.9, lost)
+    assert last(state) == "begun", "a status may flicker"
+    assert not exciter.receive_estimates(state, 22.2, lost)
+    assert last(state) == "goes on: Cm_de no longer known"
+    assert exciter.receive_estimates(state, 23.8, lost)
+    assert not any(exciter.receive_estimates(state, 23.9 + 0.1 * k, lost) for k in range(100)), "it takes its time"

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 REPEAT = 10.0  # s between two lines about the same condition
-LEAST = 2.0  # s between two lines about the same state
+LEAST = 0.9  # s between two lines about the same state
 
 _NUMBERS = re.compile(r"[-+]?\d+(\.\d+)?")  # they change all the time, and say nothing new
 

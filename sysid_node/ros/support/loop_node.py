@@ -26,6 +26,7 @@ from sysid_node.parameter import Parameter, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.message_types import fields_of
+from sysid_node.ros.support.spin import while_ros_is_up
 
 COMMAND = "actuators/command"
 EXCITATION = "actuators/excitation"
@@ -133,13 +134,14 @@ class LoopNode(Node, ABC):
             monitor.arrived()
             take(message)
 
-        monitor.name = self.create_subscription(kind, topic, on_message, profile, raw=raw).topic_name
+        careful = while_ros_is_up(self, on_message)
+        monitor.name = self.create_subscription(kind, topic, careful, profile, raw=raw).topic_name
         if needed:
             self._needed.add(topic)
 
     def every(self, period: float, callback: Any) -> None:
         """Call back every ``period`` s of a clock that never jumps."""
-        self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(period, while_ros_is_up(self, callback), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
         changed = {c.name: c.value for c in changes if any(c.name == p.name for p in self._table)}

@@ -8,6 +8,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from rclpy.exceptions import NotInitializedException
@@ -75,6 +76,23 @@ def run_program(program: Callable[[], None]) -> int:
         for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
             signal.signal(one, signal.SIG_IGN)
     return 0
+
+
+def while_ros_is_up(node: Node, callback: Callable[..., Any]) -> Callable[..., Any]:
+    """The callback, whose exceptions are left out once ROS is shutting down: its calls may fail by then.
+
+    Else Ctrl-C in the middle of a callback would be reported as FATAL, with a traceback.
+    """
+
+    def call(*arguments: Any) -> Any:
+        try:
+            return callback(*arguments)
+        except Exception:
+            if node.context.ok():
+                raise
+            return None
+
+    return call
 
 
 def serve(node: Node) -> None:
