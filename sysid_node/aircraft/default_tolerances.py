@@ -79,7 +79,7 @@ DEFAULT_TOLERANCES: tuple[DefaultTolerance, ...] = (
     ),
     DefaultTolerance("vane_scale.*", "1", 0.03, 0.0, "scale of the flow angles", _VANES),
     DefaultTolerance(
-        "air_data_lag.time_constant", "s", 0.02, 0.2, "pneumatic lag of tubes and sensor",
+        "air_data_lag.time_constant", "s", 0.04, 0.2, "pneumatic lag of tubes and sensor",
         "Haering (1995), NASA TM-104316: 10 to 100 ms",
     ),
     DefaultTolerance("actuator_lag.damping", "1", 0.1, 0.0, "damping of servos of second order", _SERVO),

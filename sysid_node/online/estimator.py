@@ -33,6 +33,7 @@ from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorModel, EstimatorState
 from sysid_node.online.status import vocabulary
 from sysid_node.online.systematic.imperfections import imperfections
+from sysid_node.online.systematic.servo_states import ServoStates
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -41,6 +42,7 @@ AIRSPEED, DENSITY = SAMPLE_COLUMNS.index("V"), SAMPLE_COLUMNS.index("rho")
 THRUST, INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
 LIMIT = 1e9  # nothing measured is as large in SI units
 JITTER = 1e-3  # s by which a stamp may be early and its sample still be the one that is meant
+SERVOS_SETTLE = 0.4  # s after which it no longer matters where a servo was at first
 SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorter steps would pass for acceleration
 
 
@@ -89,6 +91,7 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
         flow_angle_filter.init(aircraft),
         model.instrument_model,
         model.imperfections.applied if model.imperfections else None,
+        ServoStates([0.0] * len(layout.timed)) if model.imperfections and model.imperfections.controls else None,
         excited_segments=no_excited_segments(equations, layout),
     )
 
@@ -101,6 +104,8 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     fresh = init(state.model.aircraft, state.model.settings, commanded=True)
     fresh.transform.transform.last = time
     fresh.flow, fresh.begin = state.flow, state.begin
+    if fresh.servo_states is not None:
+        fresh.begin = max(state.begin, time + SERVOS_SETTLE)
     fresh.thrust_known, fresh.incomplete = state.thrust_known, state.incomplete
     return fresh
 
@@ -125,6 +130,7 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     if math.isnan(state.begin) and abs(time) < LIMIT:
         state.begin = first_counted(time, state.model.settings)
     if not time >= state.begin:
+        _follow_uncounted(state, time, sample)
         return
     if not (math.hypot(time, *sample) < LIMIT and sample[AIRSPEED] > AIRSPEED_LOW and sample[DENSITY] > DENSITY_LOW):
         sample = _completed(state, time, sample)
@@ -142,12 +148,17 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     renew_early(state)
     state.previous = (time, motion)
     if previous is None or time - previous[0] > state.model.settings.max_gap:
+        if state.servo_states is not None:
+            state.servo_states.follow(time, row[state.model.layout.deflections])
         interrupt(state, time, row)
         return
     state.step = time - previous[0]
     gain = state.model.momentum(previous[1], motion)
-    if excess:
-        gain += [row[OFFSET] * state.step * excess[i] for i in state.model.timed]
+    extra = [row[OFFSET] * excess[i] for i in state.model.timed] if excess else ()
+    if extra:
+        gain += [state.step * part for part in extra]
+    if state.servo_states is not None:
+        state.servo_states.follow(time, row[state.model.layout.deflections], extra)
     sampled_transform.append(state.transform, time, row, gain)
     state.samples += 1
     state.intervals += sample[INTERVAL]
@@ -159,6 +170,16 @@ def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Seq
         return sample, ()
     count = len(model.lower_limits)
     return sample[:count], sample[count:]
+
+
+def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
+    """Let the servos follow a sample that does not count, so that they are where they are when samples begin to."""
+    V, density = sample[AIRSPEED], sample[DENSITY]
+    if state.servo_states is not None and math.isfinite(V * density * math.fsum(sample[len(SAMPLE_COLUMNS) :])):
+        reference = state.model.aircraft.reference
+        k = density * V * V / (reference.air_density * reference.airspeed**2)
+        by_symbol = dict(zip(state.model.aircraft.control_symbols, sample[len(SAMPLE_COLUMNS) :], strict=True))
+        state.servo_states.follow(time, [k * by_symbol[symbol] for symbol in state.model.layout.timed])
 
 
 def renew_early(state: EstimatorState) -> None:

@@ -37,7 +37,7 @@ from sysid_node.online.regression.information import Information
 from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.selection_bias import selection_bias_factors
-from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.state import EstimatorState, SegmentSolution, current_lines
 from sysid_node.online.systematic import cross_spectra, estimation
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import line_model, remapped
@@ -53,7 +53,7 @@ TIMING_EVERY = 4  # pieces at least between looks at the controls' timing, which
 def renew(state: EstimatorState, last: bool = False) -> None:
     """Renew the slowly changing quantities (``SegmentSolution``); ``last`` also finishes the segment."""
     time = state.transform.last
-    lines = sampled_transform.current(state.transform)
+    lines = current_lines(state)
     _append_piece(state, lines)
     last = last or reach(time, state.step) - state.segment_start >= state.model.segment_time
     state.pieces += 1
@@ -84,6 +84,8 @@ def begin_segment(state: EstimatorState) -> None:
     """Begin a segment, of which alone the transform is, and a piece of the change monitor at the last sample."""
     time = state.transform.last
     sampled_transform.restart(state.transform)
+    if state.servo_states is not None:
+        state.first_impulses = state.servo_states.impulses(state.model.spectrum.omega, time)
     state.segment_start, state.samples, state.intervals = time, 0, 0.0
     state.noise_moments, state.noise_measured_until = NoiseMoments(), time
     _begin_piece(state)
@@ -91,7 +93,8 @@ def begin_segment(state: EstimatorState) -> None:
 
 def _begin_piece(state: EstimatorState) -> None:
     time = state.transform.last
-    state.piece, state.piece_start, state.renew_at = sampled_transform.current(state.transform), time, time + PIECE
+    state.piece = current_lines(state)
+    state.piece_start, state.renew_at = time, time + PIECE
 
 
 def _fading(state: EstimatorState, since: float) -> float:
@@ -145,10 +148,10 @@ def _measured(state: EstimatorState, lines: Array, begin: float, end: float) -> 
     """What the transform ``lines`` of begin..end (s) says, with its cross-spectra where not all is exact."""
     model = state.model
     edges = information.edges(model.spectrum.omega, begin, end) if model.imperfections else None
-    info = information.measure(lines, state.line_model, model.spectrum, begin, end, edges)
+    clean = information.clean_lines(lines, state.line_model, edges)
+    info = information.measure_clean(clean, lines[-1], model.spectrum, begin, end, edges)
     if model.imperfections is not None:
-        plain = information.about_mean(lines.copy(), None, edges)
-        info.spectra = cross_spectra.cross_spectra(plain, model.layout.transformed)
+        info.spectra = cross_spectra.cross_spectra(clean, model.layout.transformed)
     return info
 
 
@@ -193,13 +196,16 @@ def _solve_with_servos(state: EstimatorState, lines: Array) -> None:
 
 def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
     """Take the controls to where these servos have them, in all that is remembered."""
-    model, imperfect = state.model, state.model.imperfections
+    model, imperfect, before = state.model, state.model.imperfections, state.servos
     assert imperfect is not None
+    assert before is not None
     state.servos = servos
+    if state.servo_states is not None:
+        state.servo_states.lateness = servos.lateness.tolist()
     state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied)
 
     def moved(info: Information) -> Information:
-        return remapped(info, imperfect, state.line_model, model.spectrum)
+        return remapped(info, imperfect, model.instrument_model, model.layout, model.spectrum, (before, servos))
 
     state.past = moved(state.past)
     state.window_segments = deque((end, moved(info)) for end, info in state.window_segments)
@@ -270,7 +276,7 @@ def _systematic(
         model.aircraft,
         model.layout,
         model.spectrum,
-        state.line_model,
+        model.instrument_model,
         servos,
         state.equations,
         solution,
@@ -379,7 +385,7 @@ def _begin_anew(state: EstimatorState, lines: Array, since: float) -> None:
     state.segment_start = since
     sampled_transform.take_out(state.transform, before)
     state.change_monitor = ChangeMonitor()
-    _solve_with_servos(state, sampled_transform.current(state.transform))
+    _solve_with_servos(state, current_lines(state))
 
 
 def _remember_before(state: EstimatorState, lines: Array, end: float) -> None:

@@ -13,6 +13,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
 from sysid_node.online.changes.detection import ChangeMonitor
 from sysid_node.online.changes.excited_segments import ExcitedSegments
+from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import Layout, MomentumGain, ScalarSignals
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression.actuator_lag_test import LagTest
@@ -28,6 +29,7 @@ from sysid_node.online.status import Codes, Vocabulary
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections
 from sysid_node.online.systematic.servo_model import ServoModel
+from sysid_node.online.systematic.servo_states import ServoStates
 
 Array = NDArray[np.float64]
 
@@ -106,6 +108,8 @@ class EstimatorState:
     flow: FlowAngleFilter  # of the flow angles that are not measured
     line_model: InstrumentModel | None  # what is made of the transform's lines: the controls' servos, instruments
     servos: ServoModel | None = None  # of the controls, as the lines have them; None where all is exact
+    servo_states: ServoStates | None = None  # None where no control is late
+    first_impulses: Array = field(default_factory=lambda: np.empty((0, 0)))  # of the servos, at the segment's start
     past_time: float = math.nan
     window_segments: deque[tuple[float, Information]] = field(
         default_factory=deque
@@ -129,3 +133,15 @@ class EstimatorState:
     excited_segments: list[ExcitedSegments] = field(default_factory=list)  # by block of the normal equations
     pieces: int = 0  # number of pieces finished
     changed_at: float = -math.inf
+
+
+def current_lines(state: EstimatorState) -> Array:
+    """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses."""
+    lines = sampled_transform.current(state.transform)
+    if state.servo_states is not None and state.first_impulses.size:
+        model, time = state.model, state.transform.last
+        first = state.first_impulses
+        if model.spectrum.rate:
+            first = first * math.exp(0.5 * model.spectrum.rate * (state.segment_start - time))
+        lines[:, model.layout.rates] += state.servo_states.impulses(model.spectrum.omega, time) - first
+    return lines

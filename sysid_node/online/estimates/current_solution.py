@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.information import edges, products
 from sysid_node.online.regression.least_squares import Solution
 from sysid_node.online.regression.mixed_estimation import weighed
 from sysid_node.online.regression.normal_equations import NormalEquations
-from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.state import EstimatorState, SegmentSolution, current_lines
 
 Array = NDArray[np.float64]
 
@@ -36,7 +35,7 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
     latest, equations = state.latest, state.equations
     if latest is None:
         return None
-    lines, time = sampled_transform.current(state.transform), state.transform.last
+    lines, time = current_lines(state), state.transform.last
     integrals = latest.integrals + lines[-1]
     impulses = edges(state.model.spectrum.omega, state.segment_start, time) if state.servos else None
     gram = products(lines, state.line_model, impulses)

@@ -92,6 +92,9 @@ def over_intervals(layout: Layout, steps: Array, rows: Array, gains: Array) -> t
         areas[:, layout.deflections] += gains[:, OUTPUTS:]
     areas[:, layout.rates] = slants[:, layout.deflections]
     slants *= 0.5 * steps * steps
+    if gains.shape[1] > OUTPUTS:
+        # the rate's first moment about the interval's middle, in units of which a slant is six
+        slants[:, layout.rates] = -6.0 * gains[:, OUTPUTS:]
     return areas, slants
 
 

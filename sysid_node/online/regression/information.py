@@ -245,7 +245,13 @@ def measure(
     edges: Edges | None = None,
 ) -> Information:
     """What the transform (2F + 1, W) of begin..end (s) says; ``bias``, ``samples``, ``noise_moments``: none."""
-    clean = clean_lines(transform, model, edges)
+    return measure_clean(clean_lines(transform, model, edges), transform[-1], lines, begin, end, edges)
+
+
+def measure_clean(
+    clean: Array, integrals: Array, lines: Spectrum, begin: float, end: float, edges: Edges | None = None
+) -> Information:
+    """The same of clean lines (2F, W), from which ``edges`` have been taken out, and of the ``integrals`` (W,)."""
     covariance = noise_covariance(lines, begin, end)
     spread = covariance @ clean
     n = clean[:, _N]
@@ -264,4 +270,4 @@ def measure(
         traces[band] = left[rows].sum()
     square = float(np.vdot(covariance, covariance))
     energy = window_energy(end - begin, lines.rate)
-    return Information(grams, scores, traces, square, energy, np.zeros((W, W)), transform[-1].copy(), 0.0)
+    return Information(grams, scores, traces, square, energy, np.zeros((W, W)), integrals.copy(), 0.0)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.frequency.regression_signals import Layout
-from sysid_node.online.regression.information import project
 from sysid_node.online.regression.instruments import InstrumentModel
 
 Array = NDArray[np.float64]
@@ -23,11 +22,10 @@ Complex = NDArray[np.complex128]
 NO_SPECTRA: Complex = np.zeros((0, 0, 0), dtype=complex)
 
 
-def cross_spectra(about_mean: Array, transformed: int) -> Complex:
-    """(F, T, T) of the lines (2F, W) of a segment, taken about their means and without servo corrections."""
-    lines = project(about_mean[:, :transformed])
-    F = lines.shape[0] // 2
-    X = lines[:F] + 1j * lines[F:]
+def cross_spectra(clean: Array, transformed: int) -> Complex:
+    """(F, T, T) of the clean lines (2F, W) of a segment, whose controls are where the servos have them."""
+    F = clean.shape[0] // 2
+    X = clean[:F, :transformed] + 1j * clean[F:, :transformed]
     return np.asarray(X.conj()[:, :, None] * X[:, None, :])
 
 

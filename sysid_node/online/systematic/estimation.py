@@ -11,7 +11,6 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.frequency.regression_signals import Layout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.instruments import InstrumentModel
-from sysid_node.online.regression.instruments import with_servos as model_with_servos
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic import cross_spectra, servo_model
@@ -67,13 +66,14 @@ def systematic_errors(
     pieces: int,
     known: tuple[float, ColumnChanges, Array] | None,
 ) -> SystematicErrors:
-    """By the information ``total``, whose lines were made by the ``model`` with these ``servos``.
+    """By the information ``total``, whose lines have the controls where these ``servos`` have them.
+
+    ``model`` is that of the instruments.
 
     ``inflation`` (C,): factors of the statistical variances, which hold for what the flight tells of imperfections too.
     ``known`` are the changes that were last used; they depend on the flight's means alone.
     """
-    none = np.zeros((lines.omega.size, len(layout.timed)), dtype=complex)
-    model = model or model_with_servos(None, layout, lines.omega, none)
+    model = model or InstrumentModel(np.zeros((lines.omega.size, 0, 0), complex), layout.deflections, layout.rates)
     spectra = cross_spectra.with_servos(
         total.spectra, imperfect.columns, model, lines.omega, servo_model.rate_gain(servos, lines.omega)
     )

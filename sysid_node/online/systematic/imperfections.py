@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,15 +131,22 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
 
 
 def remapped(
-    info: Information, imperfect: Imperfections, model: InstrumentModel | None, lines: Spectrum
+    info: Information,
+    imperfect: Imperfections,
+    exact: InstrumentModel | None,
+    layout: Layout,
+    lines: Spectrum,
+    servos: tuple[ServoModel, ServoModel],
 ) -> Information:
-    """The information with the controls where another ``model`` has them.
+    """The information with the controls where the second of the ``servos`` have them, not the first.
 
     The Gram matrices follow from the cross-spectra. The scores, whose noise is correlated between lines, change as the
     Gram matrices do: column by column, they are as many times as large.
     """
-    if model is None or not info.spectra.size or not info.samples:
+    if not info.spectra.size or not info.samples:
         return info
+    before, after = servos
+    model = with_servos(exact, layout, lines.omega, servo_model.lateness(after, before, lines.omega))
     full = spectra_with_servos(info.spectra, imperfect.columns, model, lines.omega, None)
     grams = band_grams(full, lines.bands, imperfect.places)
     energies = info.grams.diagonal(axis1=1, axis2=2)
@@ -146,9 +154,10 @@ def remapped(
     per_energy = np.divide(np.maximum(scores, 0.0), energies, out=np.zeros_like(energies), where=energies > 0.0)
     root = np.sqrt(per_energy)
     more = (grams - info.grams) * root[:, :, None] * root[:, None, :]
-    return _replaced(info, grams, info.scores + more)
+    T = imperfect.columns.transformed
+    return _replaced(info, grams=grams, scores=info.scores + more, spectra=full[:, :T, :T].copy())
 
 
-def _replaced(info: Information, grams: Array, scores: Array) -> Information:
+def _replaced(info: Information, **changes: NDArray[Any]) -> Information:
     values = {name: getattr(info, name) for name in info.__dataclass_fields__}
-    return Information(**(values | {"grams": grams, "scores": scores}))
+    return Information(**(values | changes))

@@ -1,0 +1,58 @@
+"""Where the servos are at present, which the transform of a short stretch needs at its ends.
+
+With a servo of lateness L behind the recorded control x, its position p follows L dp/dt + p = x. The transform of p
+over a stretch that ends at t is X + g R (see ``servo_model``), where R is the transform of dx/dt less the impulse
+(x - p) at t, and plus that at the stretch's beginning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_ONE = np.ones(1)
+LONGEST = 0.5  # s
+SHORTEST = 1e-3  # s: a lateness under which a servo is where it is told to be
+
+
+@dataclass
+class ServoStates:
+    """Positions of m servos and what they follow, after the last sample."""
+
+    lateness: list[float]  # (m,) s
+    positions: list[float] = field(default_factory=list)
+    controls: Sequence[float] = ()
+    time: float = -math.inf  # s, of the last sample
+
+    def follow(self, time: float, controls: Sequence[float], excess: Sequence[float] = ()) -> None:
+        """Follow the controls, which go in straight lines to these values at ``time`` (s), but for an ``excess`` (m,)
+        in the mean. At first, and after a gap of more than ``LONGEST`` s, servos are at rest there.
+        """
+        step, self.time = time - self.time, time
+        if not 0.0 < step <= LONGEST:
+            self.positions, self.controls = list(controls), controls
+            return
+        for i, (late, before, after) in enumerate(zip(self.lateness, self.controls, controls, strict=True)):
+            if late < SHORTEST:
+                self.positions[i] = after
+                continue
+            decay = math.exp(-step / late)
+            ramp = late / step * (1.0 - decay)
+            self.positions[i] = decay * self.positions[i] + (ramp - decay) * before + (1.0 - ramp) * after
+            if excess:
+                self.positions[i] += (1.0 - decay) * excess[i]
+        self.controls = controls
+
+    def impulses(self, omega: Array, time: float) -> Array:
+        """(2F + 1, m) what p - x of the servos at ``time`` (s) is in the transform."""
+        if not self.controls:
+            return np.zeros((2 * omega.size + 1, len(self.lateness)))
+        behind = [position - control for position, control in zip(self.positions, self.controls, strict=True)]
+        wave = np.exp((-1j * time) * omega)
+        return np.asarray(np.multiply.outer(np.concatenate([wave.real, wave.imag, _ONE]), behind))
