@@ -175,11 +175,11 @@ def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Seq
 def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     """Let the servos follow a sample that does not count, so that they are where they are when samples begin to."""
     V, density = sample[AIRSPEED], sample[DENSITY]
-    if state.servo_states is not None and math.isfinite(V * density * math.fsum(sample[len(SAMPLE_COLUMNS) :])):
+    controls = [sample[len(SAMPLE_COLUMNS) + i] for i in state.model.timed]
+    if state.servo_states is not None and math.isfinite(V * density * math.fsum(controls)):
         reference = state.model.aircraft.reference
         k = density * V * V / (reference.air_density * reference.airspeed**2)
-        by_symbol = dict(zip(state.model.aircraft.control_symbols, sample[len(SAMPLE_COLUMNS) :], strict=True))
-        state.servo_states.follow(time, [k * by_symbol[symbol] for symbol in state.model.layout.timed])
+        state.servo_states.follow(time, [k * control for control in controls])
 
 
 def renew_early(state: EstimatorState) -> None:
