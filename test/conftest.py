@@ -43,6 +43,7 @@ class Page:
     complaints: list[str]
     plots: int
     drawn: int
+    data_links: int
 
 
 @pytest.fixture
@@ -60,6 +61,7 @@ def browse(tmp_path) -> Callable[[Path], Page]:
             re.findall(r".*CONSOLE.*", done.stderr),
             len(re.findall(r'<div class="plot\b[^>]*role="img"', done.stdout)),
             drawn,
+            done.stdout.count('<a class="data"'),
         )
 
     return page

@@ -11,3 +11,4 @@ def test_plots_are_drawn_without_a_complaint(tmp_path, browse):
     page = browse(path)
     assert page.complaints == []
     assert page.drawn == page.plots > len(synthetic.TRUTH)
+    assert page.data_links == page.plots

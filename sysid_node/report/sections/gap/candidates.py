@@ -7,8 +7,7 @@ from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.report.sections.gap.names import alike, units_of
-from sysid_node.report.wording.names import words_of
+from sysid_node.report.sections.gap.names import alike, label_words, parameter_words, units_of
 from sysid_node.report.wording.numbers import NONE, likely, number, with_interval
 
 
@@ -16,18 +15,18 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
     """The effects that were fitted alone, and the causes with their parameters."""
     content = document(found)
     rows = [
-        (words_of(c["effect"]), NONE if c["probability"] is None else likely(c["probability"]),
+        (label_words(c["effect"]), NONE if c["probability"] is None else likely(c["probability"]),
          f"{100 * c['share']:.1f}", 100 * c["share"])
         for c in content["candidates"]
     ]  # fmt: skip
     doubted = [_doubted(c) for c in content["doubted"]]
     causes = [
         {
-            "name": words_of(c["label"]),
+            "name": label_words(c["label"]),
             "station": c["station"],
             "probability": likely(c["probability"]),
             "parameters": _parameters(c),
-            "rivals": ", ".join(words_of(r) for r in c["indistinguishable_from"]),
+            "rivals": ", ".join(label_words(r) for r in c["indistinguishable_from"]),
         }
         for c in content["causes"]
     ]
@@ -37,16 +36,17 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
 def _doubted(cause: Mapping[str, Any]) -> str:
     """``actuator lag (probability 0.42; time constant 0.110 ± 0.006 s)``."""
     details = [f"probability {likely(cause['probability'])}", *map(" ".join, _parameters(cause))]
-    return f"{words_of(cause['label'])} ({'; '.join(details)})"
+    return f"{label_words(cause['label'])} ({'; '.join(details)})"
 
 
 def _parameters(cause: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Name, value with its 95 % interval, and unit of each of a cause's parameters."""
     units = units_of(cause["effect"])
     filed = alike(cause.get("believed", {}))
+    files = {name: f" (file: {value:.3g})" for name, value in filed.items()}
+    pairs = alike(cause["parameters"]).items()
     return [
-        (words_of(n), with_interval(v, 1.96 * e), units.get(n, "") + (f" (file: {filed[n]:.3g})" if n in filed else ""))
-        for n, (v, e) in alike(cause["parameters"]).items()
+        (parameter_words(n), with_interval(v, 1.96 * e), units.get(n, "") + files.get(n, "")) for n, (v, e) in pairs
     ]
 
 
@@ -59,4 +59,4 @@ def _confusion(found: Diagnosis) -> Mapping[str, Any]:
         for j, value in enumerate(row)
         if j < i and abs(value) >= 0.05
     ]
-    return {"names": [words_of(label) for label in table.labels], "cells": cells}
+    return {"names": [label_words(label) for label in table.labels], "cells": cells}

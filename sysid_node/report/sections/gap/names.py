@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TypeVar
 
 from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
-from sysid_node.report.wording.names import COEFFICIENT_WORDS, REGRESSOR_WORDS
+from sysid_node.report.wording.names import COEFFICIENT_WORDS, REGRESSOR_WORDS, short_meaning, split_name, words_of
 from sysid_node.report.wording.numbers import number
 
 T = TypeVar("T")
@@ -26,6 +27,44 @@ WORDS = {
     "az": "downward specific force",
     **{name: REGRESSOR_WORDS[name] for name in "pqr"},
 }
+
+
+#: Words for parameters of effects whose names are symbols.
+_PARAMETERS = {
+    "alpha_star": "angle of attack at which the flow separates",
+    "a1": "abruptness of the separation",
+    "tau1": "lag of the separation",
+    "tau2": "lag of the separation behind the angle of attack",
+    "CD_X": "drag of the separated flow",
+    "Cm_X": "pitching moment of the separated flow",
+    "CL_alphadot": "lift due to the rate of the angle of attack",
+    "Cm_alphadot": "pitching moment due to the rate of the angle of attack",
+    "Cl_beta_alpha": "dihedral effect per angle of attack",
+    "Cn_beta_alpha": "weathercock stability per angle of attack",
+    "Cl_r_alpha": "rolling moment due to yaw rate, per angle of attack",
+    "p_factor": "P-factor",
+}
+
+#: Units in which a pilot thinks: SI unit -> factor and unit.
+_PILOTS = {"rad": (180.0 / math.pi, "deg"), "rad/s": (180.0 / math.pi, "deg/s")}
+
+
+def parameter_words(name: str) -> str:
+    """A parameter of an effect in words: ``"Cm_q"`` is ``"pitch damping"``, ``"q"`` is ``"pitch rate"``."""
+    known = _PARAMETERS.get(name) or WORDS.get(name)
+    return known or (short_meaning(name) if split_name(name)[0] else words_of(name))
+
+
+def label_words(label: str) -> str:
+    """A cause in words: ``"derivative_error of Cm"`` is ``"derivative error of pitching moment"``."""
+    effect, separator, part = label.partition(" of ")
+    return f"{words_of(effect)}{separator}{WORDS.get(part, words_of(part))}"
+
+
+def in_pilots_units(value: float, error: float, unit: str) -> tuple[float, float, str]:
+    """Value, standard error and unit with angles in degrees."""
+    factor, name = _PILOTS.get(unit, (1.0, unit))
+    return factor * value, factor * error, name
 
 
 def units_of(effect: str) -> dict[str, str]:

@@ -11,8 +11,15 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.validation.simulation_error import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
-from sysid_node.report.sections.gap.names import WORDS, alike, percent, units_of
-from sysid_node.report.wording.names import words_of
+from sysid_node.report.sections.gap.names import (
+    WORDS,
+    alike,
+    in_pilots_units,
+    label_words,
+    parameter_words,
+    percent,
+    units_of,
+)
 from sysid_node.report.wording.numbers import likely, number, with_interval
 
 #: Readings that together are an aircraft's response about an axis.
@@ -148,17 +155,26 @@ def _cause(cause: Mapping[str, Any]) -> str:
     """``actuator lag (time constant 0.110 ± 0.006 s; probability 0.98)``."""
     units = units_of(cause["effect"])
     shown = [
-        f"{words_of(name)} {with_interval(value, 1.96 * error)} {units.get(name, '')}".strip()
+        _parameter(name, *in_pilots_units(value, error, units.get(name, "")))
         for name, (value, error) in alike(cause["parameters"]).items()
         if abs(value) > 2.0 * error
     ]
-    filed = [f"{words_of(n)} {number(v, 3)}" for n, v in alike(cause.get("believed", {})).items()]
+    believed = {
+        name: in_pilots_units(value, 0.0, units.get(name, ""))
+        for name, value in alike(cause.get("believed", {})).items()
+    }
+    filed = [f"{parameter_words(n)} {number(v, 3)} {unit}".strip() for n, (v, _, unit) in believed.items()]
     if filed:
         shown = [*shown[:4], f"the aircraft file says {', '.join(filed[:4])}"]
     rivals = cause["indistinguishable_from"]
-    alternatives = f"; or {', '.join(words_of(r) for r in rivals)}" if rivals else ""
+    alternatives = f"; or {', '.join(label_words(r) for r in rivals)}" if rivals else ""
     probability = f"probability {likely(cause['probability'])}"
-    return f"{words_of(cause['label'])} ({'; '.join([*shown[:5], probability])}{alternatives})"
+    return f"{label_words(cause['label'])} ({'; '.join([*shown[:5], probability])}{alternatives})"
+
+
+def _parameter(name: str, value: float, error: float, unit: str) -> str:
+    """``time constant 0.110 ± 0.006 s``."""
+    return f"{parameter_words(name)} {with_interval(value, 1.96 * error)} {unit}".strip()
 
 
 _SENTENCES = (_size, _findings, _air_motion, _unmeasured, _left_out)

@@ -15,6 +15,9 @@ from sysid_node.report.wording.numbers import number
 #: Steps of the waterfall before the rest.
 _STEPS = 7
 
+#: Height of a step, pixels: two lines of text and a gap.
+_ROW = 38
+
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, "#E69F00", "#56B4E9", "#CC79A7", "#999999")
 
 
@@ -46,29 +49,31 @@ def waterfall(found: Diagnosis) -> Figure:
         traces.append(
             {
                 "type": "bar",
-                "x": [words],
-                "y": [share],
+                "orientation": "h",
+                "y": [words],
+                "x": [share],
                 "base": [max(left, 0.0)],
                 "text": [percent(share / 100.0)],
                 "textposition": "outside",
                 "cliponaxis": False,
                 "marker": {"color": colours.get(station, MUTED)},
-                "hovertemplate": f"{station}, %{{x}}: %{{y:.1f}} %<extra></extra>",
+                "hovertemplate": "%{y}: %{x:.1f} %<extra></extra>",
             }
         )
     layout = {
         "barmode": "overlay",
-        "xaxis": figures.axis("", type="category", tickangle=0, nticks=0),
-        "yaxis": figures.axis("of the gap's power, %", range=[0, 112]),
+        "xaxis": figures.axis("of the gap's power, %", range=[0, 116]),
+        "yaxis": figures.axis("", type="category", autorange="reversed", nticks=0),
     }
-    return Figure("The gap by station and axis, down to what noise leaves", traces, layout, 340)
+    height = 60 + _ROW * len(traces)
+    return Figure("The gap by station and axis, down to what noise leaves", traces, layout, height)
 
 
 def _steps_down(found: Diagnosis) -> list[tuple[str, str, float]]:
     """Station, label and percentage of each step: the largest by axis, the rest of all, then noise."""
     caused = [w for w in found.where if w["station"] != "noise"]
-    # A word a line: nine labels of two words side by side would overlap.
-    labels = [f"{w['station']} {WORDS[w['axis']]}".replace(" ", "<br>") for w in caused[:_STEPS]]
+    # Two lines a label: beside their bars they leave room for these on a phone, too.
+    labels = [f"{w['station']},<br>{WORDS[w['axis']]}" for w in caused[:_STEPS]]
     steps = [(w["station"], label, 100.0 * w["share"]) for w, label in zip(caused, labels, strict=False)]
     rest = 100.0 * sum(w["share"] for w in caused[_STEPS:])
     noise = 100.0 * sum(w["share"] for w in found.where if w["station"] == "noise")
