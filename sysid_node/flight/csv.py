@@ -18,7 +18,7 @@ import numpy as np
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.csv_checks import check_names, check_time, implausible
-from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.record import COLUMNS, FlightRecord
 
 TIME = "t"
 SIZE_LIMIT = 2 * 10**9  # bytes: a day at 200 Hz has 1.5e9
@@ -44,6 +44,8 @@ def read_csv(path: str | Path) -> FlightRecord:
         time = columns.pop(TIME)
         whole = FlightRecord(time, columns, path.stem)
         check_time(time)
+        if not any(whole.measured(name) for name in COLUMNS):
+            raise InputError("no values in any column of a flight; was something recorded?")
         return _plausible(whole)
 
 

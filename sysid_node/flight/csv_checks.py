@@ -25,6 +25,8 @@ COLUMN_LIMIT = 1000
 WRONG_UNIT = 0.02
 SLOWEST, FASTEST = 1.0, 1e-5  # s from sample to sample
 
+LONGEST_GAP = 3600.0  # s; beyond it, it is another flight, or the clock was set
+
 _MOTION = ("ax", "ay", "az", "p", "q", "r")
 _EXPECTED = (*_MOTION, "V", "alpha", "beta")
 #: A ratio between 57.3 / 3 and 57.3 * 3 is taken for degrees; that of sound data is near 1.
@@ -73,6 +75,10 @@ def check_time(time: Array) -> None:
     if not FASTEST <= step <= SLOWEST:
         unit = next((f" ({name}?)" for name, size in (("ns", 1e6), ("us", 1e3), ("ms", 1.0)) if step > size), "")
         raise InputError(f"time steps by {step:g} from sample to sample{unit}; expected seconds, {FASTEST:g} to 1 s")
+
+    gap = int(np.argmax(np.diff(time)))
+    if time[gap + 1] - time[gap] > LONGEST_GAP:
+        raise InputError(f"time jumps by {time[gap + 1] - time[gap]:g} s at {time[gap]:g} s; make two flights of it")
 
 
 def implausible(time: Array, columns: Mapping[str, Array]) -> NDArray[np.object_]:

@@ -116,6 +116,20 @@ def test_a_dropped_column_is_named(tmp_path):
         read_csv(written(tmp_path, alpha=None, beta=None))
 
 
+def test_two_flights_in_one_file_are_refused(tmp_path):
+    """A clock that was set from 1970 to 2026 within the flight looks the same."""
+    flight = flown()
+    time = np.where(flight.time < 5.0, flight.time, flight.time + 1.7e9)
+    with pytest.raises(InputError, match=r"time jumps by 1.7e\+09 s at 4.98 s"):
+        read_csv(written(tmp_path, FlightRecord(time, flight.columns)))
+
+
+def test_a_flight_without_a_value_is_refused(tmp_path):
+    nothing = {name: np.full(1000, np.nan) for name in flown().columns}
+    with pytest.raises(InputError, match="no values in any column"):
+        read_csv(written(tmp_path, FlightRecord(flown().time, nothing)))
+
+
 def test_semicolons_and_tabs(tmp_path):
     for mark in ";\t":
         (tmp_path / "log.csv").write_text(mark.join(["t", "ax"]) + "\n" + mark.join(["0", "1"]) + "\n")

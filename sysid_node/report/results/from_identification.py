@@ -129,7 +129,8 @@ def _spectra(aircraft: Aircraft, record: FlightRecord, coefficients: Sequence[Mo
     response = coefficients[0]
     frequency = _SPECTRUM[0.4 / float(np.median(np.diff(response.time))) > _SPECTRUM]
     complete = [symbol for symbol in aircraft.control_symbols if np.isfinite(record[symbol]).all()]
-    inputs = amplitude_spectrum(record.time, np.column_stack([record[s] for s in complete]), frequency)
+    deflections = np.array([record[symbol] for symbol in complete]).reshape(len(complete), len(record)).T
+    inputs = amplitude_spectrum(record.time, deflections, frequency)
     measured = amplitude_spectrum(response.time, response.measured, frequency)
     residuals = amplitude_spectrum(response.time, response.residuals, frequency)
     return Spectra(
