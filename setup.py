@@ -4,6 +4,7 @@ from setuptools import find_packages, setup
 
 NAME = "sysid_node"
 SHARE = f"share/{NAME}"
+DATA = ("config", "config/aircraft", "config/layouts", "launch")
 
 
 def files_of(folder):
@@ -18,7 +19,10 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
-        *((f"{SHARE}/{folder}", files_of(folder)) for folder in ("config", "config/aircraft", "launch")),
+        *(
+            (f"{SHARE}/{folder}", files_of(folder))
+            for folder in ("config", "config/aircraft", "config/layouts", "launch")
+        ),
     ],
     zip_safe=False,
     maintainer="sysid maintainers",
