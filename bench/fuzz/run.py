@@ -87,14 +87,20 @@ def _work(words: Sequence[str], place: Path) -> None:
         os._exit(code)
 
 
-def hunt(seeds: Seeds, seconds: float, seed: int, out: Path) -> tuple[Counter[str], Counter[tuple[str, str]]]:
-    """Cases tried by kind, and breaks by kind and what was wrong; each new one is kept under ``out``."""
+def hunt(
+    seeds: Seeds, seconds: float, rounds: int, seed: int, out: Path
+) -> tuple[Counter[str], Counter[tuple[str, str]]]:
+    """Cases tried by kind, and breaks by kind and what was wrong; the first of each are kept under ``out``.
+
+    A round has one case of each kind; the hunt ends after ``rounds`` or ``seconds``.
+    """
     rng = random.Random(seed)
     kinds = seeds.cases()
     tried: Counter[str] = Counter()
     broke: Counter[tuple[str, str]] = Counter()
     end = time.monotonic() + seconds
-    while time.monotonic() < end:
+    while time.monotonic() < end and rounds > 0:
+        rounds -= 1
         for kind, case in kinds.items():
             place = Path(tempfile.mkdtemp(prefix="sysid-fuzz-"))
             words = case(place, rng)
@@ -131,6 +137,7 @@ def main() -> None:
     """Hunt, keep, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=600.0)
+    parser.add_argument("--rounds", type=int, default=10**9, help="at most; each has a case of every kind")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--logs", type=Path, help="a folder of sound logs to damage, too")
     parser.add_argument("--out", type=Path, default=Path("out/fuzz"))
@@ -140,7 +147,7 @@ def main() -> None:
         print(again(args.again))
         return
     with tempfile.TemporaryDirectory(prefix="sysid-seeds-") as folder:
-        tried, broke = hunt(Seeds.made(Path(folder), args.logs), args.seconds, args.seed, args.out)
+        tried, broke = hunt(Seeds.made(Path(folder), args.logs), args.seconds, args.rounds, args.seed, args.out)
     print("| input | tried | broke |\n|---|---:|---:|")
     for kind, count in tried.items():
         print(f"| {kind} | {count} | {sum(n for (of, _), n in broke.items() if of == kind)} |")
