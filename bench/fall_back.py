@@ -127,11 +127,13 @@ class Aircraft:
 
     def gain(self) -> float:
         """The median of the last jumps."""
-        return float(np.median([size for _, size in self.jumps[-9:]]))
+        return float(np.median([size for _, size in self.jumps[-25:]]))
 
 
-def kill_once(aircraft: Aircraft, baseline: float) -> tuple[float, float]:
+def kill_once(aircraft: Aircraft) -> tuple[float, float]:
     """s from the kill until the gain begins to move, and until the baseline's is flown for good."""
+    aircraft.fly(1.0)
+    baseline = aircraft.gain()
     process = subprocess.Popen([sys.executable, __file__, "--identify"])
     try:
         aircraft.until(lambda: aircraft.gain() > 1.3 * baseline)
@@ -157,8 +159,8 @@ def measure(kills: int) -> str:
     aircraft = Aircraft()
     try:
         aircraft.until(lambda: len(aircraft.jumps) > 50)
-        baseline = aircraft.gain()
-        found = np.array([kill_once(aircraft, baseline) for _ in range(kills)])
+        aircraft.fly(2.0)
+        found = np.array([kill_once(aircraft) for _ in range(kills)])
     finally:
         controller.terminate()
         controller.wait()

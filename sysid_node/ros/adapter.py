@@ -30,12 +30,14 @@ from sysid_node.flight.autopilots.base import (
     adapter_for,
 )
 from sysid_node.flight.autopilots.known import ADAPTERS
+from sysid_node.flight.live.conditions import Conditions
 from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.parameter import Parameter, annotated_yaml, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.diagnostics import Source
+from sysid_node.ros.support.loop_node import UNHEARD, full_name, say
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 #: Autopilots' bridges publish best effort. The queue is deep enough for a burst after a pause of the process.
@@ -100,6 +102,7 @@ class AdapterNode(Node):
             AirSample: (self.create_publisher(AirData, AIR_DATA, 100), air_message),
             JointSample: (self.create_publisher(JointState, ACTUATORS, 100), joint_message),
         }
+        self._conditions = Conditions()
         self._monitors = [self._listen(kind, topic) for topic, kind in kinds.items()]
         self.add_on_set_parameters_callback(_refuse)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -130,7 +133,13 @@ class AdapterNode(Node):
         return receive
 
     def _on_tick(self) -> None:
-        status = Source(self.get_name(), self._name).input(self._monitors, {}, self._stale_after)
+        present = {
+            monitor.name: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
+            for monitor in self._monitors
+            if monitor.waited() > UNHEARD
+        }
+        say(self, self._conditions.update(present))
+        status = Source(full_name(self), self._name).input(self._monitors, {}, self._stale_after)
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
