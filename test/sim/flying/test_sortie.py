@@ -6,6 +6,7 @@ from plain import make_aircraft, three_axes
 
 from sysid_node.aircraft.model import Control
 from sysid_node.errors import InputError
+from sysid_node.flight.servos import Servo, ServoState, give, move
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import START_NS, Recorder
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
@@ -129,6 +130,34 @@ def test_stamp_delay_of_the_actuators(fast, moves):
     late = recorder.record(fly_sortie(fast, moves, SortieConditions(["actuator_stamp_delay:delay=0.05"], noise=0.0)))
     plain = recorder.record(fly_sortie(fast, moves, SortieConditions(noise=0.0)))
     np.testing.assert_allclose(late.actuators.positions[5:], plain.actuators.positions[:-5], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("effects", "servo"),
+    [
+        (["actuator_lag:time_constant=0.05"], Servo(0.05)),
+        (["actuator_lag:time_constant=0.05", "command_delay:delay=0.02"], Servo(0.05, delay=0.02)),
+    ],
+)
+def test_recorded_commands_move_the_surfaces_as_the_servo_model_says(fast, moves, effects, servo):
+    """The identifier's servo, from the messages of the commands alone, against the simulator's own surfaces.
+
+    The simulator ramps to a command within a step h, the servo jumps in its middle: they differ by h^2 / 24 T^2 of it.
+    """
+    conditions = SortieConditions(effects, autopilot=False, noise=0.0, command_rate=50.0)
+    steps = 0.05 * np.sign(np.sin(2.0 * np.pi * np.arange(len(moves)) * fast.step))[:, None] * [1.0, 1.0, 1.0, 0.0]
+    sortie = fly_sortie(fast, steps[:800], conditions)
+    commands = Recorder().commands(sortie)
+    assert np.diff(commands.arrival.stamp_ns)[1:] == pytest.approx(20_000_000, abs=1)
+    state, found = ServoState(servo), []
+    for stamp, row in zip(commands.arrival.stamp_ns.tolist(), commands.positions.tolist(), strict=True):
+        give(state, stamp, row[0])
+    for i in range(800):
+        found.append(move(state, START_NS + round(i * fast.step * 1e9))[0])
+    expected = np.asarray(sortie.flight.surfaces)[:, 0]
+    resolution, curvature = 2.0**-15, 0.1 * (fast.step / 0.05) ** 2 / 24.0
+    settled = np.abs(np.diff(np.asarray(sortie.flight.commands)[:, 0], prepend=0.0)) == 0.0  # not within a ramp
+    np.testing.assert_allclose(np.array(found)[settled], expected[settled], atol=resolution + 2.0 * curvature)
 
 
 def test_measured_surfaces_and_mixed_joints(moves):
