@@ -10,6 +10,7 @@ truth, and those that are more than four standard errors off.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,7 +103,9 @@ def row(name: str, flights: int, turbulence: str) -> list[str]:
         measured = Recorder(actuator_rate=POSITION_RATE, surfaces="measured").record(sortie)
         positions.add(estimated(measured, "positions"), sortie.derivatives)
         commands.add(estimated(Recorder().record(sortie), "auto"), sortie.derivatives)
-    return [name, *positions.cells(flights), *commands.cells(flights)]
+    cells = [name, *positions.cells(flights), *commands.cells(flights)]
+    print(" | ".join(cells), file=sys.stderr, flush=True)  # a long bench says how far it is
+    return cells
 
 
 def main() -> None:

@@ -137,6 +137,7 @@ def test_stamp_delay_of_the_actuators(fast, moves):
     [
         (["actuator_lag:time_constant=0.05"], Servo(0.05)),
         (["actuator_lag:time_constant=0.05", "command_delay:delay=0.02"], Servo(0.05, delay=0.02)),
+        (["actuator_lag:time_constant=0.05:damping=0.7"], Servo(0.05, 0.7)),
     ],
 )
 def test_recorded_commands_move_the_surfaces_as_the_servo_model_says(fast, moves, effects, servo):
