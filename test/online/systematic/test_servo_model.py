@@ -1,0 +1,44 @@
+"""The response of a servo in the frequency domain against exact responses."""
+
+import numpy as np
+import pytest
+
+from sysid_node.flight.servos import Servo
+from sysid_node.online.systematic.servo_model import ServoModel, lateness, of_servo, rate_gain
+
+OMEGA = np.linspace(0.6, 12.6, 25)
+S = 1j * OMEGA
+
+
+def response(servo: Servo, applied: Servo = Servo()) -> np.ndarray:
+    """1 + j omega g of one control."""
+    models = [ServoModel(*(np.array([value]) for value in of_servo(one))) for one in (servo, applied)]
+    return 1.0 + S * lateness(models[0], models[1], OMEGA)[:, 0]
+
+
+def test_servos_of_first_and_second_order_are_exact():
+    assert np.allclose(response(Servo(0.08)), 1.0 / (1.0 + 0.08 * S))
+    second = 1.0 / (1.0 + 2.0 * 0.7 * 0.03 * S + (0.03 * S) ** 2)
+    assert np.allclose(response(Servo(0.03, damping=0.7)), second)
+
+
+def test_a_delay_is_right_to_the_third_order():
+    """1 / (1 + x + x^2 / 2) differs from exp(-x) by x^3 / 6 to lowest order."""
+    exact = np.exp(-0.02 * S)
+    assert np.all(np.abs(response(Servo(delay=0.02)) - exact) < np.abs(0.02 * S) ** 3 / 5.0)
+
+
+def test_what_the_alignment_has_applied_is_taken_out():
+    found = response(Servo(0.08), applied=Servo(0.03))
+    assert np.allclose(found, (1.0 + 0.03 * S) / (1.0 + 0.08 * S))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.05])
+def test_the_gain_of_the_rate_is_the_derivative_by_the_lateness(late):
+    def model(by: float) -> ServoModel:
+        return ServoModel(np.array([late + by]), np.array([4e-4]))
+
+    none, step = ServoModel(np.zeros(1), np.zeros(1)), 1e-5
+    h = [1.0 + S * lateness(model(by), none, OMEGA)[:, 0] for by in (-step, 0.0, step)]
+    slope = (h[2] - h[0]) / (2.0 * step)
+    assert np.allclose(slope, rate_gain(model(0.0), OMEGA)[:, 0] * S * h[1], rtol=1e-6)
