@@ -7,6 +7,7 @@ from pathlib import Path
 from sysid_node.report.pages.render import render_page
 from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.sections import (
+    budget,
     derivatives,
     excitation,
     faults,
@@ -22,6 +23,7 @@ from sysid_node.report.sections.section import Section
 SECTIONS: tuple[Section[RunResult], ...] = (
     opening.SECTION,
     derivatives.SECTION,
+    budget.SECTION,
     history.SECTION,
     fit.SECTION,
     excitation.SECTION,

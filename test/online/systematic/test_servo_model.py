@@ -10,7 +10,10 @@ OMEGA = np.linspace(0.6, 12.6, 25)
 S = 1j * OMEGA
 
 
-def response(servo: Servo, applied: Servo = Servo()) -> np.ndarray:
+NONE = Servo()
+
+
+def response(servo: Servo, applied: Servo = NONE) -> np.ndarray:
     """1 + j omega g of one control."""
     models = [ServoModel(*(np.array([value]) for value in of_servo(one))) for one in (servo, applied)]
     return 1.0 + S * lateness(models[0], models[1], OMEGA)[:, 0]

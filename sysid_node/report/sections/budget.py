@@ -1,0 +1,42 @@
+"""What each derivative's uncertainty is made of, and what to weigh, measure or calibrate next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from markupsafe import Markup
+
+from sysid_node.report.results.run_result import RunResult
+from sysid_node.report.sections.section import Section
+from sysid_node.report.wording.names import symbol
+from sysid_node.report.wording.sources import source_words
+
+LISTED = 3  # sources of each derivative
+LEAST = 0.05  # share from which one is listed
+
+
+@dataclass(frozen=True)
+class Row:
+    """One derivative: its largest sources with their shares in percent, and what reduces the first."""
+
+    name: str
+    symbol: Markup
+    sources: str
+    advice: str
+
+
+def context(run: RunResult) -> Mapping[str, Any]:
+    """The rows, in the derivatives' order."""
+    final = run.final
+    return {"rows": [_row(name, shares) for name, shares in final.budget.items() if shares] if final else []}
+
+
+def _row(name: str, shares: Mapping[str, float]) -> Row:
+    largest = [(key, share) for key, share in shares.items() if share >= LEAST][:LISTED]
+    sources = ", ".join(f"{source_words(key)[0]} {100.0 * share:.0f} %" for key, share in largest)
+    return Row(name, symbol(name), sources, source_words(largest[0][0])[1] if largest else "")
+
+
+SECTION: Section[RunResult] = Section("budget", "Error budget", "budget.html.j2", context)
