@@ -20,7 +20,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 NEEDED = {IMU: 20.0, AIR_DATA: 2.0, ACTUATORS: 20.0}
 
 #: The lowest rate (Hz) of commands that move in steps: between samples the time of a step is not known.
-NEEDED_FOR_STEPS = 100.0
+NEEDED_FOR_STEPS = 50.0
 
 
 #: Throttle and flaps stand still or step in every flight, and are no input of a manoeuvre.

@@ -72,8 +72,12 @@ def px4_log(
     drop: tuple[str, ...] = (),
     vehicle_type: int = 2,
     jump: float = 0.0,
+    torque: float = 0.0,
 ) -> FlightRecord:
-    """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway."""
+    """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
+
+    ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly.
+    """
     record = flight()
     us = microseconds(record)
     middle = int(us[us.size // 2])
@@ -102,6 +106,10 @@ def px4_log(
         Topic("vehicle_land_detected", us[:1], {"landed": ("bool", np.array([False]))}),
         *_px4_controls(us[at["controls"]], commands, old=old, elevons=elevons),
     ]  # fmt: skip
+    if torque:
+        fine = picked(record, torque)
+        scaled = fractions(record)[fine][:, :3] * np.array([0.5, 0.8, 1.2])
+        topics.append(Topic("vehicle_torque_setpoint", us[fine], {"xyz[3]": ("float", scaled)}))
     parameters = {} if old else _px4_parameters(elevons=elevons)
     kept = [topic for topic in topics if topic.name not in drop]
     release = 0x010B0200 if old else 0x010E0000

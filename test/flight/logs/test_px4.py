@@ -45,6 +45,18 @@ def test_messages_are_in_the_order_in_which_they_were_logged(tmp_path):
     assert np.all(np.diff(stamps[np.argsort(order)]) >= 0)
 
 
+def test_the_torque_setpoint_stands_for_slow_servos(tmp_path):
+    """Servos at PX4's default of 10 Hz, the torque at 50 Hz: commands are known as often as the torque."""
+    record = px4_log(tmp_path / "flight.ulg", PX4_DEFAULT, torque=50.0)
+    flight = open_log(tmp_path / "flight.ulg")
+    assert flight.streams.actuators.source == "vehicle_torque_setpoint"
+    assert any("reproduces actuator_servos" in remark for remark in flight.remarks)
+    back = load_flight_record(tmp_path / "flight.ulg", aircraft())
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    for name in ("de", "da", "dr"):
+        assert np.std(back[name] - record[name][at]) < 0.1 * np.std(record[name])
+
+
 def test_slow_airspeed_moves_as_the_imu_says(tmp_path):
     """Completed by the IMU, the airspeed is as near to the measured one as a line between the samples, or nearer."""
     record = px4_log(tmp_path / "flight.ulg", {**FULL_RATES, "airspeed": 2.0, "attitude": 20.0})

@@ -29,10 +29,10 @@ def test_a_log_of_steps_needs_a_higher_rate():
     """3-2-1-1 in steps at 25 Hz is refused, a sine at the same rate is not."""
     stamps = np.arange(0, 400, dtype=np.int64) * 40_000_000
     time = stamps / 1e9
-    for commands, needed in ((np.sign(np.sin(1.7 * time)), 100.0), (np.sin(1.7 * time), 20.0)):
+    for commands, needed in ((np.sign(np.sin(1.7 * time)), 50.0), (np.sin(1.7 * time), 20.0)):
         other = Signal("IMU", stamps, np.zeros((400, 6)))
         controls = Commands(("elevator",), Signal("RCOU", stamps, 0.2 * commands[:, np.newaxis]))
         log = AutopilotLog("x", "ArduPlane", other, absent("ATT", 4), other, other, controls, controls)
         found = rates_of_log(log)["actuators"]
         assert found.needed == needed
-        assert (found.fault == "RCOU comes at 25 Hz; 100 Hz are needed for commands in steps") == (needed == 100.0)
+        assert (found.fault == "RCOU comes at 25 Hz; 50 Hz are needed for commands in steps") == (needed == 50.0)
