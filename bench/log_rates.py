@@ -130,10 +130,10 @@ class Outcome(NamedTuple):
     error: float
 
 
-def outcomes(flight: str, rates: Rates, seed: int, *, vanes: bool) -> list[Outcome]:
+def outcomes(flight: str, rates: Rates, seed: int, *, vanes: bool, ideal: bool) -> list[Outcome]:
     """Of all derivatives of a flight."""
     truth, known = read_truth(BAGS / flight), load_aircraft(flight[:4])
-    estimates = estimated(drawn(known, seed), logged(BAGS / flight, rates, vanes=vanes))
+    estimates = estimated(replace(drawn(known, seed), ideal=ideal), logged(BAGS / flight, rates, vanes=vanes))
     found = []
     for row in estimates.derivatives.values():
         if row.name not in truth or row.name.endswith("_0"):
@@ -149,15 +149,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--page", type=Path)
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--ideal", action="store_true", help="intervals without what tolerances add to them")
     args = parser.parse_args()
     for name, flights, vanes in TABLES:
-        rows = [_row(label, rates, flights, args.seeds, vanes=vanes) for label, rates in LOGS.items()]
+        rows = [_row(label, rates, flights, args.seeds, vanes=vanes, ideal=args.ideal) for label, rates in LOGS.items()]
         heads = ("log", "valid", "of these hold the truth", "median error of all, in tolerances", "of the valid")
         publish(f"bench/log_rates.py {name}", table(heads, rows), args.page)
 
 
-def _row(label: str, rates: Rates, flights: Sequence[str], seeds: int, *, vanes: bool) -> tuple[str, ...]:
-    every = [one for flight in flights for seed in range(seeds) for one in outcomes(flight, rates, seed, vanes=vanes)]
+def _row(label: str, rates: Rates, flights: Sequence[str], seeds: int, *, vanes: bool, ideal: bool) -> tuple[str, ...]:
+    every = [
+        one
+        for flight in flights
+        for seed in range(seeds)
+        for one in outcomes(flight, rates, seed, vanes=vanes, ideal=ideal)
+    ]
     valid = [one for one in every if one.valid]
     holds = f"{100.0 * sum(one.holds for one in valid) / len(valid):.0f} %" if valid else "-"
     errors = [f"{np.median([one.error for one in some]):.2f}" if some else "-" for some in (every, valid)]
