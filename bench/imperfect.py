@@ -119,7 +119,7 @@ def main() -> None:
     heads = ("imperfection", "positions: valid", "hold", "> 4 s.e.", "commands: valid", "hold", "> 4 s.e.")
     names = [args.only] if args.only else IMPERFECTIONS
     text = table(heads, (row(name, args.flights, args.turbulence) for name in names))
-    said = f"{args.flights} flights in each row, turbulence: {args.turbulence}."
+    said = f"Flights in each row: {args.flights}; turbulence: {args.turbulence}."
     publish("bench/imperfect.py", f"{said}\n\n{text}", args.page)
 
 
