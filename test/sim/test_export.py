@@ -1,6 +1,7 @@
 """Exported models: JSBSim flies its model as our simulator does; the others hold their simulators' numbers."""
 
 import math
+from dataclasses import replace
 from xml.etree.ElementTree import fromstring
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import yaml
 from plain import DERIVATIVES, make_aircraft, steps
 
+from sysid_node.aircraft.model import Table
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.export.gazebo import gazebo_plugin
@@ -20,20 +22,27 @@ RATE, SECONDS, SUBSTEPS = 400.0, 10.0, 8
 #: Effects, one at a time, that both programs have.
 CASES = {
     "file": {},
-    "lag": {"actuator_lag": {"time_constant": 0.08}},
+    "lag": {"actuator_lag": {"elevator": 0.12, "aileron": 0.04, "rudder": 0.08}},
     "rate limit": {"actuator_rate_limit": {"rate": 0.35}},
     "delay": {"command_delay": {"delay": 0.07}},
     "CG shift": {"cg_shift": {"x": 0.02, "y": 0.004, "z": 0.01}},
     "thrust line": {"thrust_line_offset": {"arm": 0.03}},
     "derivatives": {"derivative_error": {"Cm_alpha": -0.1, "Cn_beta": 0.01}},
+    "tables": {},
 }
+
+TABLES = (
+    Table("CL", ("alpha",), ((-0.2, 0.05, 0.08, 0.4),), (-0.05, 0.0, 0.02, -0.1)),
+    Table("Cm", ("alpha", "de"), ((0.0, 0.1), (-0.2, 0.0, 0.2)), ((0.01, 0.0, 0.01), (-0.01, -0.02, 0.02))),
+    Table("CD", ("V",), ((10.0, 18.0, 25.0),), (0.01, 0.0, 0.02)),
+)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_jsbsim_flies_as_we_do(tmp_path, case):
     """10 s of 3-2-1-1 from trim: rates and flow angles within 0.5 % of their range."""
     jsbsim_flight = pytest.importorskip("jsbsim_flight", reason="JSBSim is not installed")
-    simulator = Simulator(make_aircraft(), RATE)
+    simulator = Simulator(replace(make_aircraft(), tables=TABLES if case == "tables" else ()), RATE)
     theta = simulator.vector(CASES[case])
     trim = trim_flight(simulator, theta=theta)
     time = np.arange(round(SECONDS * RATE) + 1) / RATE

@@ -218,7 +218,7 @@ def _table(parent: Element, table: Table, positions: Mapping[str, tuple[str, ...
     lines = [" ".join(map(repr, row)) for row in rows]
     if len(table.over) == 2:
         lines.insert(0, " ".join(repr(x * scales[1]) for x in table.points[1]))
-    _text(element, "tableData", "\n" + "\n".join(lines) + "\n")
+    SubElement(element, "tableData").text = "\n" + "\n".join(lines) + "\n"  # a row a line
 
 
 def _product(parent: Element, *properties: str) -> Element:
