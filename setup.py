@@ -19,10 +19,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
-        *(
-            (f"{SHARE}/{folder}", files_of(folder))
-            for folder in ("config", "config/aircraft", "config/layouts", "launch")
-        ),
+        *((f"{SHARE}/{folder}", files_of(folder)) for folder in DATA),
     ],
     zip_safe=False,
     maintainer="sysid maintainers",
