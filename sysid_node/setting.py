@@ -9,6 +9,9 @@ from sysid_node.errors import InputError
 
 BOOLEANS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
 
+#: Hz: below, no flight is long enough; above, no aircraft moves. And the number of lines that fit into memory.
+LOWEST, HIGHEST, MOST_LINES = 1e-4, 1e4, 100_000
+
 
 def parse_setting(key: str, kind: Any, value: Any) -> Any:
     """The value as a ``kind``: a plain type, or a tuple of frequencies (three numbers) or of names.
@@ -35,3 +38,8 @@ def check_frequencies(frequencies: tuple[float, float, float]) -> None:
     start, step, stop = frequencies
     if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
         raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected 0 < start < stop and step > 0, in Hz")
+    if start < LOWEST or stop > HIGHEST or (stop - start) / step > MOST_LINES:
+        raise InputError(
+            f"frequencies {start:g}:{step:g}:{stop:g}: expected {LOWEST:g} to {HIGHEST:g} Hz and"
+            f" at most {MOST_LINES} lines"
+        )

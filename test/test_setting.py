@@ -48,3 +48,9 @@ def test_others_are_refused_in_one_line(kind: Any, value: Any, wanted: str) -> N
 def test_frequencies_must_rise_from_above_zero(frequencies: Frequencies) -> None:
     with pytest.raises(InputError, match="expected 0 < start < stop and step > 0, in Hz"):
         check_frequencies(frequencies)
+
+
+@pytest.mark.parametrize("text", ["1e-300:1e-300:1e-299", "1e300:1e300:1e301", "0.1:1e-300:1"])
+def test_frequencies_that_no_flight_has_or_too_many_are_refused(text):
+    with pytest.raises(InputError, match=r"at most 100000 lines"):
+        check_frequencies(parse_setting("frequencies", tuple[float, float, float], text))

@@ -114,7 +114,7 @@ def _compare_attitude_with_rates(time: Array, columns: Mapping[str, Array]) -> N
         low, high = _DEGREES
         if low < ratio < high:
             raise InputError(f"{angle} changes {ratio:.0f} times as much as {rate} says; is {angle} in degrees?")
-        if low < 1.0 / ratio < high:
+        if ratio * low < 1.0 < ratio * high:
             raise InputError(f"{angle} changes {1 / ratio:.0f} times less than {rate} says; is {rate} in deg/s?")
 
 
@@ -135,7 +135,7 @@ def _ratio(time: Array, angle: Array | None, rate: Array | None) -> float | None
     near = np.abs(y) < full / 2.0  # a heading that passes north
     x, y = x[near], y[near]
     scale = float(np.sqrt((x @ x) * (y @ y))) if x.size > 10 else 0.0
-    if not scale or float(x @ y) < _CORRELATED * scale:
+    if not (0.0 < scale < math.inf and float(x @ y) >= _CORRELATED * scale and float(x @ x)):
         return None
     return float(x @ y) / float(x @ x)
 

@@ -98,7 +98,7 @@ def _solve(
 
     solution = least_squares(
         residual,
-        start[free],
+        np.clip(start, *bounds)[free],  # a mass that no thrust can carry starts beyond them
         slope,
         bounds=(bounds[0][free], bounds[1][free]),
         x_scale=np.where(free == len(start) - 1, simulator.aircraft.mass, 0.1),
