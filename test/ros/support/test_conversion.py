@@ -22,10 +22,13 @@ def test_estimates_survive_to_the_last_bit() -> None:
     estimates = Estimates(
         0.1,
         {
-            "Cm_alpha": DerivativeEstimate("Cm_alpha", -1 / 3, 0.1, -0.5, -0.1, True, "ok"),
-            "Cm_q": DerivativeEstimate("Cm_q", -2 / 3, math.inf, -math.inf, math.inf, False, "not excited"),
+            "Cm_alpha": DerivativeEstimate("Cm_alpha", -1 / 3, 0.1, -0.5, -0.1, True, "ok", 0.08, 0.06),
+            "Cm_q": DerivativeEstimate(
+                "Cm_q", -2 / 3, math.inf, -math.inf, math.inf, False, "not excited", math.inf, 0.0
+            ),
         },
         {"Cm": FitQuality("Cm", 0.9, 1e-3, 7.5, 12)},
+        {"elevator": DerivativeEstimate("elevator", 0.03, 0.002, 0.026, 0.034, True, "ok", 0.002, 0.0)},
     )
     raw = EstimatesSerialiser(fields_of, "cdrw", "sls_rft").one(estimates, START_NS + 100_000_000, "base_link")
     message = deserialize_message(raw, DerivativeEstimates)
