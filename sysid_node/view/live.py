@@ -121,8 +121,9 @@ class LiveScene:
             keep = time > last.time[-1]
             time = np.append(last.time[-1:], time[keep])
             columns = {n: np.append(last[n][-1:], values[keep]) for n, values in columns.items()}
-        order = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
-        time, columns = time[order], {n: values[order] for n, values in columns.items()}
+        newest = np.maximum.accumulate(np.append(-np.inf, time))[:-1]
+        later = time > newest  # messages may arrive out of order
+        time, columns = time[later], {n: values[later] for n, values in columns.items()}
         if time.size < 2:
             return None
         self._last = FlightRecord(time, columns)
@@ -189,6 +190,7 @@ def _held(
     """Messages' values at times (N,), interpolated; without a message the last known values, or NaN."""
     if not messages:
         return {n: np.full(time.shape, last[n][-1] if last is not None else np.nan) for n in names}
+    messages = sorted(messages, key=lambda message: message[0])
     at = np.array([(stamp - start_ns) / 1e9 for stamp, _ in messages])
     table = np.array([values for _, values in messages], dtype=float)
     return {name: np.interp(time, at, table[:, k]) for k, name in enumerate(names)}
