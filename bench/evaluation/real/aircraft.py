@@ -12,6 +12,7 @@ from pathlib import Path
 import yaml
 
 from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.reading.body import default_noise_bias
 
 CONTROLS = {"elevator": "de", "aileron": "da", "rudder": "dr"}
 
@@ -84,4 +85,7 @@ def _aircraft(
         controls={c: Control(c, CONTROLS[c], {c: 1.0}) for c in controls},
         derivatives=dict(beliefs),
         throttle=throttle,
+        # as exact as the programs take it that the estimates are compared with
+        ideal=True,
+        noise_bias=default_noise_bias(ideal=True),
     )
