@@ -43,6 +43,12 @@ class Axis:
         return cls(kept, centre, step)
 
 
+    @property
+    def middle(self) -> int:
+        """The index of the steady flight's node."""
+        return int(np.argmin(np.abs(self.nodes - self.centre)))
+
+
 @dataclass(frozen=True)
 class Expansion:
     """Derivatives by name and tables that together are the function at every node of every pair of variables."""
@@ -74,7 +80,7 @@ def expand(function: Function, axes: Mapping[str, Axis], tolerance: Array) -> Ex
                 slope = 0.0
             rest = alone[name][:, k] - slope * (axis.nodes - axis.centre)
             if np.abs(rest).max() > tolerance[k]:
-                keep = thinned(axis.nodes, rest[:, None], tolerance[k])
+                keep = thinned(axis.nodes, rest[:, None], tolerance[k], axis.middle)
                 tables.append(Table(coefficient, (name,), (_numbers(axis.nodes[keep]),), _numbers(rest[keep])))
         derivatives[f"{coefficient}_0"] = offset
     for first, second in combinations(axes, 2):
@@ -125,10 +131,17 @@ def largest_error(
     return np.abs(found - evaluate(expansion, points)).max(axis=0), np.ptp(found, axis=0)
 
 
-def thinned(nodes: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
-    """Nodes to keep so that linear interpolation is right within the tolerance at all (Douglas & Peucker, 1973)."""
-    keep = {0, len(nodes) - 1}
-    open_parts = [(0, len(nodes) - 1)]
+def thinned(nodes: Array, values: Array, tolerance: float, middle: int | None = None) -> NDArray[np.intp]:
+    """Nodes to keep so that linear interpolation is right within the tolerance at all (Douglas & Peucker, 1973).
+
+    ``middle`` is the index of a node that is kept, for there the tables are to be exact: it is the steady flight.
+    Where the two ends alone are right, nothing but they is needed.
+    """
+    last = len(nodes) - 1
+    if middle is None or not 0 < middle < last or _straight(nodes, values, 1e-3 * tolerance):
+        open_parts, keep = [(0, last)], {0, last}
+    else:
+        open_parts, keep = [(0, middle), (middle, last)], {0, middle, last}
     while open_parts:
         low, high = open_parts.pop()
         if high - low < 2:
@@ -138,10 +151,16 @@ def thinned(nodes: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
         miss = np.abs(values[inner] - (1.0 - share) * values[low] - share * values[high]).max(axis=1)
         worst = int(np.argmax(miss))
         if miss[worst] > tolerance:
-            middle = low + 1 + worst
-            keep.add(middle)
-            open_parts += [(low, middle), (middle, high)]
+            between = low + 1 + worst
+            keep.add(between)
+            open_parts += [(low, between), (between, high)]
     return np.array(sorted(keep))
+
+
+def _straight(nodes: Array, values: Array, tolerance: float) -> bool:
+    """Whether the ends alone give every value."""
+    share = ((nodes - nodes[0]) / (nodes[-1] - nodes[0]))[:, None]
+    return bool(np.abs(values - (1.0 - share) * values[0] - share * values[-1]).max() <= tolerance)
 
 
 def _pair(
@@ -155,17 +174,15 @@ def _pair(
 ) -> list[Table]:
     """Tables of what two variables add together beyond what each adds by itself."""
     first, second = (axes[name].nodes for name in names)
-    corners = (first[[0, -1]], second[[0, -1]]) if min(len(first), len(second)) else (first, second)
     grid = _along(function, centre, dict(zip(names, (first, second), strict=True)))
     joint = grid - alone[names[0]][:, None, :] - alone[names[1]][None, :, :] - f0
-    del corners
     tables = []
     for k, coefficient in enumerate(COEFFICIENTS):
         part = joint[:, :, k]
         if np.abs(part).max() <= tolerance[k]:
             continue
-        rows = thinned(first, part, 0.5 * tolerance[k])
-        columns = thinned(second, part.T, 0.5 * tolerance[k])
+        rows = thinned(first, part, 0.5 * tolerance[k], axes[names[0]].middle)
+        columns = thinned(second, part.T, 0.5 * tolerance[k], axes[names[1]].middle)
         values = tuple(_numbers(row) for row in part[np.ix_(rows, columns)])
         tables.append(Table(coefficient, names, (_numbers(first[rows]), _numbers(second[columns])), values))
     return tables

@@ -57,6 +57,7 @@ class Program:
         said = collect_messages()
         self.fdm: Any = jsbsim.FGFDMExec(str(files.folder))
         self.fdm.set_debug_level(0)
+        self._rate = rate
         self.fdm.set_dt(1.0 / rate)  # lags and delays freeze when the model is read
         folders = (str(files.folder.parent), str(files.engines), str(files.systems))
         try:
@@ -119,7 +120,13 @@ class Program:
         self.fdm.run()
         self.fdm.get_propulsion().get_steady_state()
         self.fdm.run()
+        self._resume()
+
+    def _resume(self) -> None:
+        """Integrate again; an engine that was started within a suspension has made JSBSim forget its step."""
         self.fdm.resume_integration()
+        if self.fdm.integration_suspended():
+            self.fdm.set_dt(1.0 / self._rate)
 
     def _levers(self, throttle: float) -> None:
         for i in range(self.engines):
@@ -202,7 +209,7 @@ class Program:
         self.fdm.suspend_integration()
         for _ in range(frames):
             self.fdm.run()
-        self.fdm.resume_integration()
+        self._resume()
 
     def read(self, names: Sequence[str]) -> Array:
         """Values of properties."""
