@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 SECONDS, RATE, SUBSTEPS = 10.0, 200.0, 6
 SIGNALS = ("p", "q", "r", "alpha", "beta")
 ALLOWED = 0.02
-_READ = tuple(f"velocities/{axis}-rad_sec" for axis in "pqr") + ("aero/alpha-rad", "aero/beta-rad")
+_READ = (*(f"velocities/{axis}-rad_sec" for axis in "pqr"), "aero/alpha-rad", "aero/beta-rad")
 _BEGINS = {"elevator": 0.5, "aileron": 3.5, "rudder": 6.5}  # s
 
 
@@ -152,7 +152,8 @@ def _why(model: JsbsimModel, theirs: Array, ours: Array, errors: Array) -> str:
         return ""
     largest = np.abs(theirs).max(axis=0)
     if largest[3] > 0.35 or largest[4] > 0.35:
-        return f"it leaves controlled flight (alpha {np.rad2deg(largest[3]):.0f}, beta {np.rad2deg(largest[4]):.0f} degrees)"
+        angles = np.rad2deg(largest[3:])
+        return f"it leaves controlled flight (alpha {angles[0]:.0f}, beta {angles[1]:.0f} degrees)"
     first = np.argmax((np.abs(ours - theirs) > ALLOWED * np.ptp(theirs, axis=0)).any(axis=1)) / RATE
     return f"{SIGNALS[int(np.argmax(errors))]} from {first:.1f} s on"
 

@@ -5,31 +5,42 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
 
 X = np.array([-0.2, 0.0, 0.05, 0.35])
 Y = np.array([-0.3, 0.1, 0.4])
 RANDOM = np.random.default_rng(4)
 AT = RANDOM.uniform(-0.6, 0.6, (200, 2))
+LINE, GRID, LONG = RANDOM.standard_normal(X.size), RANDOM.standard_normal((X.size, Y.size)), RANDOM.standard_normal(9)
+LONG_X = np.linspace(-0.5, 0.5, 9)
+
+#: Of one variable and of two, of different lengths.
+TABLES = pack([((X,), LINE), ((X, Y), GRID), ((LONG_X,), LONG)])
+
+
+def looked_up(xp=np, tables=TABLES, at=AT):
+    return interpolate(tables, xp.stack([at[:, 0]] * 3, -1), xp.stack([at[:, 0], at[:, 1], at[:, 0]], -1), xp)
 
 
 def test_one_variable_is_numpys_interpolation_held_beyond_the_ends():
-    values = RANDOM.standard_normal(X.size)
-    np.testing.assert_allclose(interpolate([X], values, [AT[:, 0]], np), np.interp(AT[:, 0], X, values), atol=1e-14)
+    found = looked_up()
+    np.testing.assert_allclose(found[:, 0], np.interp(AT[:, 0], X, LINE), atol=1e-14)
+    np.testing.assert_allclose(found[:, 2], np.interp(AT[:, 0], LONG_X, LONG), atol=1e-14)
 
 
 def test_two_variables_are_scipys_bilinear_interpolation():
-    values = RANDOM.standard_normal((X.size, Y.size))
     held = np.column_stack([np.clip(AT[:, 0], X[0], X[-1]), np.clip(AT[:, 1], Y[0], Y[-1])])
-    expected = RegularGridInterpolator((X, Y), values)(held)
-    np.testing.assert_allclose(interpolate([X, Y], values, [AT[:, 0], AT[:, 1]], np), expected, atol=1e-14)
-    scalar = interpolate(
-        [jnp.asarray(X), jnp.asarray(Y)], jnp.asarray(values), [jnp.asarray(0.02), jnp.asarray(0.2)], jnp
-    )
-    np.testing.assert_allclose(scalar, RegularGridInterpolator((X, Y), values)([0.02, 0.2])[0], atol=1e-14)
+    np.testing.assert_allclose(looked_up()[:, 1], RegularGridInterpolator((X, Y), GRID)(held), atol=1e-14)
+
+
+def test_jax_gives_the_same_for_series_and_for_scalars():
+    tables = PackedTables(*(jnp.asarray(part) for part in TABLES))
+    np.testing.assert_allclose(looked_up(jnp, tables, jnp.asarray(AT)), looked_up(), atol=1e-12)
+    one = interpolate(tables, jnp.asarray(AT[5, [0, 0, 0]]), jnp.asarray(AT[5, [0, 1, 0]]), jnp)
+    np.testing.assert_allclose(one, looked_up()[5], atol=1e-12)
 
 
 def test_the_slope_is_that_of_the_interval():
-    values = RANDOM.standard_normal(X.size)
-    slope = jax.grad(lambda x: interpolate([jnp.asarray(X)], jnp.asarray(values), [x], jnp))(0.2)
-    np.testing.assert_allclose(slope, (values[3] - values[2]) / (X[3] - X[2]))
+    tables = PackedTables(*(jnp.asarray(part) for part in TABLES))
+    slope = jax.grad(lambda x: interpolate(tables, jnp.full(3, x), jnp.zeros(3), jnp)[0])(0.2)
+    np.testing.assert_allclose(slope, (LINE[3] - LINE[2]) / (X[3] - X[2]))

@@ -42,7 +42,6 @@ class Axis:
         kept[np.argmin(np.abs(kept - centre))] = centre
         return cls(kept, centre, step)
 
-
     @property
     def middle(self) -> int:
         """The index of the steady flight's node."""

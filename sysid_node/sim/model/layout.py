@@ -18,6 +18,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.linear_model import level_flight
+from sysid_node.dynamics.lookup import PackedTables, pack
 from sysid_node.errors import InputError
 
 #: A scalar, or a time series of one: stations and effects work on either.
@@ -67,7 +68,7 @@ class Model(NamedTuple):
     imu: Scalar  # (3,) m from the CG, FRD
     air_data: Scalar  # (3,)
     noise: Scalar  # (12,) 1 sigma of each output
-    tables: tuple[tuple[Scalar, ...], ...] = ()  # points of each variable, then the values, of each lookup table
+    tables: PackedTables | tuple[()] = ()  # the lookup tables in the layout's order
 
 
 #: What the sensors measure, in the order of ``SimulatedFlight.outputs``. Units of FlightRecord's columns.
@@ -111,10 +112,11 @@ def model_of(aircraft: Aircraft) -> Model:
         "air_data": aircraft.sensors.air_data,
         "noise": [aircraft.noise[name] for name in _NOISE_OF],
     }
-    tables = tuple(
-        tuple(jnp.asarray(part, dtype=float) for part in (*table.points, table.values)) for table in aircraft.tables
-    )
-    return Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()}, tables=tables)
+    model = Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})  # type: ignore[arg-type]
+    if not aircraft.tables:
+        return model
+    packed = pack([(table.points, table.values) for table in aircraft.tables])
+    return model._replace(tables=PackedTables(*(jnp.asarray(part) for part in packed)))
 
 
 def reference_flight(aircraft: Aircraft) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from sysid_node.dynamics.airflow import stability_axes
 from sysid_node.dynamics.atmosphere import speed_of_sound
 from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, regressors, with_polar
 from sysid_node.dynamics.forces import force_and_moment
-from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.lookup import PackedTables, interpolate
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import (
     control_nonlinearity,
@@ -55,10 +55,12 @@ def coefficients(
     derivative = dict(zip(layout.derivatives, model.derivatives, strict=True))
     error = effects["derivative_error"]
 
+    added = looked_up(layout, model, x)
+
     def linear(coefficient: str) -> Scalar:
         terms = ((derivative[name] + error[name], regressor) for name, regressor in layout.terms(coefficient))
         total: Scalar = linear_coefficient(terms, x, jnp.zeros_like(x["alpha"]))
-        return total + looked_up(layout, model, coefficient, x) if layout.tables else total
+        return total + added[coefficient] if coefficient in added else total
 
     alpha = x["alpha"] - model.alpha
     ground = ground_effect.share(effects["ground_effect"], climb, model.span)
@@ -84,14 +86,21 @@ def coefficients(
     )
 
 
-def looked_up(layout: Layout, model: Model, coefficient: str, x: dict[str, Scalar]) -> Scalar:
-    """What the aircraft file's lookup tables add to a coefficient; ``x`` are the regressors."""
-    total = jnp.zeros_like(x["alpha"])
-    for (name, over), (*points, values) in zip(layout.tables, model.tables, strict=True):
-        if name == coefficient:
-            at = [x[variable] * model.airspeed if variable == "V" else x[variable] for variable in over]
-            total = total + interpolate(points, values, at, jnp)
-    return total
+def looked_up(layout: Layout, model: Model, x: dict[str, Scalar]) -> dict[str, Scalar]:
+    """What the aircraft file's lookup tables add to each coefficient that has any; ``x`` are the regressors."""
+    if not isinstance(model.tables, PackedTables):
+        return {}
+    variables = sorted({variable for _, over in layout.tables for variable in over})
+    series = [x[name] * model.airspeed if name == "V" else x[name] for name in variables]
+    columns = jnp.stack(jnp.broadcast_arrays(*series), -1)
+    places = [[variables.index(over[0]), variables.index(over[-1])] for _, over in layout.tables]
+    first, second = (columns[..., [place[k] for place in places]] for k in (0, 1))
+    values = interpolate(model.tables, first, second, jnp)
+    owners = [coefficient for coefficient, _ in layout.tables]
+    return {
+        name: values[..., [i for i, owner in enumerate(owners) if owner == name]].sum(-1)
+        for name in dict.fromkeys(owners)
+    }
 
 
 def of_alpha_rate(model: Model, effects: dict[str, Values], air: Air, rate: Scalar) -> Coefficients:
