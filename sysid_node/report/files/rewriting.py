@@ -14,6 +14,7 @@ from sysid_node.report.pages.closed_loop_page import write_loop
 #: Why the page of a folder cannot be made from its files alone, by the command.
 _NEEDS_THE_WORK = {
     "gap": "its report shows more than its files hold, so sysid gap alone writes it; run sysid gap again",
+    "aircraft": "its report shows more than its files hold, so sysid aircraft alone writes it; run it again",
     "excite": "its report shows more than its files hold, so sysid excite alone writes it; run sysid excite again",
 }
 
@@ -39,6 +40,8 @@ def rewrite_report(folder: Path) -> Path:
 
 def _command_of(folder: Path) -> tuple[str, dict[str, Any]]:
     """The command that wrote a folder, and the content of its ``summary.json``; ``""`` where neither is known."""
+    if (folder / "aircraft.json").is_file():
+        return "aircraft", {}
     if (folder / "gap.json").is_file():
         return "gap", {}
     try:
