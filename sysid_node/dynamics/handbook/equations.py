@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft, Inertia
+from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.dynamics.airflow import flow_rates, velocity_of
 from sysid_node.dynamics.atmosphere import dynamic_pressure, speed_of_sound
 from sysid_node.dynamics.attitude import down_of_euler, euler_rates
 from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, with_polar
 from sysid_node.dynamics.forces import force_and_moment, thrust_axes, thrust_line
-from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
 from sysid_node.dynamics.rigid_body import angular_acceleration, velocity_rate
 from sysid_node.dynamics.vector import Real, Vector
 
@@ -75,12 +76,24 @@ class Equations:
         total = linear_coefficient(
             ((self.aircraft.derivatives[f"{coefficient}_{name}"].value, name) for name in names), x
         )
-        for table in self.aircraft.tables:
-            if table.coefficient == coefficient:
-                points = [np.array(p) for p in table.points]
-                at = np.broadcast_arrays(*(np.asarray(looked[name], dtype=float) for name in table.over))
-                total = total + interpolate(points, np.array(table.values), at, np)
+        if coefficient in self._tables:
+            over, packed = self._tables[coefficient]
+            first = np.stack(np.broadcast_arrays(*(looked[names[0]] for names in over)), -1)
+            other = [looked[names[1]] if len(names) > 1 else 0.0 for names in over]
+            second = np.stack(np.broadcast_arrays(*other, np.zeros(first.shape[:-1]))[:-1], -1)
+            first = np.broadcast_to(first, second.shape)
+            total = total + interpolate(packed, first, second, np).sum(-1)
         return total
+
+    @cached_property
+    def _tables(self) -> dict[str, tuple[tuple[tuple[str, ...], ...], PackedTables]]:
+        """By coefficient, the variables of each table and all tables in one."""
+        found = {}
+        for coefficient in COEFFICIENTS:
+            tables = [table for table in self.aircraft.tables if table.coefficient == coefficient]
+            if tables:
+                found[coefficient] = (tuple(t.over for t in tables), pack([(t.points, t.values) for t in tables]))
+        return found
 
     def rates(self, state: Array, controls: Mapping[str, float], thrust: float) -> Array:
         """Rates (8,) of ``STATES`` with controls (rad, by symbol) and thrust (N) held."""

@@ -7,7 +7,7 @@ import pytest
 from plain import DERIVATIVES, make_aircraft
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Control, Geometry, Inertia, Reference, UncertainValue
+from sysid_node.aircraft.model import Control, Geometry, Inertia, Reference, Table, UncertainValue
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.dynamics.handbook.handbook import handbook
 from sysid_node.dynamics.linear_model import DimensionalScales, linear_model
@@ -62,6 +62,23 @@ def test_a_stated_stall_is_found_where_the_polar_has_it():
     assert "stall_separation" in book.performance.stall_from
     weight = 0.5 * 1.2 * book.performance.stall_speed**2 * 0.5 * book.performance.largest_lift
     assert weight == pytest.approx(4.0 * GRAVITY)
+
+
+def test_tables_count_as_derivatives_do():
+    """A straight table of CL over alpha, and one of Cm over alpha and elevator, in place of a part of derivatives."""
+    alpha, elevator = (-0.3, 0.0, 0.3), (-0.5, 0.5)
+    rows = tuple(tuple(-0.2 * a - 0.4 * e for e in elevator) for a in alpha)
+    tables = (
+        Table("CL", ("alpha",), (alpha,), tuple(1.2 * a for a in alpha)),
+        Table("Cm", ("alpha", "de"), (alpha, elevator), rows),
+    )
+    values = {**DERIVATIVES, "CL_alpha": 3.0, "Cm_alpha": -0.4, "Cm_de": -0.5}
+    mixed, plain = handbook(make_aircraft(values, tables=tables)), handbook(make_aircraft())
+    assert mixed.trim.alpha == pytest.approx(plain.trim.alpha)
+    assert mixed.static_margin == pytest.approx(plain.static_margin)
+    for a, b in zip(mixed.modes, plain.modes, strict=True):
+        assert a.eigenvalue == pytest.approx(b.eigenvalue, rel=1e-6)
+    assert "tables over alpha" in mixed.performance.stall_from
 
 
 def test_best_glide_of_a_parabolic_polar_is_the_closed_formula():
