@@ -96,6 +96,8 @@ def _best_glide(equations: Equations, curve: Polar) -> tuple[float, float, str]:
     notes = [] if 0 < best < curve.alpha.size - 1 else ["at the end of the range of angles"]
     if not (curve.drag > 0.0).all():
         notes.append("the file's drag is below zero at some angles")
+    if any({"V", "Mach"} & {*table.over} for table in equations.aircraft.tables):
+        notes.append("tables over airspeed are taken at the reference; those of an imported file may hold thrust")
     curved = "CD_k" in equations.aircraft.derivatives or any(t.coefficient == "CD" for t in equations.aircraft.tables)
     if not curved:
         notes.append("the file's drag is linear in alpha, so it holds near the reference alone")
