@@ -9,7 +9,7 @@ twice the gain. With the file's derivatives the gains are the baseline's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import plant, regulator
-from sysid_node.dynamics import linear_model
-from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.linear_model import Derivatives, DimensionalScales, LinearModel
+from sysid_node.dynamics.linearised import table_derivatives, trimmed
 
 Array = NDArray[np.float64]
 
@@ -45,6 +44,7 @@ class Axis:
     delay: float  # s, of the commands
     Q: Array  # (n,) weight on the states
     weight: float  # on the surfaces
+    tabulated: Mapping[str, float]  # what lookup tables add to derivatives, in the file or not, near level flight
 
     @property
     def integral(self) -> int:
@@ -62,8 +62,8 @@ class Axis:
         return np.asarray(self.motion(self.named(self.believed)).B[self.moments])
 
     def named(self, values: Array) -> dict[str, Array]:
-        """(..., D) values by name."""
-        return {name: values[..., i] for i, name in enumerate(self.derivatives)}
+        """(..., D) values by name, on top of what the aircraft file's lookup tables add."""
+        return _on_tables({name: values[..., i] for i, name in enumerate(self.derivatives)}, self.tabulated)
 
     def model(self, values: Array) -> LinearModel:
         """The linear model for derivatives (..., D), with the surfaces' lag."""
@@ -90,7 +90,7 @@ def axes(aircraft: Aircraft, lag: float, delay: float) -> tuple[Axis, Axis]:
     plant.check(aircraft)
     reference = aircraft.reference
     condition = DimensionalScales.of(aircraft, reference.airspeed, reference.air_density)
-    alpha, _ = level_flight(aircraft, 1.0)
+    alpha, _ = trimmed(aircraft)
 
     def pitch(values: Derivatives) -> LinearModel:
         return plant.with_integral(plant.with_attitude(plant.longitudinal(values, condition)), 2)
@@ -117,7 +117,10 @@ def _axis(
     known = tuple(d for d in derivatives if d in aircraft.derivatives)
     file = [aircraft.derivatives[d] for d in known]
     values = np.array([derivative.value for derivative in file])
-    whole = plant.behind_actuators(motion(dict(zip(known, values.tolist(), strict=True))), lag)
+    tables = table_derivatives(aircraft)
+    tabulated = {name: tables[name] for name in derivatives if name in tables}
+    model = motion(_on_tables(dict(zip(known, values, strict=True)), tabulated))
+    whole = plant.behind_actuators(model, lag)
     Q = np.zeros(whole.A.shape[-1])
     Q[: len(allowed)] = 1.0 / np.array(allowed) ** 2
     return Axis(
@@ -132,16 +135,15 @@ def _axis(
         delay=delay,
         Q=Q,
         weight=regulator.least_weight(whole, Q, delay),
+        tabulated=tabulated,
     )
+
+
+def _on_tables(values: Mapping[str, Array], tabulated: Mapping[str, float]) -> dict[str, Array]:
+    """The derivatives by name plus what lookup tables add to them."""
+    added = {name: np.asarray(values.get(name, 0.0) + more) for name, more in tabulated.items()}
+    return {**values, **added}
 
 
 #: Plausible sizes of regressors in a manoeuvre: rad, and non-dimensional rates.
 _SIGNALS = {"alpha": 0.05, "beta": 0.05, "p": 0.04, "q": 0.01, "r": 0.02, "de": 0.05, "da": 0.05, "dr": 0.05}
-
-
-def level_flight(aircraft: Aircraft, pressure: float) -> tuple[float, float]:
-    """Alpha and elevator (rad) in level flight, by the file, at ``pressure`` times the reference dynamic pressure."""
-    values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
-    reference = aircraft.reference
-    load = dynamic_pressure(reference.air_density, reference.airspeed) * aircraft.geometry.S * pressure
-    return linear_model.level_flight(values, aircraft.mass * GRAVITY / load)

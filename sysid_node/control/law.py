@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import reference
 from sysid_node.control.adaptation import AxisParameters
-from sysid_node.control.axis import Axis, level_flight
+from sysid_node.control.axis import Axis
 from sysid_node.control.reference import DelayedReference, ReferenceMotion, ReferenceState
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import Command, Measurements, SetPoints
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.linear_model import DimensionalScales
+from sysid_node.dynamics.linearised import linear_derivatives, trimmed
 
 Array = NDArray[np.float64]
 
@@ -45,6 +46,7 @@ class LawState:
     limits: Array  # (3,) rad
     most_thrust: float  # N
     behind: DelayedReference
+    believed: Mapping[str, float]  # the file's derivatives with what lookup tables add near level flight
     reference: ReferenceState | None = None
     airspeed: float = math.nan  # m/s, filtered
     density: float = math.nan
@@ -66,7 +68,8 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
     weight = aircraft.mass * GRAVITY
     limits = np.array([aircraft.controls[c].limit or settings.command_limit for c in ("elevator", "aileron", "rudder")])
     most = 0.0 if throttle is None else throttle.max_thrust or 2.0 * weight
-    return LawState(aircraft, settings, limits, most, DelayedReference(settings.actuator_lag, settings.delay))
+    behind = DelayedReference(settings.actuator_lag, settings.delay)
+    return LawState(aircraft, settings, limits, most, behind, linear_derivatives(aircraft))
 
 
 def step(
@@ -80,12 +83,12 @@ def step(
     """The command now, ``step`` (s) after the last one; ``excitation`` (3,) rad is added to it."""
     scales = _condition(law, measured, points, step)
     pressure = _pressure(law)
-    level, trim = level_flight(law.aircraft, pressure)
+    level, trim = trimmed(law.aircraft, pressure)
     speed = law.aircraft.reference.airspeed
     points = reference.limited(points, level, speed, law.settings)
     if law.reference is None:
         law.reference = ReferenceState(_finite(measured.theta, level), _finite(measured.phi, 0.0))
-    pitch, side = (dict(zip(axis.derivatives, f.values.tolist(), strict=True)) for axis, f in flown)
+    pitch, side = ({name: float(value) for name, value in axis.named(f.values).items()} for axis, f in flown)
     s = law.settings
     flight = reference.FlightCondition(
         law.airspeed, level, scales.force * side.get("CY_beta", 0.0), s.bandwidth, s.largest_pitch, s.largest_roll
@@ -219,7 +222,7 @@ def _thrust(
     """Thrust (N): drag in level flight, weight along the climb, and feedback of the airspeed."""
     if law.most_thrust == 0.0:
         return 0.0
-    d = {name: derivative.value for name, derivative in law.aircraft.derivatives.items()}
+    d = law.believed
     load: float = dynamic_pressure(law.density, law.airspeed) * law.aircraft.geometry.S
     weight = law.aircraft.mass * GRAVITY
     drag = d.get("CD_0", 0.0) + d.get("CD_alpha", 0.0) * level + d.get("CD_k", 0.0) * (weight / load) ** 2

@@ -12,7 +12,8 @@ from made_flights import JOINTS, made_aircraft, made_streams
 from rosbags.rosbag2 import Reader
 
 from sysid_node.aircraft.dump import dump_aircraft
-from sysid_node.aircraft.model import UncertainValue
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Table, UncertainValue
 from sysid_node.api import load, replay
 from sysid_node.api.replaying import replay_settings
 from sysid_node.cli.main import main
@@ -319,3 +320,27 @@ def test_a_real_flight_through_the_two_commands(tmp_path, flights, capsys):
     assert found["samples"] == 401
     assert found["rejected"] == {}
     assert found["derivatives"]["Cm_alpha"]["value"] == pytest.approx(-1.466, abs=2 * 0.018)
+
+
+def test_derivatives_are_estimated_on_top_of_the_files_tables(tmp_path):
+    """A flight of ``sysid simulate`` without noise: the truth with the tables, and far from it without them."""
+    plain = load_aircraft("cdrw")
+    bends = (-0.1, 0.05, 0.1, 0.3)
+    lift = Table("CL", ("alpha",), (bends,), (0.2, 0.0, -0.05, -0.4))
+    both = ((-0.05, -0.02, -0.1), (0.0, 0.0, -0.05), (0.03, 0.0, -0.06), (0.2, 0.1, 0.0))
+    pitch = Table("Cm", ("alpha", "de"), (bends, (-0.3, 0.0, 0.3)), both)
+    bent = dataclasses.replace(plain, tables=(lift, pitch))
+    for name, aircraft in (("plain", plain), ("bent", bent)):
+        (tmp_path / f"{name}.yaml").write_text(dump_aircraft(aircraft))
+    flown = ["--noise", "0", "--duration", "11", "--manoeuvre", "3211:elevator:amplitude=0.05:start=1"]
+    flown += ["--manoeuvre", "3211:elevator:amplitude=0.07:start=5"]
+    assert main(["simulate", "--aircraft", str(tmp_path / "bent.yaml"), "--out", str(tmp_path / "bag"), *flown]) == 0
+    errors = {}
+    for name in ("plain", "bent"):
+        arguments = ["replay", str(tmp_path / "bag"), "--aircraft", str(tmp_path / f"{name}.yaml")]
+        assert main([*arguments, "--out", str(tmp_path / name)]) == 0
+        found = json.loads((tmp_path / name / "summary.json").read_text())["derivatives"]
+        watched = ("CL_alpha", "Cm_alpha", "Cm_de")
+        errors[name] = [abs(found[d]["value"] / plain.derivatives[d].value - 1.0) for d in watched]
+    assert max(errors["bent"]) < 0.05
+    assert min(errors["plain"]) > 0.2

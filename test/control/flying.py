@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.control.axis import level_flight
 from sysid_node.control.types import IdentifiedDerivative, Measurements
+from sysid_node.dynamics.linearised import trimmed
 
 AIRCRAFT = load_aircraft("cdrw")
-LEVEL, _ = level_flight(AIRCRAFT, 1.0)
+LEVEL, _ = trimmed(AIRCRAFT)
 STEP = 0.005
 NAN = math.nan
 

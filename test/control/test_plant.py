@@ -6,8 +6,8 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import plant
-from sysid_node.control.axis import level_flight
 from sysid_node.dynamics.linear_model import DimensionalScales
+from sysid_node.dynamics.linearised import trimmed
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying.rollout import settled
@@ -56,7 +56,7 @@ def test_longitudinal_model_is_the_simulators_slope(slopes: tuple[np.ndarray, np
 
 def test_lateral_model_is_the_simulators_slope(slopes: tuple[np.ndarray, np.ndarray]) -> None:
     A, B = slopes
-    alpha, _ = level_flight(AIRCRAFT, 1.0)
+    alpha, _ = trimmed(AIRCRAFT)
     found = plant.lateral(VALUES, CONDITION, alpha)
     np.testing.assert_allclose(found.A[:3, :3], A[2:, 2:], rtol=0.01, atol=0.02)
     np.testing.assert_allclose(found.B[:3], B[2:, 1:], rtol=0.01, atol=1e-3)

@@ -72,9 +72,9 @@ class Model:
         """One derivative."""
         return float(self.matrix[COEFFICIENTS.index(coefficient), self.regressors.index(regressor)])
 
-    def __call__(self, regressors: Array) -> Array:
-        """Rows of ``regressors`` in the order of the names."""
-        found: Array = self.matrix @ regressors
+    def __call__(self, regressors: Array, added: Array | float = 0.0) -> Array:
+        """Rows of ``regressors`` in the order of the names; ``added`` (6, N) is what the linear model does not hold."""
+        found: Array = self.matrix @ regressors + added
         found[1] += self.induced * found[0] ** 2
         return found
 
@@ -125,13 +125,13 @@ def exact_flight(
     controls[[symbols.index(s) for s in ("de", "da", "dr")]] = 0.0
     added = np.array([(extra or {}).get(c, np.zeros_like(time)) for c in COEFFICIENTS])
     qS = 0.5 * rho * V**2 * g.S
-    unheld = model(_regressors(aircraft, (V, a, beta), omega, controls)) + added
+    unheld = model(_regressors(aircraft, (V, a, beta), omega, controls), added)
     needed = _moments(aircraft, qS, omega, domega, thrust) - unheld[3:]
     lateral = np.array([[model.effect(c, r) for r in ("da", "dr")] for c in ("Cl", "Cn")])
     da, dr = np.linalg.solve(lateral, needed[[0, 2]])
     for symbol, value in (("de", needed[1] / model.effect("Cm", "de")), ("da", da), ("dr", dr)):
         controls[symbols.index(symbol)] = value
-    found = model(_regressors(aircraft, (V, a, beta), omega, controls)) + added
+    found = model(_regressors(aircraft, (V, a, beta), omega, controls), added)
     force = _specific_force(aircraft, found, qS, a, thrust)
     arm = np.array(aircraft.sensors.imu)[:, None]
     ax, ay, az = force + np.cross(domega, arm, axis=0) + np.cross(omega, np.cross(omega, arm, axis=0), axis=0)

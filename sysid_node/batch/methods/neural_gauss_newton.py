@@ -44,12 +44,13 @@ _RATE = 25.0  # Hz: well above twice the low-pass
 
 @dataclass(frozen=True)
 class _TrainingData:
-    """Low-passed data of one group: motion (N, m), its rates (N, k), measured coefficients (N, c), and the regressors
-    (N, p) of each coefficient."""
+    """Low-passed data of one group: motion (N, m), its rates (N, k), measured coefficients (N, c), the part of these
+    that lookup tables add, and the regressors (N, p) of each coefficient."""
 
     motion: Array
     rates: Array
     coefficients: Array
+    tabulated: Array
     regressors: dict[str, Array]
 
 
@@ -93,11 +94,13 @@ def _data(
     at = at_cg(aircraft, record)
     kept = np.isin(record.time, flight.time)
     smooth = partial(lowpass, flight.time, cutoff=low_pass)
+    tables = smooth(np.column_stack([flight.tabulated.get(name, np.zeros_like(flight.time)) for name in structure]))
     signals = {name: smooth(at[name][kept][:, None])[:, 0] for name in motion}
     return _TrainingData(
         np.column_stack([signals[name] for name in motion]),
         np.column_stack([differentiate(flight.time, signals[name]) for name in changing]),
-        smooth(np.column_stack([flight.coefficients[name] for name in structure])),
+        smooth(np.column_stack([flight.coefficients[name] for name in structure])) + tables,
+        tables,
         {name: smooth(regressor_matrix(flight, regressors)) for name, regressors in structure.items()},
     )
 
@@ -106,15 +109,16 @@ def _group(
     structure: dict[str, tuple[str, ...]], parts: Sequence[_TrainingData], flights: Sequence[MeasuredCoefficients]
 ) -> dict[str, Regression]:
     """The regressions of one group's coefficients, through a network trained on all flights."""
-    motion, rates, measured = (
-        np.concatenate([getattr(p, n) for p in parts]) for n in ("motion", "rates", "coefficients")
+    motion, rates, measured, tables = (
+        np.concatenate([getattr(p, n) for p in parts]) for n in ("motion", "rates", "coefficients", "tabulated")
     )
     scales = [(x.mean(axis=0), np.maximum(x.std(axis=0), 1e-9)) for x in (motion, measured, rates)]
     state, inner, target = ((x - m) / s for x, (m, s) in zip((motion, measured, rates), scales, strict=True))
     weights = train_network(np.column_stack([state, inner]), target)
     Xs = [np.concatenate([p.regressors[name] for p in parts]) for name in structure]
-    start = np.concatenate([np.linalg.lstsq(X, y, rcond=None)[0] for X, y in zip(Xs, measured.T, strict=True)])
-    through = _ThroughNetwork(weights, state, target, Xs, scales[1])
+    ys = (measured - tables).T
+    start = np.concatenate([np.linalg.lstsq(X, y, rcond=None)[0] for X, y in zip(Xs, ys, strict=True)])
+    through = _ThroughNetwork(weights, state, target, Xs, (scales[1][0] - tables, scales[1][1]))
     theta = least_squares(through.misfit, start, through.jacobian, x_scale="jac", max_nfev=30).x
     return _regressions(structure, theta, through, flights)
 
@@ -125,7 +129,7 @@ class _ThroughNetwork:
     def __init__(
         self, weights: Weights, state: Array, target: Array, Xs: Sequence[Array], scale: tuple[Array, Array]
     ) -> None:
-        """``scale``: mean and standard deviation of the coefficients (c,) in training."""
+        """``scale``: the coefficients' mean in training less what tables add (N, c), and standard deviation (c,)."""
         self.weights, self.state, self.target, self.Xs = weights, state, target, Xs
         self.mean, self.spread = scale
         self.edges = np.cumsum([X.shape[1] for X in Xs])[:-1]

@@ -1,4 +1,4 @@
-"""Aerodynamic coefficients as the aircraft file names them: linear in the derivatives, one regressor each."""
+"""Aerodynamic coefficients as the aircraft file names them: linear in the derivatives, on top of lookup tables."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.models.model import Parameter, Scalars
+from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.tables import mach_number
 
 Signals = Mapping[str, jax.Array]
 #: ``signals, theta -> coefficient -> value``.
@@ -28,12 +31,19 @@ def derivative_parameters(aircraft: Aircraft, coefficients: Sequence[str], use_p
 def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rates: bool) -> Coefficients:
     """Coefficients from signals V, alpha, beta, p, q, r and the controls (SI, rad) and theta in the order of ``names``.
 
+    Each holds what the aircraft file's tables add to it; those over the Mach number need ``rho`` (kg/m^3) too.
+
     Rates are made non-dimensional with the airspeed of the moment, or with the reference airspeed where
     ``reference_rates``. CD_k multiplies CL^2 (parabolic drag polar).
     """
     geometry, speed = aircraft.geometry, aircraft.reference.airspeed
     halves = {"p": geometry.b / 2.0, "q": geometry.cbar / 2.0, "r": geometry.b / 2.0}
     terms = [split_derivative(name) for name in names]
+    tables = [
+        (table.coefficient, table.over, [np.array(axis) for axis in table.points], np.array(table.values))
+        for table in aircraft.tables
+        if table.coefficient in {coefficient for coefficient, _ in terms}
+    ]
 
     def regressor(name: str, signals: Signals) -> jax.Array:
         if name == "0":
@@ -44,11 +54,19 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
             return signals[name] * halves[name] / (speed if reference_rates else signals["V"])
         return signals[name]
 
+    def variable(name: str, signals: Signals) -> jax.Array:
+        if name == "Mach":
+            return jnp.asarray(mach_number(signals["V"], signals["rho"], jnp))
+        return signals["V"] if name == "V" else regressor(name, signals)
+
     def evaluate(signals: Signals, theta: Scalars) -> dict[str, jax.Array]:
         total: dict[str, jax.Array] = {}
         for (coefficient, name), value in zip(terms, theta, strict=True):
             if name != "k":
                 total[coefficient] = total.get(coefficient, 0.0) + value * regressor(name, signals)
+        for coefficient, over, points, values in tables:
+            added = interpolate(points, values, [variable(name, signals) for name in over], jnp)
+            total[coefficient] = total.get(coefficient, 0.0) + added
         for (coefficient, name), value in zip(terms, theta, strict=True):
             if name == "k":
                 total[coefficient] = total.get(coefficient, 0.0) + value * total["CL"] ** 2

@@ -100,7 +100,8 @@ def _inputs(
 ) -> tuple[str, ...]:
     """The model's inputs; ``names`` are those of the derivatives, ``modelled`` the coefficients."""
     given = [name for name in STATES if name not in states]
-    controls = [symbol for symbol in aircraft.control_symbols if any(name.endswith(f"_{symbol}") for name in names)]
+    tabulated = {name for table in aircraft.tables if table.coefficient in modelled for name in table.over}
+    controls = [s for s in aircraft.control_symbols if s in tabulated or any(name.endswith(f"_{s}") for name in names)]
     return (*given, *controls, "rho", *(["thrust"] if thrust else []), *_measured_forces(modelled))
 
 

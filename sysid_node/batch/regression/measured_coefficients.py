@@ -2,6 +2,9 @@
 
 Klein & Morelli, "Aircraft System Identification" (2006), eqs. 5.96 to 5.101: forces from the accelerometers, moments
 from differentiated rates with all products of rates and Ixz. Everything is first referred to the centre of gravity.
+
+What the aircraft file's lookup tables add is subtracted from the coefficients, so that regressions estimate the
+derivatives on top of the tables. The regressor CL^2 is that of the whole lift.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, Table
 from sysid_node.batch.regression.filtering import differentiate
 from sysid_node.dynamics import scalar
 from sysid_node.dynamics.airflow import speed_of
@@ -20,6 +23,7 @@ from sysid_node.dynamics.coefficients import regressors, with_polar
 from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
 from sysid_node.dynamics.lever_arm import centripetal, tangential, velocity_from
 from sysid_node.dynamics.rigid_body import known_moments
+from sysid_node.dynamics.tables import array_tables, mach_number, need_mach
 from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -35,9 +39,10 @@ _SLOWEST = 0.2
 class MeasuredCoefficients:
     """Both sides of the six equations at each time of a flight.
 
-    ``coefficients`` CL CD CY Cl Cm Cn as far as they can be formed, besides CX and CZ (body axes); ``regressors`` by
-    the names of derivatives ("0", "alpha", "q", "de", ...); each (N,), finite. ``left_out`` samples lacked a value or
-    did not fly; ``noise`` holds the sensors' 1 sigma in those regressors that have one.
+    ``coefficients`` CL CD CY Cl Cm Cn as far as they can be formed, less what lookup tables add (``tabulated``),
+    besides the whole CX and CZ (body axes); ``regressors`` by the names of derivatives ("0", "alpha", "q", "de", ...);
+    each (N,), finite. ``left_out`` samples lacked a value or did not fly; ``noise`` holds the sensors' 1 sigma in those
+    regressors that have one.
     """
 
     name: str
@@ -47,6 +52,7 @@ class MeasuredCoefficients:
     left_out: int = 0
     remarks: tuple[str, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
+    tabulated: Mapping[str, Array] = field(default_factory=dict)
 
 
 def measured_coefficients(aircraft: Aircraft, record: FlightRecord) -> MeasuredCoefficients:
@@ -59,6 +65,7 @@ def measured_coefficients(aircraft: Aircraft, record: FlightRecord) -> MeasuredC
     s = at_cg(aircraft, complete)
     coefficients, remarks = _coefficients(aircraft, s)
     regressors = _regressors(aircraft, s, coefficients["CL"])
+    tabulated = _tabulated(aircraft, s, regressors)
     if left_out:
         remarks.append(
             f"{record.name or 'flight'}: {left_out} of {len(record)} samples lack a value or are slower than "
@@ -66,7 +73,14 @@ def measured_coefficients(aircraft: Aircraft, record: FlightRecord) -> MeasuredC
         )
     noise = _noise(aircraft, float(s["V"].mean()))
     return MeasuredCoefficients(
-        record.name or "flight", complete.time, coefficients, regressors, left_out, tuple(remarks), noise
+        record.name or "flight",
+        complete.time,
+        _less(coefficients, tabulated),
+        regressors,
+        left_out,
+        tuple(remarks),
+        noise,
+        tabulated,
     )
 
 
@@ -98,7 +112,8 @@ def sensitivity_to_readings(aircraft: Aircraft, record: FlightRecord) -> dict[st
     def sides(name: str, step: float) -> tuple[dict[str, Array], dict[str, Array]]:
         moved = _moved_to_cg(aircraft, {**s, name: s[name] + step})
         coefficients, _ = _coefficients(aircraft, moved)
-        return coefficients, _regressors(aircraft, moved, coefficients["CL"])
+        regressors = _regressors(aircraft, moved, coefficients["CL"])
+        return _less(coefficients, _tabulated(aircraft, moved, regressors)), regressors
 
     found = {}
     for name, step in _STEPS.items():
@@ -142,6 +157,7 @@ def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, 
 def _needed(aircraft: Aircraft) -> list[str]:
     """Columns without which the model cannot be formed."""
     regressors = {name for names in aircraft.model_structure.values() for name in names}
+    regressors |= {name for table in _tables(aircraft) for name in table.over}
     longitudinal = {"CL", "CD"} & set(aircraft.model_structure)
     angles = [name for name in ("alpha", "beta") if name in regressors or (name == "alpha" and longitudinal)]
     return [*_ALWAYS, *angles, *(symbol for symbol in aircraft.control_symbols if symbol in regressors)]
@@ -217,6 +233,25 @@ def _moments(
         if math.isnan(moment) and name in aircraft.model_structure
     }
     return {name: value for name, value in moments.items() if not math.isnan(about[name])}, unknown
+
+
+def _tables(aircraft: Aircraft) -> list[Table]:
+    """The tables of those coefficients that the aircraft's model has derivatives of."""
+    return [table for table in aircraft.tables if table.coefficient in aircraft.model_structure]
+
+
+def _tabulated(aircraft: Aircraft, s: Mapping[str, Array], regressors: Mapping[str, Array]) -> dict[str, Array]:
+    """What the aircraft file's tables add to the coefficients, (N,) each."""
+    tables = _tables(aircraft)
+    if not tables:
+        return {}
+    mach = {"Mach": mach_number(s["V"], s["rho"], np)} if need_mach(tables) else {}
+    return array_tables(tables)({**regressors, "V": s["V"], **mach})
+
+
+def _less(coefficients: Mapping[str, Array], tabulated: Mapping[str, Array]) -> dict[str, Array]:
+    """The coefficients without what the tables add."""
+    return {name: c - tabulated[name] if name in tabulated else c for name, c in coefficients.items()}
 
 
 def _regressors(aircraft: Aircraft, s: Mapping[str, Array], lift: Array) -> dict[str, Array]:

@@ -29,6 +29,7 @@ from sysid_node.dynamics import scalar
 from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.forces import lift_and_drag
+from sysid_node.dynamics.linearised import linear_derivatives
 from sysid_node.online.frequency.regression_signals import OFFSET, Layout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.least_squares import Solution
@@ -259,7 +260,7 @@ def _kinematics(aircraft: Aircraft) -> Kinematics | None:
 def _linear(aircraft: Aircraft, coefficient: str, of: str) -> tuple[float, float, tuple[tuple[int, float], ...]]:
     """Slope, offset and the rest of a coefficient's model; places are those of ``_regressors``."""
     names = ("p", "q", "r", "V", *aircraft.control_symbols)
-    values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
+    values = linear_derivatives(aircraft)
     rest = tuple((i, values[f"{coefficient}_{n}"]) for i, n in enumerate(names) if f"{coefficient}_{n}" in values)
     return values[f"{coefficient}_{of}"], values.get(f"{coefficient}_0", 0.0), rest
 

@@ -8,6 +8,9 @@ so that a moment's rate-of-momentum part is a plain derivative of a measured rat
 differentiation nor the derivative of the dynamic pressure: it enters as the increment of the angular momentum over a
 sampling interval, which the transform integrates exactly (see ``fourier_transform``).
 
+Where the aircraft file has lookup tables, k times what they add is subtracted from the coefficients' signals, and the
+regression estimates the derivatives on top of them. The regressor CL^2 is that of the whole lift.
+
 Equations of motion with all products of rates and Ixz: Klein & Morelli, "Aircraft System Identification" (2006), eqs.
 3.35 to 3.37; coefficients from them eqs. 5.96 to 5.101. Body axes FRD, SI, radians.
 """
@@ -33,6 +36,7 @@ from sysid_node.dynamics.coefficients import rate_regressors
 from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
 from sysid_node.dynamics.lever_arm import tangential, velocity_from, without_centripetal
 from sysid_node.dynamics.rigid_body import angular_momentum, gyroscopic_moment, known_moments
+from sysid_node.dynamics.tables import TableSum, array_tables, need_mach, scalar_tables, table_variables
 from sysid_node.dynamics.vector import Vector
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -109,7 +113,8 @@ def scalar_signals(aircraft: Aircraft) -> ScalarSignals:
 
     The vectorised twin is ``array_signals``; both perform the same operations in the same order, bit for bit.
     """
-    return cast(ScalarSignals, _signals(aircraft, scalar, lambda _: 1.0, lambda _: 0.0))
+    tables = scalar_tables(aircraft.tables) if aircraft.tables else None
+    return cast(ScalarSignals, _signals(aircraft, scalar, lambda _: 1.0, lambda _: 0.0, tables))
 
 
 def array_signals(aircraft: Aircraft) -> ArraySignals:
@@ -121,14 +126,15 @@ def array_signals(aircraft: Aircraft) -> ArraySignals:
     def mapped(function: Callable[..., float]) -> Callable[..., Array]:
         return lambda *xs: np.fromiter(map(function, *(x.tolist() for x in xs)), np.float64, xs[0].size)
 
-    functions = {name: mapped(getattr(scalar, name)) for name in ("cos", "sin", "arctan2")}
-    return cast(
-        ArraySignals, _signals(aircraft, SimpleNamespace(**functions, sqrt=np.sqrt), np.ones_like, np.zeros_like)
-    )
+    functions = {name: mapped(getattr(scalar, name)) for name in ("cos", "sin", "arctan2", "exp", "log")}
+    library = SimpleNamespace(**functions, sqrt=np.sqrt)
+    tables = array_tables(aircraft.tables) if aircraft.tables else None
+    return cast(ArraySignals, _signals(aircraft, library, np.ones_like, np.zeros_like, tables))
 
 
-def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any) -> Any:
+def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any, tables: TableSum | None) -> Any:
     """Build the signal function over scalars or arrays; see ``scalar_signals``. ``xp`` holds elementary functions."""
+    subtract_tables = _subtraction(aircraft, xp, tables) if tables else None
     rho0, V0 = aircraft.reference.air_density, aircraft.reference.airspeed
     pressure0, span, chord = rho0 * V0 * V0, aircraft.geometry.b, aircraft.geometry.cbar
     force, roll, pitch = (1.0 / scale for scale in _scales(aircraft))
@@ -158,6 +164,8 @@ def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any) -> Any:
         known = [k * alpha, k * beta, p_hat, q_hat, r_hat, k * V / V0, lift * lift / k]
         known += [k * control for control in sample[_CONTROLS:]]
         row = [lift, drag, mass * fy, L * roll, (M - arm * thrust) * pitch, N * roll, k, one(k)]
+        if subtract_tables:
+            subtract_tables(row, k, (V, alpha, beta), rates, rho, sample[_CONTROLS:])
         row += [known[i] for i in chosen]
         row += [none(k)] * len(timed)  # rates come with the interval
         if with_thrust:
@@ -166,6 +174,21 @@ def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any) -> Any:
         return row, [ca, sa]
 
     return signals
+
+
+def _subtraction(aircraft: Aircraft, xp: Any, tables: TableSum) -> Any:
+    """Function that subtracts k times the tables from the coefficients in a row of signals."""
+    span, chord, symbols = aircraft.geometry.b, aircraft.geometry.cbar, aircraft.control_symbols
+    with_mach = need_mach(aircraft.tables)
+
+    def subtract(row: list[Any], k: Any, flow: Any, rates: Any, density: Any, controls: Any) -> None:
+        variables = table_variables(flow, rates, span, chord, density if with_mach else None, xp)
+        variables.update(zip(symbols, controls, strict=False))  # what stands behind the controls is not theirs
+        for coefficient, value in tables(variables).items():
+            place = COEFFICIENTS.index(coefficient)
+            row[place] = row[place] - k * value
+
+    return subtract
 
 
 def _scales(aircraft: Aircraft) -> tuple[float, float, float]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft, Inertia
 from sysid_node.dynamics.linear_model import STATES, DimensionalScales, linear_model
+from sysid_node.dynamics.linearised import linear_derivatives
 from sysid_node.online.frequency.regression_signals import Layout
 
 Array = NDArray[np.float64]
@@ -96,8 +97,7 @@ def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[n
     # instruments need not be exact, and those of all results so far are without it
     uncoupled = replace(aircraft, inertia=Inertia(Ixx, Iyy, Izz, Ixz=0.0))
     condition = DimensionalScales.of(uncoupled, reference.airspeed, reference.air_density)
-    values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
-    model = linear_model(values, condition, 0.0, STATES, layout.timed)
+    model = linear_model(linear_derivatives(aircraft), condition, 0.0, STATES, layout.timed)
     scales = {"q": condition.chord, "p": condition.span, "r": condition.span}
     rows = np.array([STATES.index(r) for r in layout.instrumented], dtype=np.intp)
     A = model.A - _LEAK * np.eye(len(STATES))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL
 
-from sysid_node.aircraft.model import Derivative
+from sysid_node.aircraft.model import Derivative, Table
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 
 SIGNALS = {
@@ -29,6 +29,23 @@ def test_the_drag_polar_is_a_parabola_over_lift():
     evaluate = coefficient_function(KESTREL, ("CL_alpha", "CD_0", "CD_k"), False)
     found = evaluate(SIGNALS, (jnp.array(5.0), jnp.array(0.03), jnp.array(0.05)))
     np.testing.assert_allclose(found["CD"], 0.03 + 0.05 * 0.5**2, rtol=1e-12)
+
+
+def test_tables_add_to_the_coefficients_and_to_the_lift_of_the_polar():
+    """By NumPy's interpolation; half the rate over V, Mach with the speed of sound at sea level (ICAO Doc 7488)."""
+    tables = (
+        Table("CL", ("alpha",), ((0.0, 0.08, 0.2),), (0.0, 0.04, -0.2)),
+        Table("CL", ("V", "q"), ((10.0, 30.0), (-1.0, 1.0)), ((0.0, 0.0), (-0.2, 0.2))),
+        Table("CL", ("Mach",), ((0.0, 0.1),), (0.0, 0.5)),
+        Table("CY", ("alpha",), ((0.0, 1.0),), (0.0, 1.0)),
+    )
+    evaluate = coefficient_function(dataclasses.replace(KESTREL, tables=tables), ("CL_alpha", "CD_k"), False)
+    found = evaluate({**SIGNALS, "rho": jnp.array(1.225)}, (jnp.array(5.0), jnp.array(0.05)))
+    rate = 0.5 * KESTREL.geometry.cbar / (2.0 * 20.0)
+    lift = 0.5 + 0.04 - 0.24 * 0.02 / 0.12 + 0.5 * 0.2 * rate + 5.0 * 20.0 / 340.294
+    np.testing.assert_allclose(found["CL"], lift, rtol=1e-6)
+    np.testing.assert_allclose(found["CD"], 0.05 * lift**2, rtol=1e-6)
+    assert set(found) == {"CL", "CD"}
 
 
 def test_parameters_start_at_the_files_values_with_its_tolerances():

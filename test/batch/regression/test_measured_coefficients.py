@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, clean, flight
 
+from sysid_node.aircraft.model import Table
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
@@ -25,3 +26,22 @@ def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
     assert any("slower than" in remark for remark in found.remarks)
     with pytest.raises(InputError, match=r"only 0 of \d+ samples .* in which the aircraft flies"):
         measured_coefficients(KESTREL, FlightRecord(record.time, {**record.columns, "V": 0.0 * record["V"]}, "parked"))
+
+
+def test_what_tables_add_is_subtracted_and_the_polar_has_the_whole_lift():
+    """By NumPy's interpolation; a table of a coefficient that has no derivatives is not needed."""
+    tables = (
+        Table("CL", ("alpha",), ((0.0, 0.05, 0.2),), (0.0, 0.02, -0.2)),
+        Table("Cm", ("V",), ((15.0, 25.0),), (0.0, 0.3)),
+        Table("Cl", ("p",), ((-0.1, 0.0, 0.1),), (0.01, 0.0, 0.01)),
+    )
+    plain = measured_coefficients(KESTREL, clean())
+    found = measured_coefficients(dataclasses.replace(KESTREL, tables=tables), clean())
+    x = {**plain.regressors, "V": plain.regressors["V"] * KESTREL.reference.airspeed}
+    added = {t.coefficient: np.interp(x[t.over[0]], *t.points, t.values) for t in tables}
+    for name, value in found.coefficients.items():
+        np.testing.assert_allclose(value, plain.coefficients[name] - added.get(name, 0.0), atol=1e-12)
+    assert all(np.ptp(added[name]) > 1e-3 for name in ("CL", "Cm", "Cl"))
+    for name, value in found.regressors.items():
+        np.testing.assert_array_equal(value, plain.regressors[name])
+    assert set(found.tabulated) == set(added)
