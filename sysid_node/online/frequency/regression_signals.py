@@ -183,7 +183,7 @@ def _subtraction(aircraft: Aircraft, xp: Any, tables: TableSum) -> Any:
 
     def subtract(row: list[Any], k: Any, flow: Any, rates: Any, density: Any, controls: Any) -> None:
         variables = table_variables(flow, rates, span, chord, density if with_mach else None, xp)
-        variables.update(zip(symbols, controls, strict=False))  # what stands behind the controls is not theirs
+        variables.update(zip(symbols, controls, strict=False))  # a sample may hold the controls' excess behind them
         for coefficient, value in tables(variables).items():
             place = COEFFICIENTS.index(coefficient)
             row[place] = row[place] - k * value
