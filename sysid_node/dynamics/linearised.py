@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics import scalar
@@ -30,7 +30,8 @@ def linear_derivatives(aircraft: Aircraft) -> dict[str, float]:
 
 def table_derivatives(aircraft: Aircraft, pressure: float = 1.0) -> dict[str, float]:
     """What the tables add to the derivatives in level flight at ``pressure`` times the reference dynamic pressure."""
-    return _tangent(aircraft, *trimmed(aircraft, pressure), pressure) if aircraft.tables else {}
+    over = {name for table in aircraft.tables for name in table.over} - {"V", "Mach"}
+    return _tangent(aircraft, *trimmed(aircraft, pressure), pressure, sorted(over)) if aircraft.tables else {}
 
 
 def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:
@@ -44,15 +45,17 @@ def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:
     lift = aircraft.mass * GRAVITY / load
     now = level_flight(values, lift)
     for _ in range(_ROUNDS if aircraft.tables else 0):
-        before, now = now, level_flight(_sum(values, _tangent(aircraft, *now, pressure)), lift)
+        before, now = now, level_flight(_sum(values, _tangent(aircraft, *now, pressure, ("alpha", "de"))), lift)
         now = min(max(now[0], -math.pi), math.pi), min(max(now[1], -math.pi), math.pi)
         if max(abs(now[0] - before[0]), abs(now[1] - before[1])) < _ARRIVED:
             break
     return now
 
 
-def _tangent(aircraft: Aircraft, alpha: float, elevator: float, pressure: float) -> dict[str, float]:
-    """The tables' slopes and offsets at an angle of attack and elevator (rad), with all else at rest."""
+def _tangent(
+    aircraft: Aircraft, alpha: float, elevator: float, pressure: float, over: Sequence[str]
+) -> dict[str, float]:
+    """The tables' slopes over some variables, and offsets, at an angle of attack and elevator (rad), with all else at rest."""
     reference, geometry = aircraft.reference, aircraft.geometry
     density = reference.air_density if need_mach(aircraft.tables) else None
     flow = (reference.airspeed * math.sqrt(pressure), alpha, 0.0)
@@ -60,8 +63,7 @@ def _tangent(aircraft: Aircraft, alpha: float, elevator: float, pressure: float)
     at |= dict.fromkeys(aircraft.control_symbols, 0.0) | ({"de": elevator} if "de" in aircraft.control_symbols else {})
     added = scalar_tables(aircraft.tables)
     found = {f"{coefficient}_0": value for coefficient, value in added(at).items()}
-    over = {name for table in aircraft.tables for name in table.over} - {"V", "Mach"}
-    for name in sorted(over):
+    for name in (name for name in over if name in at):
         above, below = (added({**at, name: at[name] + step}) for step in (_STEP, -_STEP))
         for coefficient, value in above.items():
             slope = (value - below[coefficient]) / (2.0 * _STEP)

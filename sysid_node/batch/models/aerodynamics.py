@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.models.model import Parameter, Scalars
-from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
 from sysid_node.dynamics.tables import mach_number
 
 Signals = Mapping[str, jax.Array]
@@ -39,11 +38,9 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
     geometry, speed = aircraft.geometry, aircraft.reference.airspeed
     halves = {"p": geometry.b / 2.0, "q": geometry.cbar / 2.0, "r": geometry.b / 2.0}
     terms = [split_derivative(name) for name in names]
-    tables = [
-        (table.coefficient, table.over, [np.array(axis) for axis in table.points], np.array(table.values))
-        for table in aircraft.tables
-        if table.coefficient in {coefficient for coefficient, _ in terms}
-    ]
+    modelled = {coefficient for coefficient, _ in terms}
+    tables = [table for table in aircraft.tables if table.coefficient in modelled]
+    packed = pack([(table.points, table.values) for table in tables]) if tables else None
 
     def regressor(name: str, signals: Signals) -> jax.Array:
         if name == "0":
@@ -64,12 +61,19 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
         for (coefficient, name), value in zip(terms, theta, strict=True):
             if name != "k":
                 total[coefficient] = total.get(coefficient, 0.0) + value * regressor(name, signals)
-        for coefficient, over, points, values in tables:
-            added = interpolate(points, values, [variable(name, signals) for name in over], jnp)
-            total[coefficient] = total.get(coefficient, 0.0) + added
+        if packed is not None:
+            first, second = (_stacked([variable(table.over[k], signals) for table in tables]) for k in (0, -1))
+            added = interpolate(PackedTables(*(jnp.asarray(part) for part in packed)), first, second, jnp)
+            for i, table in enumerate(tables):
+                total[table.coefficient] = total.get(table.coefficient, 0.0) + added[..., i]
         for (coefficient, name), value in zip(terms, theta, strict=True):
             if name == "k":
                 total[coefficient] = total.get(coefficient, 0.0) + value * total["CL"] ** 2
         return total
 
     return evaluate
+
+
+def _stacked(series: Sequence[jax.Array]) -> jax.Array:
+    """The variables (..., T) of T tables."""
+    return jnp.stack(jnp.broadcast_arrays(*series), -1)
