@@ -55,7 +55,7 @@ def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:
 def _tangent(
     aircraft: Aircraft, alpha: float, elevator: float, pressure: float, over: Sequence[str]
 ) -> dict[str, float]:
-    """The tables' slopes over some variables, and offsets, at an angle of attack and elevator (rad), with all else at rest."""
+    """The tables' slopes over some variables, and offsets, at an angle of attack and elevator (rad), else at rest."""
     reference, geometry = aircraft.reference, aircraft.geometry
     density = reference.air_density if need_mach(aircraft.tables) else None
     flow = (reference.airspeed * math.sqrt(pressure), alpha, 0.0)
