@@ -208,7 +208,8 @@ def test_reset_and_save(probe: Probe, tmp_path: Path) -> None:
         assert content["samples"] == 599
         assert content["settings"]["frequencies"] == list(OnlineSettings().frequencies)
         assert content["derivatives"].keys() == load_aircraft("cdrw").derivatives.keys()
-        assert {"value", "standard_error", "lower", "upper", "valid", "status"} == content["derivatives"]["Cm_q"].keys()
+        errors = {"standard_error", "statistical_error", "systematic_error"}
+        assert content["derivatives"]["Cm_q"].keys() == {"value", *errors, "lower", "upper", "valid", "status"}
         assert [path.name for path in folder.iterdir()] == [Path(saved.message).name]
         assert probe.ask(Trigger, "/identifier/reset").success
         assert not probe.ask(Trigger, "/identifier/save").success

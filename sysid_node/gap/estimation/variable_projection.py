@@ -86,7 +86,7 @@ class VariableProjection:
 
         A nuisance parameter at its limit stays there while the values move alone, and may hold what belongs to them:
         an actuator's bias then moves by a thousandth a round, where the joint step finds it at once. The joint step
-        decides anew which nuisance parameters stand at their limits.
+        decides anew which nuisance parameters stand at their limits. Values at which predictions diverge are returned.
         """
         if self.free.all():
             return values
@@ -94,7 +94,7 @@ class VariableProjection:
         cross, corner = self.matrix.T @ columns, columns.T @ columns + np.diag(self.sigma**-2.0)
         gram = np.block([[self.gram, cross], [cross.T, corner]])
         right = np.append(self.matrix.T @ rows, columns.T @ rows - (values - self.centre) / self.sigma**2)
-        if self._active_set_holds(gram, right):
+        if not (np.isfinite(gram).all() and np.isfinite(right).all()) or self._active_set_holds(gram, right):
             return values
         before, deviance = (self.free, self.shift), self.deviance(self.residual(values))
         limit, now = self.limit / self.spread, self.now / self.spread

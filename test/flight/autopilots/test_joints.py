@@ -49,7 +49,7 @@ def test_every_example_is_one(autopilot: str) -> None:
 
 def test_the_page_shows_maps_that_are_accepted() -> None:
     page = (Path(__file__).resolve().parents[3] / "docs" / "how-to" / "autopilots.md").read_text(encoding="utf-8")
-    shown = re.findall(r'joints(?::=| )"([^"]+)"', page)
+    shown = [text for text in re.findall(r'joints(?::=| )"([^"]+)"', page) if text != "..."]
     assert len(shown) == 3
     for text in shown:
         autopilot = "px4" if "servo" in text else "mavros"

@@ -37,21 +37,24 @@ def test_arrays_of_fixed_length_have_none_before_them():
 
 def estimates(words: list[str]) -> tuple[object, ...]:
     """Values of a message of estimates with these statuses."""
-    derivatives = tuple((f"C_{'x' * i}", float(i), 2.0, 3.0, 4.0, word == "ok", word) for i, word in enumerate(words))
+    derivatives = tuple(
+        (f"C_{'x' * i}", float(i), 2.0, 1.5, 1.3, 3.0, 4.0, word == "ok", word) for i, word in enumerate(words)
+    )
     fits = (("Cm", 0.9, 1e-3, 7.5, 12),)
-    return ((1, 2), "base_link"), "cdrw", "iv_rft", derivatives, fits
+    return ((1, 2), "base_link"), "cdrw", "iv_rft", derivatives, fits, derivatives[:2]
 
 
 def by_rosbags(words: list[str]) -> bytes:
     """The same message as rosbags serialises it."""
     types = STORE.types
-    (stamp, frame), aircraft, method, derivatives, fits = estimates(words)
+    (stamp, frame), aircraft, method, derivatives, fits, servos = estimates(words)
     message = types[DERIVATIVES_TYPE](
         types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](*stamp), frame),
         aircraft,
         method,
         [types["sysid_msgs/msg/DerivativeEstimate"](*row) for row in derivatives],
         [types["sysid_msgs/msg/FitQuality"](*row) for row in fits],
+        [types["sysid_msgs/msg/DerivativeEstimate"](*row) for row in servos],
     )
     return bytes(STORE.serialize_cdr(message, DERIVATIVES_TYPE))
 

@@ -70,7 +70,7 @@ def test_a_late_imu_cannot_be_told_from_late_commands(aircraft, make_flight) -> 
     (cause,) = document(found)["causes"]
     assert found.verdict == "ambiguous"
     assert (cause["effect"], cause["indistinguishable_from"]) == ("command_delay", ["imu_delay"])
-    assert cause["parameters"]["delay"][0] == pytest.approx(0.06, rel=0.1)
+    assert cause["parameters"]["elevator"][0] == pytest.approx(0.06, rel=0.1)
     assert cause["probability"] == pytest.approx(0.5, abs=0.05)
 
 

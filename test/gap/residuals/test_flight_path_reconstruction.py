@@ -85,7 +85,7 @@ def test_a_lag_is_found_despite_the_vanes_noise(aircraft) -> None:
     off = []
     for seen in (model, by_vanes):
         nuisances = nuisances_of(aircraft, seen)
-        candidates = [c for c in candidates_of(seen.simulator, [seen]) if c.effect == "actuator_lag"]
+        candidates = [c for c in candidates_of(seen.simulator, [seen]) if c.label == "actuator_lag"]
         fit = converged(with_candidates(converged(unfitted([seen], nuisances)), candidates, nuisances, [0.05]))
         off.append(abs(fit.values[0] - 0.09))
     assert off[0] < 0.003 < 0.5 * off[1]

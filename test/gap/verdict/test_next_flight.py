@@ -18,7 +18,7 @@ def fits(aircraft) -> dict[str, CandidateFit]:
     model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {"command_delay": {"delay": 0.08}}, seed=14))
     nuisances = nuisances_of(aircraft, model)
     base = unfitted([model], nuisances)
-    table = {c.effect: c for c in candidates_of(model.simulator, [model])}
+    table = {c.label: c for c in candidates_of(model.simulator, [model])}
     sizes = {"command_delay": 0.08, "actuator_stamp_delay": -0.08, "actuator_lag": 0.08}
     return {n: linearised(with_candidates(base, [table[n]], nuisances, [size])) for n, size in sizes.items()}
 
