@@ -20,11 +20,14 @@ from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
 from sysid_node.flight.bag.reader import open_bag, reading
+from sysid_node.flight.commands import COMMANDS, POSITIONS
 from sysid_node.ros.support.conversion import NANOSECONDS, stamp_message
 from sysid_node.ros.support.spin import run_program
 
 CLOCK_PERIOD = NANOSECONDS // 100
 ACKNOWLEDGED = Duration(seconds=5)  # the longest wait for subscribers to acknowledge the last messages
+#: Recorded beside the topic ``actuators``, to which alone an identifier listens: nobody waits for listeners of these.
+BESIDE = (COMMANDS, POSITIONS)
 SETTLE = 0.3  # s after a subscriber is found, until it receives messages for certain
 
 
@@ -46,7 +49,7 @@ class Player(Node):
         self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
 
     def await_listeners(self, patience: float) -> None:
-        """Wait up to ``patience`` s until every topic has a subscriber; log the topics that then have none."""
+        """Wait up to ``patience`` s until every topic has a subscriber, but those ``BESIDE``; log those without one."""
         end = time.monotonic() + patience
         unheard = self._unheard()
         while unheard and time.monotonic() < end and rclpy.ok():
@@ -82,7 +85,8 @@ class Player(Node):
         return count
 
     def _unheard(self) -> list[str]:
-        return [name for name, (publisher, _) in self._topics.items() if not publisher.get_subscription_count()]
+        waited = ((name, publisher) for name, (publisher, _) in self._topics.items() if name not in BESIDE)
+        return [name for name, publisher in waited if not publisher.get_subscription_count()]
 
 
 def shift_stamp(raw: bytes, shift: int) -> bytes:
