@@ -27,7 +27,7 @@ RUNS = {
 }
 #: Name of each picture: the run whose report it shows, the sections, and its size in pixels.
 SHOWN = {
-    "replay_opening": ("replay", ("opening", "derivatives"), (900, 866)),
+    "replay_opening": ("replay", ("opening", "derivatives"), (900, 1064)),
     "replay_history": ("replay", ("history",), (900, 668)),
     "failed_faults": ("failed", ("faults",), (1000, 240)),
     "gap_opening": ("gap", ("opening",), (900, 330)),
