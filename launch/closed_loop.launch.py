@@ -23,6 +23,41 @@ RECORDED = (
 )
 
 
+def arguments() -> list[DeclareLaunchArgument]:
+    """What can be given on the command line."""
+    return [
+        DeclareLaunchArgument("aircraft", default_value="cdrw", description="a name, or an aircraft file"),
+        DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
+        DeclareLaunchArgument(
+            "turbulence",
+            default_value="none",
+            description="Dryden turbulence",
+            choices=["none", "light", "moderate", "severe"],
+        ),
+        DeclareLaunchArgument(
+            "speed", default_value="1.0", description="how many times as fast as real time; the nodes use /clock"
+        ),
+        DeclareLaunchArgument(
+            "effects",
+            default_value="actuator_lag:time_constant=0.05",
+            description="what makes the aircraft differ from its file: name:key=value, a space between",
+        ),
+        DeclareLaunchArgument(
+            "adapt",
+            default_value="true",
+            description="false: the aircraft file's gains, whatever is identified",
+            choices=["true", "false"],
+        ),
+        DeclareLaunchArgument(
+            "method",
+            default_value="sls_rft",
+            description="of the identifier; iv_rft in gusts",
+            choices=["sls_rft", "iv_rft"],
+        ),
+        DeclareLaunchArgument("bag", default_value="", description="folder to record into; empty: none"),
+    ]
+
+
 def generate_launch_description() -> LaunchDescription:
     """Five nodes, each with its file of parameters, and a recorder where a bag is named."""
     argument, value = LaunchConfiguration, ParameterValue
@@ -52,35 +87,7 @@ def generate_launch_description() -> LaunchDescription:
     topics = [[prefix, f"/{topic}"] for topic in RECORDED]
     return LaunchDescription(
         [
-            DeclareLaunchArgument("aircraft", default_value="cdrw", description="a name, or an aircraft file"),
-            DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
-            DeclareLaunchArgument(
-                "turbulence",
-                default_value="none",
-                description="Dryden turbulence",
-                choices=["none", "light", "moderate", "severe"],
-            ),
-            DeclareLaunchArgument(
-                "speed", default_value="1.0", description="how many times as fast as real time; the nodes use /clock"
-            ),
-            DeclareLaunchArgument(
-                "effects",
-                default_value="actuator_lag:time_constant=0.05",
-                description="what makes the aircraft differ from its file: name:key=value, a space between",
-            ),
-            DeclareLaunchArgument(
-                "adapt",
-                default_value="true",
-                description="false: the aircraft file's gains, whatever is identified",
-                choices=["true", "false"],
-            ),
-            DeclareLaunchArgument(
-                "method",
-                default_value="sls_rft",
-                description="of the identifier; iv_rft in gusts",
-                choices=["sls_rft", "iv_rft"],
-            ),
-            DeclareLaunchArgument("bag", default_value="", description="folder to record into; empty: none"),
+            *arguments(),
             Node(**described("flight_simulator", **sky)),
             LifecycleNode(**described("identifier", method=method, **simulated)),
             Node(**described("exciter", watch=True, accuracy=0.15, **simulated)),
