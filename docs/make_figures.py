@@ -218,6 +218,7 @@ def layers() -> str:
         (("api", "Python: load, replay, identify, diagnose"), ("view", "flights in 3-D, in the viewer Rerun")),
         (("report", "pages, figures, tables and files of a run"),),
         (("ros", "nodes: messages in and out, no mathematics"),),
+        (("fleet", "many flights: catalogue, engine, statistics"),),
         (("gap", "flight data, residuals, estimation, instruments, selection, validation, verdict"),),
         (("faults", "surfaces, sensors, airframe"), ("control", "adaptive gains"), ("excite", "manoeuvres")),
         (("online", "recursive estimator"), ("batch", "estimators of whole flights")),

@@ -25,7 +25,8 @@ BELOW = {
     "excite": {"aircraft", "dynamics", "flight", "sim", "online"},
     "faults": {"aircraft", "dynamics", "flight", "online"},
     "gap": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite"},
-    "ros": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite", "faults", "gap"},
+    "fleet": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "gap"},
+    "ros": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite", "faults", "gap", "fleet"},
 }
 BELOW["report"] = {*BELOW["ros"], "ros"}
 BELOW["api"] = {*BELOW["report"], "report"}

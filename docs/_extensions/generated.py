@@ -204,7 +204,7 @@ def _fields(lines: list[str]) -> Iterator[str]:
 # The Python interface, and the map of the source
 
 #: Layers whose own modules make up the interface to programs, upper layers last; their sub-packages are inner workings.
-LAYERS = ("aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "faults", "gap")
+LAYERS = ("aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "faults", "gap", "fleet")
 
 
 def interface() -> dict[str, str]:
