@@ -1,0 +1,70 @@
+"""What of a diagnosis of a real record with a known effect is right, by rules that were fixed before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+#: Probability above which a cause that is not there counts as blamed in a record as it is.
+BLAMED = 0.8
+
+#: Most effects that a set named together may hold.
+TOGETHER = 3
+
+#: Share by which a size may be off, and by which the gap may exceed that of the record as it is.
+_SIZE, _GAP = 0.2, 0.1
+
+#: Parameters that only shape an effect, or are not what was put in.
+_SHAPES = frozenset({"onset"})
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One case: whether the effect was named (first or beside what the record holds), its size right, the gap closed.
+
+    ``stated`` are the probabilities of all causes, and whether each is there. None: does not apply.
+    """
+
+    named: bool | None
+    sized: bool | None
+    closed: bool | None
+    blamed: bool  # something is blamed that is not there
+    stated: tuple[tuple[float, bool], ...]
+
+
+def judge(row: Mapping[str, Any], holds: Sequence[str], unspiked: float | None) -> Judged:
+    """A case by its line of the ledger; ``unspiked`` is what the gap of the record as it is falls to."""
+    effect, values = row["effect"], row["values"]
+    stated = tuple((c["probability"], _there(c, effect, holds)) for c in row["causes"])
+    wrong = any(p > BLAMED and not there for p, there in stated)
+    if not effect:
+        return Judged(None, None, None, wrong, stated)
+    others = [c for c in row["causes"] if not _among(c, holds) or _among(c, (effect,))]
+    named = bool(others) and _among(others[0], (effect,))
+    own = next((c for c in row["causes"] if c["effect"] == effect), None)
+    sized = all(_close(own["parameters"].get(n), v) for n, v in _sizes(effect, values)) if named and own else None
+    closed = None if unspiked is None or row["gap"] is None else row["gap"]["after"] <= (1.0 + _GAP) * unspiked
+    return Judged(named, sized, closed, wrong, stated)
+
+
+def _there(cause: Mapping[str, Any], effect: str, holds: Sequence[str]) -> bool:
+    return _among(cause, (*holds, effect))
+
+
+def _among(cause: Mapping[str, Any], effects: Sequence[str]) -> bool:
+    """Whether a cause, or one of those that it is not told apart from, is one of these."""
+    return bool({cause["effect"], *cause["indistinguishable_from"][: TOGETHER - 1]} & set(effects))
+
+
+def _sizes(effect: str, values: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Parameters whose size was put in; a surface that is held has none."""
+    return [] if effect == "stuck_surface" else [(n, v) for n, v in values.items() if n not in _SHAPES]
+
+
+def _close(found: Sequence[float] | None, true: float) -> bool:
+    """Whether a value with its standard error is within a fifth of the true one, or its 95 % interval holds this."""
+    if found is None:
+        return False
+    value, error = found
+    return abs(value - true) <= max(_SIZE * abs(true), 1.96 * error)

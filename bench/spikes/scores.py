@@ -1,0 +1,93 @@
+"""Tables of spike and recovery: in all, by effect, by flight, and the calibration of the probabilities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from evaluation.pages import table
+from withheld.scoreboard import calibration, interval
+
+from .judging import Judged, judge
+from .records import FLIGHTS
+
+_Pairs = Sequence[tuple[Mapping[str, Any], Judged]]
+
+
+def page(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The section of the documentation."""
+    bare = {row["flight"]: row["gap"]["after"] for row in rows if not row["effect"] and row["gap"]}
+    pairs = [(row, judge(row, FLIGHTS[row["flight"]].holds, bare.get(row["flight"]))) for row in rows]
+    spiked = [pair for pair in pairs if pair[0]["effect"]]
+    unspiked = [pair for pair in pairs if not pair[0]["effect"]]
+    stated = [each for _, judged in pairs for each in judged.stated]
+    parts = [
+        f"{len(spiked)} cases with an effect put in, {len(unspiked)} records as they are; in brackets 95 % intervals.",
+        table(("", "", "wanted"), _overall(spiked, unspiked)),
+        "The records as they are:",
+        table(("record", "verdict", "gap, left, floor", "named", "doubted", "it holds"), map(_as_it_is, unspiked)),
+        "By effect:",
+        _grouped(spiked, "effect"),
+        "By record:",
+        _grouped(spiked, "flight"),
+        "Those that were not named:",
+        table(("record", "put in", "said"), (_missed(row) for row, judged in spiked if not judged.named)),
+    ]
+    if stated:
+        parts += ["Probabilities as stated, and the share of them that is right:", calibration(stated)]
+    return "\n\n".join(parts)
+
+
+def share(flags: Iterable[bool | None]) -> str:
+    """How many of those that apply, with the interval of the share."""
+    known = [flag for flag in flags if flag is not None]
+    if not known:
+        return "-"
+    low, high = interval(sum(known), len(known))
+    return f"{sum(known)} of {len(known)} ({100 * low:.0f}-{100 * high:.0f} %)"
+
+
+def _overall(spiked: _Pairs, unspiked: _Pairs) -> list[list[str]]:
+    return [
+        ["as they are: nothing blamed above 0.8 that is not there", share(not j.blamed for _, j in unspiked), "all"],
+        ["put in: named first, or beside what the record holds", share(j.named for _, j in spiked), "85 %"],
+        ["of those named: size within 20 % or its interval", share(j.sized for _, j in spiked), "85 %"],
+        ["gap within 10 % of that of the record as it is", share(j.closed for _, j in spiked), "85 %"],
+        ["the same, of those named", share(j.closed for _, j in spiked if j.named), ""],
+    ]
+
+
+def _as_it_is(pair: tuple[Mapping[str, Any], Judged]) -> list[str]:
+    row, _ = pair
+    holds = FLIGHTS[row["flight"]]
+    return [row["flight"], row["verdict"], _gap(row), _names(row["causes"]), _names(row["doubted"]), holds.why]
+
+
+def _grouped(pairs: _Pairs, key: str) -> str:
+    rows = []
+    for name in sorted({row[key] for row, _ in pairs}):
+        own = [judged for row, judged in pairs if row[key] == name]
+        counts = [[getattr(j, what) for j in own] for what in ("named", "sized", "closed")]
+        rows.append([name, str(len(own)), *(_count(flags) for flags in counts)])
+    return table((key, "cases", "named", "size", "gap closed"), rows)
+
+
+def _count(flags: Sequence[bool | None]) -> str:
+    known = [flag for flag in flags if flag is not None]
+    return f"{sum(known)} of {len(known)}" if known else "-"
+
+
+def _missed(row: Mapping[str, Any]) -> list[str]:
+    put = ", ".join(f"{name} {value:.3g}" for name, value in row["values"].items())
+    said = row["refusal"] or f"{row['verdict']}: {_names(row['causes'])}"
+    doubted = f"; doubted: {_names(row['doubted'])}" if row["doubted"] else ""
+    return [row["flight"], f"{row['effect']} ({put})", said + doubted]
+
+
+def _names(causes: Sequence[Mapping[str, Any]]) -> str:
+    return ", ".join(f"{c.get('label', c['effect'])} {c['probability']:.2f}" for c in causes) or "-"
+
+
+def _gap(row: Mapping[str, Any]) -> str:
+    gap = row["gap"]
+    return ", ".join(f"{gap[name]:.2f}" for name in ("before", "after", "noise_floor")) if gap else "-"

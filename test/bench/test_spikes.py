@@ -1,0 +1,140 @@
+"""Known effects put into records, and the scorer of spike and recovery. Truth: the simulator's own equations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from spikes import ledger, scores
+from spikes.drawing import SETS, Case, draw
+from spikes.editing import EFFECTS, edited, misbelieved
+from spikes.judging import judge
+from spikes.records import FLIGHTS, belief
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.dynamics.airflow import flow_angles, velocity_of
+from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
+from sysid_node.dynamics.vector import Vector
+from sysid_node.flight.record import FlightRecord
+
+RECORDS = Path(__file__).resolve().parents[3] / "shared" / "flights"
+STEP = 0.01
+GAP = {"before": 0.5, "tolerances": 0.4, "after": 0.1, "noise_floor": 0.08, "shrink_percent": 95.0}
+
+
+@pytest.fixture(scope="module")
+def flight() -> FlightRecord:
+    """A smooth motion of all signals, made by hand."""
+    time = np.arange(0.0, 8.0, STEP)
+    names = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "alpha", "beta", "de", "da", "dr")
+    columns = {name: 0.1 * np.sin((0.5 + 0.13 * k) * time + k) for k, name in enumerate(names)}
+    return FlightRecord(time, {**columns, "V": 20.0 + 0.5 * np.sin(0.4 * time), "rho": np.full(time.size, 1.2)})
+
+
+def test_stamps_and_commands_are_shifted_by_the_delay(flight: FlightRecord) -> None:
+    inner = slice(20, -20)
+    late = edited(flight, "imu_delay", {"delay": 0.1})
+    np.testing.assert_allclose(late["q"][inner], flight["q"][inner.start - 10 : inner.stop - 10], atol=1e-9)
+    assert late["alpha"] is flight["alpha"]
+    earlier = edited(flight, "command_delay", {"delay": 0.1})
+    np.testing.assert_allclose(earlier["de"][20:-30], flight["de"][30:-20], atol=1e-9)
+
+
+def test_a_lag_of_the_edited_commands_gives_the_recorded_positions(flight: FlightRecord) -> None:
+    command = edited(flight, "actuator_lag", {"time_constant": 0.1})["de"]
+    position = np.empty_like(command)
+    position[0], decay = flight["de"][0], np.exp(-STEP / 0.1)
+    for k in range(1, command.size):  # exact for a command held at its mean between samples
+        position[k] = decay * position[k - 1] + (1.0 - decay) * 0.5 * (command[k - 1] + command[k])
+    np.testing.assert_allclose(position, flight["de"], atol=2e-4)
+
+
+def test_an_imu_and_a_probe_moved_there_and_back_read_the_same(flight: FlightRecord) -> None:
+    rates = Vector(*(flight[name] for name in "pqr"))
+    turning = Vector(*(np.gradient(w, STEP) for w in rates))
+    moved = edited(flight, "imu_lever_arm", {"x": 0.4, "z": -0.2})
+    force = specific_force_from(Vector(moved["ax"], moved["ay"], moved["az"]), rates, turning, (0.4, 0.0, -0.2))
+    for found, name in zip(force, ("ax", "ay", "az"), strict=True):
+        np.testing.assert_allclose(found[100:-100], flight[name][100:-100], atol=1e-4)
+    vanes = edited(flight, "vane_lever_arm", {"x": 1.5})
+    velocity = velocity_of([vanes[name] for name in ("V", "alpha", "beta")], np)
+    back = flow_angles(velocity_from(velocity, tuple(rates), (1.5, 0.0, 0.0)), np)
+    for found, name in zip(back, ("V", "alpha", "beta"), strict=True):
+        np.testing.assert_allclose(found, flight[name], atol=1e-12)
+
+
+def test_a_surface_loses_a_part_of_what_is_commanded(flight: FlightRecord) -> None:
+    command = edited(flight, "control_effectiveness_loss", {"aileron": 0.4, "onset": 3.0})["da"]
+    np.testing.assert_allclose(command[400:] * 0.6, flight["da"][400:])
+    np.testing.assert_array_equal(command[:300], flight["da"][:300])
+
+
+def test_a_belief_is_wrong_by_what_was_put_in() -> None:
+    aircraft = load_aircraft(Path(__file__).parents[2] / "config" / "aircraft" / "cdrw.yaml")
+    assert misbelieved(aircraft, "mass_error", {"error": 0.25}).mass * 1.25 == pytest.approx(aircraft.mass)
+    assert misbelieved(aircraft, "inertia_error", {"Iyy": 0.5}).inertia.Iyy * 1.5 == pytest.approx(aircraft.inertia.Iyy)
+    cg = misbelieved(aircraft, "cg_shift", {"x": 0.03})
+    arm = 0.03 / aircraft.geometry.cbar  # a point behind the CG is nearer to the neutral point
+    slope = aircraft.derivatives["Cm_alpha"].value + arm * aircraft.derivatives["CL_alpha"].value
+    assert cg.derivatives["Cm_alpha"].value == pytest.approx(slope)
+    assert misbelieved(aircraft, "imu_delay", {"delay": 0.1}) is aircraft
+
+
+def _row(effect: str, values: dict[str, float], *causes: dict[str, Any], after: float = 0.1) -> dict[str, Any]:
+    said = {"verdict": "explained", "gap": {**GAP, "after": after}, "air_motion": 0.0, "doubted": []}
+    return ledger.row(Case(9, "thor", effect, values), {**said, "causes": list(causes)}, "", 1.0, "now")
+
+
+def _cause(effect: str, probability: float = 0.95, rivals: tuple[str, ...] = (), **sizes: float) -> dict[str, Any]:
+    values = {name: [value, 0.01] for name, value in sizes.items()}
+    return {"effect": effect, "label": effect, "probability": probability, "indistinguishable_from": list(rivals),
+            "parameters": values}  # fmt: skip
+
+
+def test_an_effect_is_named_first_or_beside_what_the_record_holds() -> None:
+    late, bias = _cause("command_delay", delay=0.06), _cause("imu_bias", p=0.03)
+    judged = judge(_row("imu_bias", {"p": 0.032}, late, bias), ("command_delay",), 0.1)
+    assert (judged.named, judged.sized, judged.closed, judged.blamed) == (True, True, True, False)
+    judged = judge(_row("imu_bias", {"p": 0.06}, late, bias, after=0.12), (), 0.1)
+    assert (judged.named, judged.closed, judged.blamed) == (False, False, True)
+    judged = judge(_row("imu_bias", {"p": 0.06}, bias, after=0.12), (), 0.1)
+    assert (judged.named, judged.sized) == (True, False)
+    rivals = _cause("vane_scale", 0.5, ("imu_bias",), alpha=0.2)
+    assert judge(_row("imu_bias", {"p": 0.06}, rivals), (), None).named
+
+
+def test_nothing_may_be_blamed_in_a_record_as_it_is() -> None:
+    assert judge(_row("", {}, _cause("imu_scale", 0.9, q=0.2)), (), None).blamed
+    assert not judge(_row("", {}, _cause("imu_scale", 0.7, q=0.2)), (), None).blamed
+    assert not judge(_row("", {}, _cause("command_delay", 0.9)), ("command_delay",), None).blamed
+
+
+def test_the_page_counts_cases_and_lists_what_was_missed() -> None:
+    bare = {**_row("", {}), "seed": 0}
+    rows = [bare, _row("imu_bias", {"p": 0.03}, _cause("imu_bias", p=0.03)), _row("mass_error", {"error": 0.25})]
+    text = scores.page(rows)
+    assert "2 cases with an effect put in, 1 records as they are" in text
+    assert "| thor | mass_error (error 0.25) | explained: - |" in text
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_cases_are_drawn_alike_again_and_sets_apart() -> None:
+    cases = [draw(RECORDS, "development", seed) for seed in range(30)]
+    assert cases == [draw(RECORDS, "development", seed) for seed in range(30)]
+    assert [case.flight for case in cases[:8]] == list(FLIGHTS)
+    assert not any(case.effect for case in cases[:8])
+    assert {case.effect for case in cases[8:]} <= set(EFFECTS)
+    assert set(SETS) == {"development", "final"}
+    assert [draw(RECORDS, "final", seed) for seed in range(8, 30)] != cases[8:]
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_the_belief_has_the_derivatives_that_the_field_finds() -> None:
+    """SIDPAC: CZ_alpha -6.35, Cm_alpha -1.476, Cm_q -36.4, Cm_de -1.87 (docs/results/real_flights.md)."""
+    found = {name: d.value for name, d in belief(RECORDS, FLIGHTS["twin_otter"]).derivatives.items()}
+    assert found["CL_alpha"] == pytest.approx(6.35, rel=0.03)
+    assert found["Cm_alpha"] == pytest.approx(-1.476, rel=0.03)
+    assert found["Cm_q"] == pytest.approx(-36.4, rel=0.05)
+    assert found["Cm_de"] == pytest.approx(-1.87, rel=0.05)
