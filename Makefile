@@ -56,13 +56,10 @@ format: $(DONE)/dev  ## lay the source out by ruff
 build: $(DONE)/build  ## sysid_msgs and sysid_node into $(VENV), by colcon
 
 fuzz: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## damaged input for every reader and command; ARGS="--seconds 3600 --seed 7"
-	@$(BIN)/python -m bench.fuzz.run $(ARGS)
+	@$(BIN)/python -m bench.robustness.fuzz $(ARGS)
 
-bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## all benches; BENCH=live runs bench/live.py alone
-	@for bench in $(or $(BENCH:%=bench/%.py),$(sort $(wildcard bench/*.py))); do
-	    echo "==> $$bench"
-	    $(BIN)/python $$bench $(ARGS)
-	done
+bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## run one: BENCH=speed.live ARGS="--seconds 60"
+	@$(BIN)/python -m bench.$(or $(BENCH),$(error which? BENCH=speed.live, or another of bench/README.md)) $(ARGS)
 
 clean:  ## remove what was built and written, keep the environment
 	@rm -rf build install log out $(DONE)/build .mypy_cache .pytest_cache .ruff_cache .hypothesis

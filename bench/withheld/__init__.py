@@ -1,5 +1,4 @@
-"""The check on withheld effects: plants that hand over bags and an aircraft file, and nothing else.
+"""Withheld effects: cases drawn at random, flown by the plants, diagnosed, and judged by their labels.
 
-The plants are written apart from the simulator: plain floats, another integrator, other actuators, an autopilot with
-its own instruments. They know an effect by its equation and share with the diagnosis only the file formats.
+`plants` hands over bags and an aircraft file, and nothing else. `ledgers` keeps what was judged.
 """

@@ -17,17 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.withheld.drawing import FOREIGN, Case
+from bench.withheld.plants.motion import DivergedError, Effects
+from bench.withheld.plants.plant import RATE, Plant
+from bench.withheld.predicting import everywhere, vector
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
-
-from .drawing import FOREIGN, Case
-from .motion import DivergedError, Effects
-from .plant import RATE, Plant
-from .predicting import everywhere, vector
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Whether the stated interval of the shrinkage covers: `python -m withheld.covering SET SEED FOLDER`.
+"""Whether the stated interval of the shrinkage covers: `python -m bench.withheld.covering SET SEED FOLDER`.
 
 The shrinkage that the diagnosis states is measured again, by the same rule, on flights of the plant that it has not
 seen, in other gusts with other noise. Only for plants and effects that the simulator can fly as they are. Writes
@@ -16,6 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.withheld.closing import effects_of
+from bench.withheld.drawing import Case
+from bench.withheld.plants.instruments import SUITES, readings, record
+from bench.withheld.plants.plant import Plant
+from bench.withheld.predicting import everywhere, vector
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
@@ -23,12 +28,6 @@ from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
-
-from .closing import effects_of
-from .drawing import Case
-from .instruments import SUITES, readings, record
-from .plant import Plant
-from .predicting import everywhere, vector
 
 #: Numbers of the flights that are flown for this: after the one fitted and the one held out.
 _FLIGHTS = (2, 3, 4)

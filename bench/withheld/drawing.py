@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .instruments import SUITES
+from bench.withheld.plants.instruments import SUITES
 
 SETS = {"development": 20260101, "final": 20260401}
 PLANTS = {"cdfp": 0.25, "cdrw": 0.25, "kestrel": 0.25, "c172p": 0.25}  # the last flies in JSBSim

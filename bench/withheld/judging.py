@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .drawing import FOREIGN, INHERENT, LOADED_ASIDE
+from bench.withheld.drawing import FOREIGN, INHERENT, LOADED_ASIDE
 
 #: Probability from which an effect counts as blamed.
 BLAMED = 0.9

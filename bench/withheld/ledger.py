@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import sysid_node
-
-from . import judging
-from .judging import Judged
+from bench.withheld import judging
+from bench.withheld.judging import Judged
 
 #: What is kept of a cause that was named or doubted: effect, nats, misfit, whether it was there.
 Weighed = tuple[str, float, float, bool]

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfiltfilt
 
+from bench.withheld.plants.instruments import Log
+from bench.withheld.plants.motion import Effects
 from sysid_node.aircraft.model import Aircraft
-
-from .instruments import Log
-from .motion import Effects
 
 Array = NDArray[np.float64]
 

@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from evaluation.pages import table
 from scipy.stats import beta
 
-from .drawing import FOREIGN
-from .judging import BLAMED, Judged
+from bench.pages import table
+from bench.withheld.drawing import FOREIGN
+from bench.withheld.judging import BLAMED, Judged
 
 _ALPHA = 0.05
 _EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.99, 1.01)  # of the bins of stated probability

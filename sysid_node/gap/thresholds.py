@@ -1,7 +1,7 @@
 """Thresholds and tuned constants of the gap that decide something, each with its unit, meaning and source.
 
 ``THRESHOLDS`` holds the values in use. Decision functions take a ``Thresholds`` as their last argument, so that
-``bench/gap_thresholds.py`` can decide again from recorded scores with other values. ``table`` lists all of them.
+``bench/gap/thresholds.py`` can decide again from recorded scores with other values. ``table`` lists all of them.
 
 A source is a bench that learned the value from flights of known truth, a definition, or "chosen": a judgement that no
 bench learned. Settings of numerical methods (rounds, tolerances, ridges, starting values) are no thresholds and stand
@@ -149,11 +149,11 @@ class Search:
 class Calibration:
     """The probability that a cause is there, from its evidence."""
 
-    constant: float = _threshold(-4.02, "1", "constant of the logistic regression", "bench/gap_credence.py")
+    constant: float = _threshold(-4.02, "1", "constant of the logistic regression", "bench/gap/calibration_weights.py")
     per_log_nat: float = _threshold(
-        1.18, "1", "its weight of the natural logarithm of the log Bayes factor", "bench/gap_credence.py"
+        1.18, "1", "its weight of the natural logarithm of the log Bayes factor", "bench/gap/calibration_weights.py"
     )
-    flexible: float = _threshold(-1.12, "1", "its weight of a flexible effect", "bench/gap_credence.py")
+    flexible: float = _threshold(-1.12, "1", "its weight of a flexible effect", "bench/gap/calibration_weights.py")
     flexible_effects: frozenset[str] = _threshold(
         frozenset({"derivative_error", "inertia_error", "mass_error", "cg_shift"}),
         "",
@@ -187,7 +187,7 @@ class Validation:
         1.5, "1", "ratio of an error to the noise floor that chance allows: half a minute of turbulence scatters by 1/4"
     )
     discrepancy: float = _threshold(
-        0.03, "1", "1 sigma by which a size is off beyond chance, as a share of itself", "bench/gap_sizes.py"
+        0.03, "1", "1 sigma by which a size is off beyond chance, as a share of itself", "bench/gap/size_errors.py"
     )
 
 

@@ -40,7 +40,7 @@ class Snippet:
 
 def pages() -> list[Path]:
     """All pages that people read, but for those that are generated."""
-    found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md"]
+    found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", ROOT / "bench" / "README.md"]
     found += sorted((ROOT / "docs").rglob("*.md"))
     return [page for page in found if "generated" not in page.parts and "_build" not in page.parts]
 

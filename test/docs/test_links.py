@@ -9,7 +9,7 @@ import pytest
 from snippets import ROOT, pages
 
 OUTSIDE = [page for page in pages() if ROOT / "docs" not in page.parents]  # what Sphinx does not see
-BENCHES = sorted((ROOT / "bench").glob("*.py"))
+BENCHES = sorted((ROOT / "bench").rglob("*.py"))
 MARKERS = [
     (page, name)
     for page in sorted((ROOT / "docs").rglob("*.md"))
@@ -39,10 +39,10 @@ def test_every_table_has_its_bench_and_its_end(page: Path, name: str) -> None:
     assert f"<!-- /{name} -->" in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("bench", BENCHES, ids=lambda bench: bench.stem)
+@pytest.mark.parametrize("bench", BENCHES, ids=lambda bench: str(bench.relative_to(ROOT)))
 def test_pages_that_a_bench_fills_hold_its_marker(bench: Path) -> None:
     for page in re.findall(r"--page (docs/\S+\.md)", bench.read_text(encoding="utf-8")):
-        assert f"<!-- bench/{bench.name}" in (ROOT / page).read_text(encoding="utf-8"), page
+        assert f"<!-- {bench.relative_to(ROOT)}" in (ROOT / page).read_text(encoding="utf-8"), page
 
 
 def test_every_page_of_the_documentation_that_the_program_names_is_there() -> None:

@@ -138,11 +138,12 @@ def check(words: list[str], place: str) -> None:
     elif program == "python" and arguments[0] == "-m":
         module = arguments[1]
         assert module in ("venv", "pip", "http.server") or find_spec(module), f"{place}: no module {module}"
+        if module.startswith("bench."):
+            check_options(ROOT / f"{module.replace('.', '/')}.py", arguments[2:], place)
     elif program == "python":
         source = ROOT / arguments[0]
         assert source.is_file(), f"{place}: {arguments[0]} is not there"
-        for option in (word.partition("=")[0] for word in arguments[1:] if word.startswith("--")):
-            assert f'"{option}"' in source.read_text(encoding="utf-8"), f"{place}: {arguments[0]} has no {option}"
+        check_options(source, arguments[1:], place)
     elif words[:3] == ["ros2", "run", "sysid_node"]:
         assert re.search(rf'"{arguments[2]} = ', (ROOT / "setup.py").read_text(encoding="utf-8")), f"{place}: {words}"
     elif words[:3] == ["ros2", "launch", "sysid_node"]:
@@ -151,6 +152,12 @@ def check(words: list[str], place: str) -> None:
             assert f'"{argument.partition(":=")[0]}"' in launch, f"{place}: {arguments[2]} has no {argument}"
     else:
         assert program in FOREIGN, f"{place}: what is {program}?"
+
+
+def check_options(source: Path, arguments: list[str], place: str) -> None:
+    """That a program's source has these options."""
+    for option in (word.partition("=")[0] for word in arguments if word.startswith("--")):
+        assert f'"{option}"' in source.read_text(encoding="utf-8"), f"{place}: {source.name} has no {option}"
 
 
 def test_the_make_file_of_the_pages_is_complete() -> None:

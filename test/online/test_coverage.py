@@ -1,12 +1,15 @@
-"""Intervals hold the truth, in a few simulated flights; bench/coverage.py flies hundreds. Truth: the aircraft file."""
+"""Intervals hold the truth, in a few simulated flights (`bench.estimation.coverage` flies hundreds).
+
+Truth: the aircraft file.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from bench.evaluation.flying import AIR_INTERVAL, Setting, fly
-from bench.evaluation.judging import METHODS, estimates, judge
+from bench.estimation.judging import METHODS, estimates, judge
+from bench.estimation.simulated_flights import AIR_INTERVAL, Setting, fly
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.types import SAMPLE_COLUMNS
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.evaluation.real import aircraft, attas, hfb320, references, thor, twin_otter
-from bench.evaluation.real.replaying import replay
-from bench.evaluation.real.showing import errors_off
+from bench.estimation.real import aircraft, attas, hfb320, references, thor, twin_otter
+from bench.estimation.real.replaying import replay
+from bench.estimation.real.showing import errors_off
 
 
 @pytest.fixture(scope="module")

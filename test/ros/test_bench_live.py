@@ -12,7 +12,7 @@ from harness import ROOT
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT], ids=str)
 def test_told_to_stop_it_ends_without_a_traceback(ros: None, told: signal.Signals) -> None:
     """Exit code 0, as run_program promises; what it started ends too, else its output would never end."""
-    command = [sys.executable, "-u", str(ROOT / "bench" / "live.py"), "--seconds", "60"]
+    command = [sys.executable, "-u", "-m", "bench.speed.live", "--seconds", "60"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT)
     assert process.stdout is not None
     assert "400 Hz IMU" in process.stdout.readline()

@@ -4,7 +4,7 @@ Evidence says how much better one model of the list predicts than another. If th
 evidence of the nearest candidate grows with the amount of data, and no such number is a probability (Bernardo & Smith
 (1994), Bayesian Theory, sect. 6.1: the M-open case). A cause whose equation is refuted by what it leaves therefore has
 no probability, and for the others the log Bayes factor is calibrated by a logistic regression over causes whose truth
-was known (Platt (1999), Advances in Large Margin Classifiers). ``bench/gap_credence.py`` learns its weights.
+was known (Platt (1999), Advances in Large Margin Classifiers). ``bench/gap/calibration_weights.py`` learns its weights.
 """
 
 from __future__ import annotations

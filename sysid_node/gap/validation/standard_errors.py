@@ -6,8 +6,8 @@ computed, and its scatter from group to group is taken where that is more (White
 clusters: Liang & Zeger (1986), Biometrika 73(1)).
 
 What an aircraft has beside the effects of the list may change a size in the same way in every window, which no scatter
-shows. A size is therefore also uncertain by a share of itself, which ``bench/gap_sizes.py`` learned from aircraft that
-are not the simulator's (a discrepancy of the model: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63(3)).
+shows. A size is therefore also uncertain by a share of itself, which ``bench/gap/size_errors.py`` learned from aircraft
+that are not the simulator's (a discrepancy of the model: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63(3)).
 """
 
 from __future__ import annotations

@@ -1,1 +1,0 @@
-"""What benches of the estimator share: flights simulated in batches, real flights, and how estimates are judged."""

@@ -1,1 +1,0 @@
-"""Parts of the batch estimators' bench: published analyses, coverage of intervals, the bundled flights."""

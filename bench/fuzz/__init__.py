@@ -1,1 +1,0 @@
-"""Damaged input for every reader and command, for as long as one likes."""

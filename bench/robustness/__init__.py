@@ -1,0 +1,1 @@
+"""Damaged input and signals at random times, for every reader and command."""

@@ -1,0 +1,1 @@
+"""The simulator: its speed, and imported models beside their own programs."""

@@ -1,0 +1,1 @@
+"""What estimation, replay, reading and diagnosis cost in time and memory."""

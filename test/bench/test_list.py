@@ -1,0 +1,39 @@
+"""Every bench can be imported, and bench/README.md lists each of them. Truth: the files."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+MODULES = sorted(
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for path in (ROOT / "bench").rglob("*.py")
+    if path.name != "__init__.py"
+)
+PROGRAMS = [
+    module
+    for module in MODULES
+    if 'if __name__ == "__main__"' in (ROOT / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
+]
+README = (ROOT / "bench" / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_bench_can_be_imported(module: str) -> None:
+    importlib.import_module(module)
+
+
+@pytest.mark.parametrize("module", PROGRAMS)
+def test_a_bench_is_listed(module: str) -> None:
+    name = module.removeprefix("bench.")
+    assert f"`{name}`" in README or f"`{name}.py`" in README
+
+
+def test_what_is_listed_is_there() -> None:
+    listed = re.findall(r"^\| `([\w.]+)`", README, re.M)
+    assert len(listed) > 30
+    assert {f"bench.{name}" for name in listed} <= set(PROGRAMS)
