@@ -18,8 +18,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
-from withheld.mattering import coefficients
 
+from bench.withheld.mattering import coefficients
 from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.record import FlightRecord

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from evaluation.pages import table
-from withheld.scoreboard import calibration, interval
+from bench.pages import table
+from bench.withheld.scoreboard import calibration, interval
 
 from .judging import Judged, judge
 from .records import FLIGHTS

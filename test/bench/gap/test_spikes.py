@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spikes import ledger, scores
-from spikes.drawing import SETS, Case, draw
-from spikes.editing import EFFECTS, edited, misbelieved
-from spikes.judging import judge
-from spikes.records import FLIGHTS, belief
 
+from bench.spikes import ledger, scores
+from bench.spikes.drawing import SETS, Case, draw
+from bench.spikes.editing import EFFECTS, edited, misbelieved
+from bench.spikes.judging import judge
+from bench.spikes.records import FLIGHTS, belief
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.dynamics.airflow import flow_angles, velocity_of
 from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
 
-RECORDS = Path(__file__).resolve().parents[3] / "shared" / "flights"
+RECORDS = Path(__file__).resolve().parents[4] / "shared" / "flights"
 STEP = 0.01
 GAP = {"before": 0.5, "tolerances": 0.4, "after": 0.1, "noise_floor": 0.08, "shrink_percent": 95.0}
 
@@ -72,7 +72,7 @@ def test_a_surface_loses_a_part_of_what_is_commanded(flight: FlightRecord) -> No
 
 
 def test_a_belief_is_wrong_by_what_was_put_in() -> None:
-    aircraft = load_aircraft(Path(__file__).parents[2] / "config" / "aircraft" / "cdrw.yaml")
+    aircraft = load_aircraft(Path(__file__).parents[3] / "config" / "aircraft" / "cdrw.yaml")
     assert misbelieved(aircraft, "mass_error", {"error": 0.25}).mass * 1.25 == pytest.approx(aircraft.mass)
     assert misbelieved(aircraft, "inertia_error", {"Iyy": 0.5}).inertia.Iyy * 1.5 == pytest.approx(aircraft.inertia.Iyy)
     cg = misbelieved(aircraft, "cg_shift", {"x": 0.03})

@@ -1,6 +1,6 @@
 """Spike and recovery: ``sysid gap`` on real records with a known effect put in.
 
-    python bench/gap_spikes.py --set development --cases 40 --ledger out/spikes.jsonl \
+    python -m bench.gap.spikes --set development --cases 40 --ledger out/spikes.jsonl \
         [--page docs/results/gap_spikes.md]
 
 The first cases are the records as they are; in the others an effect drawn at random is put into the record, or into
@@ -17,13 +17,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from evaluation.pages import publish
-from spikes import ledger, scores
-from spikes.drawing import SETS, Case, draw
-from spikes.editing import edited, misbelieved
-from spikes.records import FLIGHTS, belief, part, rate_of
-from withheld.ledger import version
-
+from bench.pages import publish
+from bench.spikes import ledger, scores
+from bench.spikes.drawing import SETS, Case, draw
+from bench.spikes.editing import edited, misbelieved
+from bench.spikes.records import FLIGHTS, belief, part, rate_of
+from bench.withheld.ledger import version
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
@@ -34,7 +33,7 @@ from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 
 def main() -> None:
     """Diagnose the cases that the ledger lacks, and print the tables or put them in the documentation."""
-    beside = Path(__file__).resolve().parents[2] / "shared" / "flights"
+    beside = Path(__file__).resolve().parents[3] / "shared" / "flights"
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=Path, default=Path(os.environ.get("SYSID_FLIGHTS", beside)))
     parser.add_argument("--set", choices=SETS, default="development", help="of seeds; the final one is for the end")
@@ -51,7 +50,7 @@ def main() -> None:
             print(f"flight records not found at {args.flights}: nothing to diagnose; give their folder as --flights")
             return
         _diagnose_missing(args)
-    publish(f"bench/gap_spikes.py {args.set}", scores.page(ledger.read(args.ledger)), args.page)
+    publish(f"bench/gap/spikes.py {args.set}", scores.page(ledger.read(args.ledger)), args.page)
 
 
 def _diagnose_missing(args: argparse.Namespace) -> None:
