@@ -35,7 +35,7 @@ def compare_contrasts(value: Array, covariance: Array, courses: Array, freedom: 
 
     Amplitude and error are those of generalised least squares. The variances count as known but for a common factor
     with so many degrees of ``freedom``, so that each statistic has Student's t distribution. The p-value of the
-    largest is simulated; it is Bonferroni's bound where fewer than 30 draws exceed it, for the bound is close there, and
+    largest is simulated; it is Bonferroni's bound where fewer than 30 draws exceed it (it is close there) and
     where the largest would not be significant alone.
     """
     inverse = np.linalg.inv(covariance)

@@ -1,4 +1,6 @@
-"""What a fleet's statistics are worth, on fleets drawn from their model. `python bench/fleet_statistics.py`
+"""What a fleet's statistics are worth, on fleets drawn from their model.
+
+    python -m bench.fleet.statistics
 
 Coverage of the intervals of means and scatters, false drifts, whether the four events are found and put to the right
 account, and the errors of estimates with the fleet's prior. `--events` draws fleets with the events, `--quiet-fleets`
@@ -15,7 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from evaluation.fleets import (
+from scipy import stats
+
+from bench.fleet.drawn_fleets import (
     CONFUSED,
     LACKING,
     NAMES,
@@ -26,9 +30,7 @@ from evaluation.fleets import (
     sizes_of,
     statistical_covariance,
 )
-from evaluation.pages import publish, table
-from scipy import stats
-
+from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.fleet.statistics.summarise import summarise
 from sysid_node.fleet.statistics.summary import FleetSummary
@@ -173,14 +175,15 @@ def main() -> None:
     args = parser.parse_args()
     args.ledger.parent.mkdir(parents=True, exist_ok=True)
     done = {(row["events"], row["seed"]) for row in _read(args.ledger)}
-    wanted = [(False, 1000 + k) for k in range(args.quiet_fleets)] + [(True, k) for k in range(args.events)]
+    wanted = [(events, seed) for seed in range(max(args.events, args.quiet_fleets)) for events in (True, False)]
+    wanted = [(e, seed) for e, seed in wanted if seed < (args.events if e else args.quiet_fleets)]
     for events, seed in wanted:
         if (events, seed) not in done:
             row = judge_fleet(seed, events=events)
             with args.ledger.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
     rows = [row for row in _read(args.ledger) if (row["events"], row["seed"]) in set(wanted)]
-    publish("bench/fleet_statistics.py", report(rows), args.page)
+    publish("bench.fleet.statistics", report(rows), args.page)
 
 
 if __name__ == "__main__":
