@@ -183,7 +183,7 @@ def main() -> None:
             with args.ledger.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
     rows = [row for row in _read(args.ledger) if (row["events"], row["seed"]) in set(wanted)]
-    publish("bench.fleet.statistics", report(rows), args.page)
+    publish("bench/fleet/statistics.py", report(rows), args.page)
 
 
 if __name__ == "__main__":
