@@ -53,7 +53,7 @@ def compare_contrasts(value: Array, covariance: Array, courses: Array, freedom: 
 def _p_value(largest: float, whitened: Array, freedom: int, seed: int) -> float:
     """Probability that the largest of |whitened e| / sqrt(chi2 / freedom) exceeds ``largest``."""
     alone = float(2.0 * stats.t.sf(largest, freedom))
-    bound = min(1.0, whitened.shape[0] * alone)
+    bound = float(min(1.0, whitened.shape[0] * alone))
     if alone > _MATTERS:  # not significant even without the search
         return bound
     generator = np.random.default_rng(seed)
