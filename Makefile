@@ -41,10 +41,10 @@ docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out
 	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
 	@echo "out/docs/index.html"
 
-test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
+test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
 	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
-lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## ruff and mypy --strict
+lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev  ## ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
@@ -55,10 +55,10 @@ format: $(DONE)/dev  ## lay the source out by ruff
 
 build: $(DONE)/build  ## sysid_msgs and sysid_node into $(VENV), by colcon
 
-fuzz: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## damaged input for every reader and command; ARGS="--seconds 3600 --seed 7"
+fuzz: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev  ## damaged input for every reader and command; ARGS="--seconds 3600 --seed 7"
 	@$(BIN)/python -m bench.robustness.fuzz $(ARGS)
 
-bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev  ## run one: BENCH=speed.live ARGS="--seconds 60"
+bench: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev  ## run one: BENCH=speed.live ARGS="--seconds 60"
 	@$(BIN)/python -m bench.$(or $(BENCH),$(error which? BENCH=speed.live, or another of bench/README.md)) $(ARGS)
 
 clean:  ## remove what was built and written, keep the environment
@@ -79,7 +79,7 @@ $(DONE)/ros: requirements/ros.txt requirements/constraints.txt | $(DONE)/venv
 	$(PIP) -r requirements/ros.txt
 	touch $@
 
-$(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/dev $(DONE)/docs $(DONE)/view: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
+$(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view: $(DONE)/%: requirements/%.txt requirements/constraints.txt | $(DONE)/ros
 	@echo "==> $< into $(VENV)"
 	$(PIP) -r $<
 	touch $@

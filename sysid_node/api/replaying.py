@@ -26,7 +26,8 @@ from sysid_node.flight.truth import Truth, truth_at_end
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.alignment.whole_record import AlignedSamples, align_streams
-from sysid_node.online.replay import run as run_online
+from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
+from sysid_node.online.replay import run_to_end
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.estimates_bag import write_estimates
@@ -58,6 +59,7 @@ class Replay(EstimatedRun):
     final: Estimates  # after the last sample, whether or not one was due
     streams: Streams
     truth: Truth  # empty where it is not known
+    covariance: EstimateCovariance | None  # of ``final``; None where nothing was estimated
     faults: FaultVerdict | None = None  # None: nothing was judged
 
     @cached_property
@@ -161,7 +163,7 @@ def _estimated(
     time = aligned.time
     due = due_times(time, aligned.wait, publish_rate)
     last = float(time[-1])
-    history = run_online(
+    history, state = run_to_end(
         flight.aircraft,
         settings,
         time,
@@ -172,7 +174,10 @@ def _estimated(
     )
     published = history if due.size and due[-1] == last else history[:-1]
     stamps = aligned.stamps[np.searchsorted(time, due)]
-    return Replay(flight.aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams, truth)
+    covariance = estimate_covariance(state)
+    return Replay(
+        flight.aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams, truth, covariance
+    )
 
 
 def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> FaultVerdict:

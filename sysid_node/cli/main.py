@@ -29,6 +29,7 @@ COMMANDS = {
     "simulate": "fly a simulated aircraft into a bag",
     "excite": "design a manoeuvre and predict its accuracy",
     "gap": "find why the simulator does not fly like the aircraft",
+    "fleet": "identify many flights of many aircraft, and say what they tell together",
     "aircraft": "say what an aircraft file means, as a handbook would",
     "check": "say what a flight's file is good for",
     "convert": "turn a flight log into a bag",

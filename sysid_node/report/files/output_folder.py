@@ -22,7 +22,7 @@ from sysid_node.version import VERSION
 
 STAGE, EARLIER = ".sysid-unfinished", ".sysid-earlier"
 #: The files of which one lists all files of a run, and the key under which it does.
-CONTENTS, WRITTEN = ("summary.json", "gap.json", "aircraft.json"), "written"
+CONTENTS, WRITTEN = ("summary.json", "gap.json", "aircraft.json", "fleet.json"), "written"
 #: Names of results that earlier versions wrote without a list; ``--force`` removes them.
 _UNLISTED = frozenset(
     ["summary.json", "gap.json"]

@@ -1,0 +1,102 @@
+"""Dask's workers: started here, one thread a process, or those of a scheduler that runs already."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import signal
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import dask
+from distributed import Client, LocalCluster, WorkerPlugin
+
+from sysid_node.errors import InputError
+
+#: A flight whose process ends is handed out again by our own count, not by Dask's. Memory is bounded by ending the
+#: process: a worker that spills or pauses at a share of its limit would wait for memory that the libraries keep.
+_SETTINGS: dict[str, Any] = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.worker.daemon": True,
+    "distributed.admin.system-monitor.log-length": 60,
+    "distributed.nanny.pre-spawn-environ.OMP_NUM_THREADS": 1,
+    "distributed.nanny.pre-spawn-environ.MKL_NUM_THREADS": 1,
+    "distributed.nanny.pre-spawn-environ.OPENBLAS_NUM_THREADS": 1,
+}
+
+#: Seconds in which a scheduler must answer.
+_ANSWER = 15.0
+
+
+class IgnoreInterrupts(WorkerPlugin):  # type: ignore[misc]  # Dask has no type hints
+    """Lets a worker of this machine ignore Ctrl-C, which the terminal sends to all: the command ends its workers."""
+
+    def setup(self, worker: object) -> None:
+        """Called by Dask in the worker's main thread."""
+        with contextlib.suppress(ValueError):  # not the main thread
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class Workers(NamedTuple):
+    """A client of the workers' scheduler, and a function that starts those anew that have gone and did not return."""
+
+    client: Client
+    revive: Callable[[], None]
+
+
+@contextlib.contextmanager
+def local_workers(count: int, memory: str | None = None) -> Iterator[Workers]:
+    """``count`` worker processes on this machine, each bounded to ``memory`` (as "2GB"; None: its share of all).
+
+    Raises InputError where the memory is no size.
+    """
+    if memory is not None:
+        try:
+            dask.utils.parse_bytes(memory)
+        except ValueError:
+            raise InputError(f"--memory {memory!r}: expected a size, e.g. 2GB") from None
+    _quiet()
+    with dask.config.set(_SETTINGS):
+        cluster = LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit="auto" if memory is None else memory,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        )
+        try:
+            with Client(cluster) as client:
+                client.register_plugin(IgnoreInterrupts())
+                yield Workers(client, lambda: cluster.scale(count))
+        finally:
+            with contextlib.suppress(TimeoutError):  # a worker that is being started anew
+                cluster.close(timeout=_ANSWER)
+
+
+@contextlib.contextmanager
+def connected(address: str) -> Iterator[Workers]:
+    """The workers of the scheduler at ``address``. Raises InputError where none answers."""
+    _quiet()
+    try:
+        client = Client(address, timeout=_ANSWER)
+    except (OSError, ValueError, TimeoutError) as error:
+        words = " ".join(str(error).split())[:200]
+        raise InputError(f"--scheduler {address}: no scheduler answers ({words}); is it dask scheduler's?") from error
+    try:
+        if not client.scheduler_info(n_workers=-1)["workers"]:
+            raise InputError(f"--scheduler {address}: it has no workers; start some: dask worker {address}")
+        yield Workers(client, lambda: None)
+    finally:
+        client.close(timeout=5.0)
+
+
+def _quiet() -> None:
+    """Let Dask's loggers be silent: what concerns the user comes as one line of the command."""
+    for name in ("distributed", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -1,0 +1,93 @@
+"""What is to be done: which flights of a catalogue are finished, which are not, and which cannot be begun."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
+from sysid_node.fleet.catalogue import locations
+from sysid_node.fleet.catalogue.catalogue import Catalogue, CatalogueFlight
+from sysid_node.fleet.outcome import FleetSettings, FlightTask
+from sysid_node.fleet.state.fingerprints import fingerprint, known_hash
+from sysid_node.fleet.state.store import FleetState
+
+
+@dataclass(frozen=True)
+class PlannedFlight:
+    """A flight of the catalogue: with a ``fault`` in the entry, or its ``task`` and fingerprint; whether it is done."""
+
+    entry: CatalogueFlight
+    task: FlightTask | None
+    fingerprint: str
+    done: bool
+
+
+class Plan:
+    """The flights of a catalogue as they stand beside a state file, or beside none."""
+
+    def __init__(
+        self, catalogue: Catalogue, settings: FleetSettings, state: FleetState | None, cache: str = ""
+    ) -> None:
+        self.settings, self.cache, self._state = settings, cache, state
+        self._aircraft = _AircraftFiles()
+        self.catalogue = replace(catalogue, flights=tuple(map(self._with_aircraft_fault, catalogue.flights)))
+
+    def aircraft_of(self, entry: CatalogueFlight) -> Aircraft | None:
+        """The aircraft of a flight; None where its file has a fault."""
+        return self._aircraft.loaded(entry.aircraft)[0] if entry.aircraft else None
+
+    def _with_aircraft_fault(self, entry: CatalogueFlight) -> CatalogueFlight:
+        if entry.fault or not entry.aircraft:
+            return entry
+        return replace(entry, fault=self._aircraft.loaded(entry.aircraft)[2])
+
+    def flights(self, progress: Callable[[], None] = lambda: None) -> Iterator[PlannedFlight]:
+        """Every flight, one at a time; logs are hashed as they come. ``progress`` is called after each."""
+        finished = self._state.fingerprints() if self._state is not None else {}
+        for entry in self.catalogue.flights:
+            yield self._planned(entry, finished)
+            progress()
+
+    def _planned(self, entry: CatalogueFlight, finished: dict[str, str]) -> PlannedFlight:
+        if entry.fault:
+            return PlannedFlight(entry, None, "", done=False)
+        aircraft, text, _ = self._aircraft.loaded(entry.aircraft)
+        assert aircraft is not None
+        try:
+            log = self._hash(entry.location)
+        except InputError as error:
+            return PlannedFlight(replace(entry, fault=str(error)), None, "", done=False)
+        key = fingerprint(log, text, self.settings.as_dict())
+        task = FlightTask(entry.flight, entry.location, aircraft, self.settings, self.cache)
+        return PlannedFlight(entry, task, key, done=finished.get(entry.flight) == key)
+
+    def _hash(self, location: str) -> str:
+        if locations.is_remote(location):
+            return locations.remote_hash(location)
+        path = Path(location)
+        if self._state is None:
+            return known_hash(path, lambda *_: None, lambda *_: None)
+        return known_hash(path, self._state.known_hash, self._state.remember_hash)
+
+
+class _AircraftFiles:
+    """Aircraft files, each read once: the aircraft, the file's text, and its fault."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[Aircraft | None, str, str]] = {}
+
+    def loaded(self, name: str) -> tuple[Aircraft | None, str, str]:
+        if name not in self._found:
+            self._found[name] = self._load(name)
+        return self._found[name]
+
+    def _load(self, name: str) -> tuple[Aircraft | None, str, str]:
+        try:
+            aircraft = load_aircraft(name)
+        except InputError as error:
+            return None, "", str(error)
+        return aircraft, repr(aircraft), ""
