@@ -34,6 +34,7 @@ setup(
             "fault_monitor = sysid_node.ros.fault_monitor:main",
             "flight_simulator = sysid_node.ros.flight_simulator:main",
             "identifier = sysid_node.ros.identifier:main",
+            "markers = sysid_node.cli.live.markers:main",
             "player = sysid_node.ros.player:main",
             "recorder = sysid_node.ros.recorder:main",
             "sysid = sysid_node.cli.main:main",

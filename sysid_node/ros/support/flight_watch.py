@@ -35,13 +35,13 @@ class FlightWatch:
     Subscriptions are best effort, so that no publisher waits for them, and messages that are left out are not decoded.
     """
 
-    def __init__(self, frame: BodyFrame = "flu") -> None:
+    def __init__(self, frame: BodyFrame = "flu", name: str = "view") -> None:
         self.start_ns = 0  # the first stamp
         self.faults: Mapping[str, str] = {}
-        self._frame: BodyFrame = frame
+        self.frame: BodyFrame = frame  # of the IMU's messages
         self._news = FlightNews([], [], [])
         self._estimates: list[Estimates] = []
-        self.node: Node = rclpy.create_node("view")
+        self.node: Node = rclpy.create_node(name)
         for kind, topic, take in (
             (Imu, IMU, self._on_imu),
             (AirData, AIR_DATA, self._on_air_data),
@@ -87,14 +87,14 @@ class FlightWatch:
     def _on_imu(self, message: Any) -> None:
         pair = (message.linear_acceleration, message.angular_velocity)
         vectors = np.array([[vector.x, vector.y, vector.z] for vector in pair])
-        values = turn_vectors(vectors, self._frame).ravel().tolist()
+        values = turn_vectors(vectors, self.frame).ravel().tolist()
         self._news.imu.append((self._stamp(message), (*values, *self._attitude(message))))
 
     def _attitude(self, message: Any) -> list[float]:
         if message.orientation_covariance[0] == -1.0:
             return [math.nan] * 3
         quaternion = np.array([[getattr(message.orientation, part) for part in "xyzw"]])
-        angles: list[float] = euler_from_quaternion(quaternion, self._frame)[0].tolist()
+        angles: list[float] = euler_from_quaternion(quaternion, self.frame)[0].tolist()
         return angles
 
     def _on_air_data(self, message: Any) -> None:
