@@ -32,7 +32,7 @@ _LAPSE = 0.0065
 _REMEDIES = {
     IMU: "LOG_BITMASK: set bit 7 (IMU, every loop) and bit 0 (fast attitude), 524287 for everything",
     AIRSPEED: "LOG_BITMASK has no bit that logs ARSP faster; below 5 Hz look for dropped messages (DSF.Dp)",
-    CONTROLS: "LOG_BITMASK: set bit 13 (RC, 25 Hz)",
+    CONTROLS: "LOG_BITMASK: set bit 13 (RC): RCOU then comes at 25 Hz, which serves for smooth commands, not for steps",
 }
 
 Rows = dict[str, list[dict[str, Any]]]
