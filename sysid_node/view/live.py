@@ -36,7 +36,7 @@ class LiveScene:
     def __init__(self, aircraft: Aircraft) -> None:
         self._aircraft, self._actuation = aircraft, Actuation.of(aircraft)
         self._references = References(prior_of(aircraft))
-        self._last: FlightRecord | None = None  # its newest sample
+        self._last: tuple[float, Mapping[str, float]] | None = None  # the newest sample: its time, and values by column
         self._place = np.zeros(3)  # m
         self._controls: dict[str, tuple[Array, Array]] = {}  # times and values of the last seconds
         self._states: dict[str, str] = {}  # of lanes
@@ -118,16 +118,17 @@ class LiveScene:
         accepted = [(stamp, values) for stamp, values in rows if not isinstance(values, str)]
         columns |= _held(time, start_ns, ("thrust", *self._aircraft.control_symbols), accepted, last)
         if last is not None:
-            keep = time > last.time[-1]
-            time = np.append(last.time[-1:], time[keep])
-            columns = {n: np.append(last[n][-1:], values[keep]) for n, values in columns.items()}
+            keep = time > last[0]
+            time = np.append(last[0], time[keep])
+            columns = {n: np.append(last[1][n], values[keep]) for n, values in columns.items()}
         newest = np.maximum.accumulate(np.append(-np.inf, time))[:-1]
         later = time > newest  # messages may arrive out of order
         time, columns = time[later], {n: values[later] for n, values in columns.items()}
-        if time.size < 2:
-            return None
-        self._last = FlightRecord(time, columns)
-        return self._last
+        if time.size:
+            self._last = float(time[-1]), {n: float(values[-1]) for n, values in columns.items()}
+        return (
+            FlightRecord(time, columns) if time.size > 1 else None
+        )  # one sample is no motion; the next call adds to it
 
     def _body(self, record: FlightRecord) -> Body:
         """The aircraft from where it was seen last; its way is not drawn as a line, as it is not over."""
@@ -185,11 +186,11 @@ def _held(
     start_ns: int,
     names: Sequence[str],
     messages: Sequence[tuple[int, tuple[float, ...]]],
-    last: FlightRecord | None,
+    last: tuple[float, Mapping[str, float]] | None,
 ) -> dict[str, Array]:
     """Messages' values at times (N,), interpolated; without a message the last known values, or NaN."""
     if not messages:
-        return {n: np.full(time.shape, last[n][-1] if last is not None else np.nan) for n in names}
+        return {n: np.full(time.shape, last[1][n] if last is not None else np.nan) for n in names}
     messages = sorted(messages, key=lambda message: message[0])
     at = np.array([(stamp - start_ns) / 1e9 for stamp, _ in messages])
     table = np.array([values for _, values in messages], dtype=float)

@@ -25,6 +25,15 @@ def test_messages_out_of_order_are_left_out() -> None:
     np.testing.assert_allclose(second.bodies[0].position[:, 0], [4.0, 6.0, 8.0])  # north at 20 m/s, carried on
 
 
+def test_messages_that_come_one_at_a_time_are_shown() -> None:
+    """An IMU of 20 Hz gives one message between two looks."""
+    scene = LiveScene(load_aircraft("cdrw"))
+    shown = [scene.update(SECOND, news([t]), [], {}).bodies for t in (0.0, 0.1, 0.2)]
+    assert not shown[0]
+    np.testing.assert_allclose(shown[1][0].time, [0.0, 0.1])
+    np.testing.assert_allclose(shown[2][0].position[:, 0], [2.0, 4.0])
+
+
 def test_nothing_new_adds_nothing() -> None:
     scene = LiveScene(load_aircraft("cdrw"))
     nothing = scene.update(0, FlightNews([], [], []), [], {})

@@ -40,6 +40,12 @@ def test_published_transforms_and_markers() -> None:
     node.create_subscription(MarkerArray, "/markers/markers", arrays.append, 100)
     imu, air = node.create_publisher(Imu, "imu/data", 100), node.create_publisher(AirData, "air_data", 100)
     joints = node.create_publisher(JointState, "actuators", 100)
+    for _ in range(200):  # until all have found each other
+        watch.listen(0.05)
+        outputs = ("/tf", "/markers/markers")
+        known = all(one.get_subscription_count() for one in (imu, air, joints))
+        if known and all(watch.node.count_subscribers(topic) and node.count_publishers(topic) for topic in outputs):
+            break
     for tick in range(150):
         at = 0.02 * tick
         stamp = header(1_700_000_000_000_000_000 + round(1e9 * at), "base_link")
