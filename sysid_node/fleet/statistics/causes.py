@@ -11,7 +11,7 @@ from scipy import stats
 from sysid_node.fleet.results import FlightResult
 from sysid_node.fleet.statistics.cause_evidence import GroupBelief, TailEvidence, pooled
 from sysid_node.fleet.statistics.diagnoses import FlightDiagnosis, confused_groups, diagnoses_of
-from sysid_node.fleet.statistics.random_effects import fit_random_effects
+from sysid_node.fleet.statistics.random_effects import RandomEffects, fit_random_effects
 
 #: Probability from which a cause is listed for a type or a tail.
 LISTED = 0.5
@@ -164,11 +164,23 @@ def _shared_split(rows: Sequence[tuple[str, float, float]]) -> _SplitSizes:
         return _SplitSizes(Size(fit.mean, fit.lower, fit.upper), {tails[0]: Size(fit.mean, fit.lower, fit.upper)}, {})
     t = float(stats.t.ppf(0.975, len(tails) - 1))
     total = {name: _around(fit.level[j], t * fit.level_error[j]) for j, name in enumerate(tails)}
-    deviation = fit.level - fit.mean
-    kept = 1.0 - fit.shrinkage
-    spread = np.sqrt(kept * fit.own_error**2 + kept**2 * fit.mean_error**2)
-    own = {name: _around(deviation[j], t * spread[j]) for j, name in enumerate(tails)}
+    own = {name: _own_part(fit, j, t) for j, name in enumerate(tails)}
     return _SplitSizes(Size(fit.mean, fit.lower, fit.upper), total, own)
+
+
+def _own_part(fit: RandomEffects, j: int, t: float) -> Size:
+    """A tail's deviation from the type's size, with an interval that holds those of all likely scatters of tails.
+
+    At a scatter of zero no tail could differ, which few tails cannot show: the interval is therefore the hull of that
+    at the estimated scatter and that at the upper end of its 95 % interval.
+    """
+    deviation, variance = float(fit.own[j] - fit.mean), float(fit.own_error[j] ** 2)
+    ends = []
+    for scatter in (fit.tails.value, fit.tails.upper):
+        kept = scatter**2 / (scatter**2 + variance)
+        half = t * np.sqrt(kept * variance + kept**2 * fit.mean_error**2)
+        ends += [kept * deviation - half, kept * deviation + half]
+    return Size(float(fit.level[j] - fit.mean), float(min(ends)), float(max(ends)))
 
 
 def _around(value: float, half: float) -> Size:

@@ -5,7 +5,9 @@
   const touch = window.matchMedia("(pointer: coarse)").matches;
   const night = window.matchMedia("(prefers-color-scheme: dark)");
   const config = { displaylogo: false, displayModeBar: false, responsive: true };
-  const waiting = Array.from(document.querySelectorAll(".plot"));
+  // A plot in a closed part of the page waits until that is opened: it has no width yet, and there may be hundreds.
+  const closed = (box) => box.closest("details:not([open])") !== null;
+  const waiting = Array.from(document.querySelectorAll(".plot")).filter((box) => !closed(box));
   const drawn = new Map(); // plot -> text of its figure
   // Colours of figures.py, and what they are on a dark page.
   const dark = {
@@ -74,6 +76,19 @@
     draw(waiting.shift());
     setTimeout(drawNext, 0);
   }
+
+  for (const part of document.querySelectorAll("details")) {
+    part.addEventListener("toggle", () => {
+      for (const box of part.querySelectorAll(".plot")) if (part.open && !drawn.has(box) && !closed(box)) draw(box);
+    });
+  }
+  // A link into a closed part opens it.
+  function openTarget() {
+    const part = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (part && part.tagName === "DETAILS") part.open = true;
+  }
+  window.addEventListener("hashchange", openTarget);
+  openTarget();
 
   night.addEventListener("change", () => redraw(night.matches));
   window.addEventListener("beforeprint", () => {

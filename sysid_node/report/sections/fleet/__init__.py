@@ -1,0 +1,1 @@
+"""The sections of a fleet's page, one module each."""

@@ -1,0 +1,53 @@
+"""What stands out in the fleet, in a few sentences."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import Any
+
+from sysid_node.report.results.fleet_report import FleetReport
+from sysid_node.report.wording.fleet import account_words, tail_sentence
+from sysid_node.report.wording.names import short_meaning
+from sysid_node.report.wording.numbers import number, plural
+
+#: Sentences of one kind at most; the sections below hold all.
+_MOST = 8
+
+
+def opening(report: FleetReport) -> dict[str, Any]:
+    """Facts about the fleet, and sentences about drift, tails that stand out, and causes."""
+    summary = report.summary
+    tails = sum(len(names) for names in summary.tails.values())
+    drifting = [
+        tail_sentence(tail, list(found), report.maintenance(tail))
+        for (_, tail), found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
+    ]
+    causes = [f"{c.label} ({c.aircraft}): {account_words(c)}" for c in summary.causes if c.account != "flight"]
+    facts = [
+        ("Flights", str(summary.flights)),
+        ("Tails", str(tails)),
+        ("Types", ", ".join(summary.tails) or "none"),
+        ("Refused", str(len(report.results.refusals))),
+    ]
+    return {
+        "facts": facts,
+        "drifting": _shortened(drifting),
+        "odd": _shortened([_odd(report, k) for k in range(len(report.odd))]),
+        "causes": _shortened(causes),
+        "flights": plural(summary.flights, "flight"),
+        "tails": plural(tails, "tail"),
+    }
+
+
+def _odd(report: FleetReport, k: int) -> str:
+    found = report.odd[k]
+    mean = report.summary.populations[found.aircraft, found.name].fit.mean
+    share = f"{number(100 * abs(found.distance / mean), 2)}\u202f%" if mean else number(abs(found.distance), 2)
+    weaker = "weaker" if found.distance * mean < 0 else "stronger"
+    return f"{found.tail}: {short_meaning(found.name)} is {share} {weaker} than that of the other tails."
+
+
+def _shortened(sentences: list[str]) -> list[str]:
+    if len(sentences) <= _MOST:
+        return sentences
+    return [*sentences[: _MOST - 1], f"{len(sentences) - _MOST + 1} more; the sections below show them."]

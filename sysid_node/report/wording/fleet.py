@@ -1,0 +1,77 @@
+"""A fleet's findings in a technician's words: ``aileron power -18 % since 3 May 2026``."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+
+from sysid_node.fleet.results import MaintenanceNote
+from sysid_node.fleet.statistics.causes import PooledCause, TailCause
+from sysid_node.fleet.statistics.drift import Drift
+from sysid_node.fleet.statistics.series import DAY
+from sysid_node.report.wording.names import short_meaning
+from sysid_node.report.wording.numbers import MINUS, likely, listing, number
+
+#: Standard errors by which a level must differ from zero for a change to be given as a share of it.
+_SURE = 4.0
+
+
+def date_words(day: float) -> str:
+    """A day since 1970 as ``3 May 2026``."""
+    date = datetime.datetime.fromtimestamp(day * DAY, datetime.UTC).date()
+    return f"{date.day} {date:%B %Y}"
+
+
+def change_words(drift: Drift) -> str:
+    """The change in percent of the level before it, or as a number where that level is hardly known."""
+    if abs(drift.before) > _SURE * drift.error and not drift.name.endswith("_0"):
+        return f"{_signed(100.0 * drift.change / drift.before, 2)}\u202f%"
+    return f"by {_signed(drift.change, 2)}"
+
+
+def drift_words(drift: Drift) -> str:
+    """One drift: what, how much and since when."""
+    what = f"{short_meaning(drift.name)} {change_words(drift)}"
+    if drift.kind == "configuration":
+        return f"{what} in the configuration {drift.configuration}"
+    if drift.kind == "trend":
+        return f"{what} little by little from {date_words(drift.first)} to {date_words(drift.last)}"
+    return f"{what} since {date_words(drift.since)}"
+
+
+def tail_sentence(tail: str, drifts: Sequence[Drift], notes: Sequence[MaintenanceNote] = ()) -> str:
+    """All significant drifts of a tail, and the maintenance notes that lie where a step does."""
+    parts = "; ".join(drift_words(drift) for drift in drifts)
+    beside = [note for note in notes if any(_beside(note, drift) for drift in drifts)]
+    said = "".join(f" Maintenance on {_date_of(note)}: {note.text}." for note in beside)
+    return f"{tail}: {parts}; the others are unchanged.{said}"
+
+
+def _beside(note: MaintenanceNote, drift: Drift) -> bool:
+    """Whether maintenance was within the dates between which a step lies (a day more on either side)."""
+    day = note.date.timestamp() / DAY
+    return drift.kind == "step" and drift.first - 1.0 <= day <= drift.last + 1.0
+
+
+def _date_of(note: MaintenanceNote) -> str:
+    return date_words(note.date.timestamp() / DAY)
+
+
+def account_words(cause: PooledCause) -> str:
+    """Whose a cause is, in one sentence."""
+    if cause.account == "simulator":
+        return f"The simulator lacks it: all tails share it (probability {likely(cause.shared)})."
+    if cause.account == "tail":
+        tails = [tail.tail for tail in cause.tails if tail.own >= 0.5]
+        return f"{listing(tails)} {'has' if len(tails) == 1 else 'have'} it alone: it is not the simulator's."
+    return "Single flights named it, and neither the type nor a tail has it with an even chance."
+
+
+def tail_cause_words(cause: TailCause) -> str:
+    """A tail that has a cause alone, with its probability and the date from which on."""
+    since = "" if cause.since is None else f", since {date_words(cause.since)}"
+    return f"{cause.tail} ({likely(cause.own)}{since})"
+
+
+def _signed(value: float, digits: int) -> str:
+    return ("+" if value > 0 else MINUS) + number(abs(value), digits)

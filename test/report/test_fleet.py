@@ -1,0 +1,110 @@
+"""The fleet's page, tables and aircraft files, from a small fleet whose worn tail and shared cause are known."""
+
+import csv
+from dataclasses import replace
+
+import pytest
+from fleet_flights import START, fleet
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.fleet.results import FleetResults, MaintenanceNote, Refusal
+from sysid_node.fleet.statistics.series import DAY
+from sysid_node.fleet.statistics.summarise import summarise
+from sysid_node.report.fleet import file_name, write
+from sysid_node.report.wording.fleet import date_words, tail_sentence
+
+GAP = {
+    "verdict": "explained",
+    "causes": [
+        {
+            "effect": "motor_lag",
+            "label": "motor_lag",
+            "parameters": {"time_constant": [0.2, 0.02]},
+            "probability": 0.9,
+            "indistinguishable_from": [],
+        }
+    ],
+    "doubted": [],
+    "candidates": [],
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A written fleet: its folder, results and summary."""
+    flights = tuple(replace(f, gap=GAP) for f in fleet(worn="t3", wear=-0.04, tails=6))
+    refusals = (Refusal("a.ulg", "cdrw", "t1", None, "a.ulg: no <air> data; log it"),)
+    results = FleetResults(flights, refusals, (MaintenanceNote("t3", START.replace(month=3, day=15), "new servo"),))
+    files = {"cdrw": load_aircraft("cdrw")}
+    folder = tmp_path_factory.mktemp("fleet")
+    summary = summarise(results, files)
+    write(results, summary, folder, files)
+    return folder, results, summary
+
+
+def rows_of(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_page_says_what_changed_and_whose_the_gap_is(written):
+    page = (written[0] / "report.html").read_text(encoding="utf-8")
+    assert "t3: aileron power" in page
+    assert "the others are unchanged" in page
+    assert "new servo" in page
+    assert "The simulator lacks it: all tails share it" in page
+    assert "no &lt;air&gt; data" in page
+    assert 'href="flights/t3-20/report.html"' in page
+
+
+def test_the_page_draws_what_is_open_without_a_complaint(written, browse):
+    page = browse(written[0] / "report.html")
+    assert page.complaints == []
+    assert page.drawn == 1  # the drift; forest plots wait until they are opened
+    assert page.plots == 5
+
+
+def test_tables_hold_every_estimate_and_the_drift(written):
+    folder, results, summary = written
+    estimates = rows_of(folder / "estimates.csv")
+    assert len(estimates) == sum(len(flight.names) for flight in results.flights)
+    assert float(estimates[0]["value"]) == results.flights[0].values[0]
+    assert [row["tail"] for row in rows_of(folder / "drift.csv") if row["significant"] == "true"] == ["t3"]
+    assert {row["account"] for row in rows_of(folder / "causes.csv")} == {"simulator"}
+    population = rows_of(folder / "population.csv")[0]
+    assert float(population["mean"]) == summary.populations["cdrw", population["name"]].fit.mean
+
+
+def test_parquet_holds_what_the_csv_holds(written):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    for name in ("estimates", "population", "tails", "drift", "causes"):
+        table, rows = parquet.read_table(written[0] / f"{name}.parquet"), rows_of(written[0] / f"{name}.csv")
+        assert table.column_names == list(rows[0])
+        assert table.num_rows == len(rows)
+
+
+def test_each_tail_has_an_aircraft_file_with_the_fleets_values(written):
+    folder, _, summary = written
+    read = load_aircraft(folder / "tails" / "t3.yaml")
+    prior = summary.priors["cdrw", "t3"]["Cl_da"]
+    assert (read.derivatives["Cl_da"].value, read.derivatives["Cl_da"].tolerance) == (prior.value, prior.tolerance)
+
+
+def test_a_drift_in_a_technicians_words(written):
+    drift = written[2].drifts["cdrw", "t3", "Cl_da"]
+    drift = replace(drift, kind="step", before=0.2, change=-0.036, error=0.004, since=START.timestamp() / DAY)
+    assert (
+        tail_sentence("t3", [drift])
+        == "t3: aileron power \u221218\u202f% since 1 January 2026; the others are unchanged."
+    )
+
+
+def test_dates_and_names():
+    assert date_words(20576.0) == "3 May 2026"
+    assert file_name("../x/7") == "_x_7"
+
+
+def test_a_folder_that_cannot_be_written(written, tmp_path):
+    with pytest.raises(InputError, match="cannot be written"):
+        write(written[1], written[2], tmp_path / "absent" / "folder")
