@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.alignment import flow_angle_errors
 from sysid_node.online.changes import detection
 from sysid_node.online.changes.detection import PIECE, ChangeMonitor, ChangeTests
 from sysid_node.online.changes.excited_segments import no_excited_segments, remember
@@ -315,7 +315,7 @@ def _lag_test(state: EstimatorState, solution: Solution, spread: Uncertainty, gr
 def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
     """(C, P, P) what errors of the aircraft file bring to the covariance through reconstructed flow angles."""
     model = state.model
-    return flow_angle_filter.doubt(
+    return flow_angle_errors.reconstruction_covariance(
         state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.equations, solution, total
     )
 

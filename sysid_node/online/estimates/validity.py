@@ -85,8 +85,8 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     if state.flow.active:
         structure, at = state.model.aircraft.model_structure, state.piece_start
         for i, name in enumerate(table.names):
-            flaw = flow_angle_filter.flaw(state.flow, at, name, structure[name.partition("_")[0]])
-            objections[i] = words.code(flaw) if flaw else objections[i]
+            reason = flow_angle_filter.why_unknown(state.flow, at, name, structure[name.partition("_")[0]])
+            objections[i] = words.code(reason) if reason else objections[i]
     objections[latest.contradicted[c]] = status.CONTRADICTED
     objections[latest.outside_model[c]] = status.OUTSIDE
     return objections
