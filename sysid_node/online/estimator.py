@@ -3,7 +3,7 @@
 Morelli, "Real-time parameter estimation in the frequency domain", J. Guidance 23(5), 2000, as flown on the CDFP and
 CDRW by Subrahmanyam, Kim & Ghosh. ``init``, then ``update`` with every sample, and ``estimates.estimate`` whenever the
 derivatives are wanted. What changes slowly (the residuals' colour, the segments, the watch for changes) is renewed
-every half second of data or less often (``segment_update``): with the next sample, or before it by ``renew_early``, so
+every half second of data or less often (``segment_update``): with the next sample, or earlier by ``renew_early``, so
 that no estimate waits for it.
 """
 
@@ -30,7 +30,7 @@ from sysid_node.online.regression.instruments import INSTRUMENTED, instrument_mo
 from sysid_node.online.regression.mixed_estimation import believed_derivatives
 from sysid_node.online.segment_update import begin_segment, reach, renew
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.state import EstimatorModel, EstimatorState
+from sysid_node.online.state import ChangeWatch, EstimatorModel, EstimatorState, FinishedSegments
 from sysid_node.online.status import vocabulary
 from sysid_node.online.systematic.imperfections import imperfections
 from sysid_node.online.systematic.servo_states import ServoStates
@@ -51,6 +51,25 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
 
     ``commanded``: whether the samples' deflections follow from commands (``flight.commanded``).
     """
+    grid = fourier_transform.lines(*settings.frequencies)
+    model = _model(aircraft, settings, grid.omega, commanded)
+    layout, equations, imperfect = model.layout, model.equations, model.imperfections
+    transform = fourier_transform.start(grid, layout.transformed, model.memory, len(layout.instrumented))
+    return EstimatorState(
+        model,
+        SampledTransform(layout, transform),
+        equations,
+        flow_angle_filter.init(aircraft),
+        model.instrument_model,
+        imperfect.applied if imperfect else None,
+        ServoStates([0.0] * len(layout.timed)) if imperfect and imperfect.controls else None,
+        FinishedSegments(information.nothing(layout, grid.count if imperfect else 0)),
+        ChangeWatch(no_excited_segments(equations, layout)),
+    )
+
+
+def _model(aircraft: Aircraft, settings: OnlineSettings, omega: Array, commanded: bool) -> EstimatorModel:
+    """What does not change in flight; ``omega`` are the lines (rad/s). Raises InputError, see ``init``."""
     layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
     unformed = regression_signals.unformed(aircraft)
     structure = {c: rs for c, rs in aircraft.model_structure.items() if c not in unformed and set(rs) - {"0"}}
@@ -59,40 +78,25 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
     memory = settings.forgetting_time or math.inf
     # lines are independent over one period of their spacing; windows and forgetting want several segments
     segment_time = min(1.0 / settings.frequencies[1], settings.window / 5.0 or math.inf, 2.0 * memory)
-    grid = fourier_transform.lines(*settings.frequencies)
     equations = normal_equations.normal_equations(structure, layout)
-    model = EstimatorModel(
+    return EstimatorModel(
         aircraft=aircraft,
         settings=settings,
         layout=layout,
         equations=equations,
         table=derivative_index(aircraft, equations, settings.valid_fraction),
         vocabulary=vocabulary(aircraft, equations),
-        spectrum=information.spectrum(grid.omega, memory),
+        spectrum=information.spectrum(omega, memory),
         lower_limits=_lowest(len(aircraft.controls)),
         signals=regression_signals.scalar_signals(aircraft),
         momentum=regression_signals.momentum_gain(aircraft),
         prior=believed_derivatives(aircraft, equations),
-        instrument_model=instrument_model(aircraft, layout, grid.omega),
+        instrument_model=instrument_model(aircraft, layout, omega),
         imperfections=imperfections(aircraft, layout, commanded=commanded, positions=settings.actuators == "positions"),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
         commanded=commanded,
         timed=tuple(aircraft.control_symbols.index(symbol) for symbol in layout.timed),
-    )
-    transform = fourier_transform.start(grid, layout.transformed, memory, len(layout.instrumented))
-    running = SampledTransform(layout, transform)
-    nothing = information.nothing(layout, grid.count if model.imperfections else 0)
-    return EstimatorState(
-        model,
-        running,
-        equations,
-        nothing,
-        flow_angle_filter.init(aircraft),
-        model.instrument_model,
-        model.imperfections.applied if model.imperfections else None,
-        ServoStates([0.0] * len(layout.timed)) if model.imperfections and model.imperfections.controls else None,
-        excited_segments=no_excited_segments(equations, layout),
     )
 
 
@@ -103,10 +107,10 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     """
     fresh = init(state.model.aircraft, state.model.settings, commanded=True)
     fresh.transform.transform.last = time
-    fresh.flow, fresh.begin = state.flow, state.begin
+    fresh.flow, fresh.inputs.begin = state.flow, state.inputs.begin
     if fresh.servo_states is not None:
-        fresh.begin = max(state.begin, time + SERVOS_SETTLE)
-    fresh.thrust_known, fresh.incomplete = state.thrust_known, state.incomplete
+        fresh.inputs.begin = max(state.inputs.begin, time + SERVOS_SETTLE)
+    fresh.inputs.thrust_known, fresh.inputs.incomplete = state.inputs.thrust_known, state.inputs.incomplete
     return fresh
 
 
@@ -127,41 +131,47 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     """
     sample, excess = _without_excess(state.model, sample)
     sample = flow_angle_filter.complete(state.flow, time, sample, state.model.settings.max_gap)
-    if math.isnan(state.begin) and abs(time) < LIMIT:
-        state.begin = first_counted(time, state.model.settings)
-    if not time >= state.begin:
+    inputs = state.inputs
+    if math.isnan(inputs.begin) and abs(time) < LIMIT:
+        inputs.begin = first_counted(time, state.model.settings)
+    if not time >= inputs.begin:
         _follow_uncounted(state, time, sample)
         return
     if not (math.hypot(time, *sample) < LIMIT and sample[AIRSPEED] > AIRSPEED_LOW and sample[DENSITY] > DENSITY_LOW):
         sample = _completed(state, time, sample)
         if not sample:
             return
-    elif state.thrust_known is None:
-        state.thrust_known = True
-    previous = state.previous
-    if previous is not None and time - previous[0] < SHORTEST:
+    elif inputs.thrust_known is None:
+        inputs.thrust_known = True
+    if inputs.previous is not None and time - inputs.previous[0] < SHORTEST:
         leave_out(state, len(sample))
         return
-    row, angles = state.model.signals(sample)
+    _append(state, time, sample, excess)
+
+
+def _append(state: EstimatorState, time: float, sample: Sequence[float], excess: Sequence[float]) -> None:
+    """Append a complete sample to the transform; after a gap, begin a segment with it."""
+    model, inputs, previous = state.model, state.inputs, state.inputs.previous
+    row, angles = model.signals(sample)
     row.insert(DRIFT, time)
     motion = (*sample[3:6], *angles)
     renew_early(state)
-    state.previous = (time, motion)
-    if previous is None or time - previous[0] > state.model.settings.max_gap:
+    inputs.previous = (time, motion)
+    if previous is None or time - previous[0] > model.settings.max_gap:
         if state.servo_states is not None:
-            state.servo_states.follow(time, row[state.model.layout.deflections])
+            state.servo_states.follow(time, row[model.layout.deflections])
         interrupt(state, time, row)
         return
-    state.step = time - previous[0]
-    gain = state.model.momentum(previous[1], motion)
-    extra = [row[OFFSET] * excess[i] for i in state.model.timed] if excess else ()
+    inputs.step = time - previous[0]
+    gain = model.momentum(previous[1], motion)
+    extra = [row[OFFSET] * excess[i] for i in model.timed] if excess else ()
     if extra:
-        gain += [state.step * part for part in extra]
+        gain += [inputs.step * part for part in extra]
     if state.servo_states is not None:
-        state.servo_states.follow(time, row[state.model.layout.deflections], extra)
+        state.servo_states.follow(time, row[model.layout.deflections], extra)
     sampled_transform.append(state.transform, time, row, gain)
-    state.samples += 1
-    state.intervals += sample[INTERVAL]
+    state.segment.samples += 1
+    state.segment.intervals += sample[INTERVAL]
 
 
 def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
@@ -184,7 +194,7 @@ def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float
 
 def renew_early(state: EstimatorState) -> None:
     """Renew what is due to be renewed before the next sample; whoever has time before that comes may do it then."""
-    if reach(state.transform.last, state.step) >= state.renew_at:
+    if reach(state.transform.last, state.inputs.step) >= state.segment.renew_at:
         renew(state)
 
 
@@ -196,7 +206,7 @@ def first_counted(time: float, settings: OnlineSettings) -> float:
 def _completed(state: EstimatorState, time: float, sample: Sequence[float]) -> Sequence[float]:
     """The sample with unknown thrust taken as none; empty, and counted, where anything else is missing."""
     filled = list(sample)
-    powerless = not abs(filled[THRUST]) < LIMIT and not state.thrust_known
+    powerless = not abs(filled[THRUST]) < LIMIT and not state.inputs.thrust_known
     if powerless:
         filled[THRUST] = 0.0
     for column, value in enumerate(filled):
@@ -206,21 +216,21 @@ def _completed(state: EstimatorState, time: float, sample: Sequence[float]) -> S
     if not time < LIMIT:
         leave_out(state, len(filled))
         return ()
-    if state.thrust_known is None:
-        state.thrust_known = not powerless
+    if state.inputs.thrust_known is None:
+        state.inputs.thrust_known = not powerless
     return filled
 
 
 def leave_out(state: EstimatorState, column: int) -> None:
     """Count a sample that lacks a possible value of a column; the one behind them all stands for the time."""
     name = (*SAMPLE_COLUMNS, *state.model.aircraft.control_symbols, "time")[column]
-    state.incomplete[name] = state.incomplete.get(name, 0) + 1
+    state.inputs.incomplete[name] = state.inputs.incomplete.get(name, 0) + 1
 
 
 def interrupt(state: EstimatorState, time: float, row: Sequence[float]) -> None:
     """Finish the segment at the last sample and begin one at this: nothing is known of the time in between."""
-    if state.transform.last > state.segment_start:
+    if state.transform.last > state.segment.start:
         renew(state, last=True)
-    state.change_monitor.pieces.clear()
+    state.changes.monitor.pieces.clear()
     sampled_transform.begin_at(state.transform, time, row)
     begin_segment(state)

@@ -98,50 +98,76 @@ class SegmentSolution:
 
 
 @dataclass
+class PresentSegment:
+    """The segment that is under way, of which alone the transform is. Times in s."""
+
+    start: float = math.nan  # NaN = none is under way
+    samples: int = 0
+    intervals: float = 0.0  # s: sum of the air data's intervals
+    piece_start: float = math.nan  # of the piece under way, half a second of data
+    piece_lines: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
+    renew_at: float = math.inf
+    noise_moments: NoiseMoments = field(default_factory=NoiseMoments)
+    noise_measured_until: float = math.nan  # time up to which ``noise_moments`` are measured
+    first_impulses: Array = field(default_factory=lambda: np.empty((0, 0)))  # of the servos, at the segment's start
+    information: Information | None = None  # at the last renewal; None = none since the segment's start
+
+
+@dataclass
+class FinishedSegments:
+    """What the finished segments say of the derivatives."""
+
+    information: Information  # their sum, faded to ``time``
+    time: float = math.nan  # s
+    in_window: deque[tuple[float, Information]] = field(default_factory=deque)  # end (s) and content of each
+    pieces: int = 0  # number of pieces finished
+
+
+@dataclass
+class ChangeWatch:
+    """What the tests for changes of the aircraft use."""
+
+    excited: list[ExcitedSegments]  # by block of the normal equations
+    monitor: ChangeMonitor = field(default_factory=ChangeMonitor)
+    changed_at: float = -math.inf  # s, of the last change
+
+
+@dataclass
+class Inputs:
+    """What the samples so far say of the instruments. Times in s."""
+
+    begin: float = math.nan  # time from which samples count
+    previous: tuple[float, tuple[float, ...]] | None = None  # the last sample: time, (p, q, r, ca, sa)
+    step: float = 0.0  # between the last two samples
+    incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
+    thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
+
+
+@dataclass
 class EstimatorState:
-    """All that the estimator remembers. Times in s."""
+    """All that the estimator remembers."""
 
     model: EstimatorModel
     transform: SampledTransform  # of the present segment
     equations: NormalEquations  # the model's, with least squares where instruments are weak
-    past: Information  # finished segments, faded to ``past_time``
     flow: FlowAngleFilter  # of the flow angles that are not measured
-    line_model: InstrumentModel | None  # what is made of the transform's lines: the controls' servos, instruments
-    servos: ServoModel | None = None  # of the controls, as the lines have them; None where all is exact
-    servo_states: ServoStates | None = None  # None where no control is late
-    first_impulses: Array = field(default_factory=lambda: np.empty((0, 0)))  # of the servos, at the segment's start
-    past_time: float = math.nan
-    window_segments: deque[tuple[float, Information]] = field(
-        default_factory=deque
-    )  # end and content of those inside the window
-    segment_start: float = math.nan  # NaN = none is under way
-    piece: Array = field(default_factory=lambda: np.empty((0, 0)))  # transform at the piece's start
-    piece_start: float = math.nan
-    noise_measured_until: float = math.nan  # s: time up to which ``noise_moments`` are measured
-    noise_moments: NoiseMoments = field(default_factory=NoiseMoments)  # of the present segment
-    renew_at: float = math.inf
-    step: float = 0.0  # s between the last two samples
-    previous: tuple[float, tuple[float, ...]] | None = None  # the last sample: time, (p, q, r, ca, sa)
-    begin: float = math.nan  # time from which samples count
-    samples: int = 0  # in the present segment
-    intervals: float = 0.0  # s: sum of the air data's intervals in the present segment
-    incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
-    thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
-    present: Information | None = None  # the present segment's, at the last renewal
+    line_model: InstrumentModel | None  # what is computed from the transform's lines: the controls' servos, instruments
+    servos: ServoModel | None  # of the controls, as the lines have them; None where all is exact
+    servo_states: ServoStates | None  # None where no control is late
+    finished: FinishedSegments
+    changes: ChangeWatch
+    inputs: Inputs = field(default_factory=Inputs)
+    segment: PresentSegment = field(default_factory=PresentSegment)
     latest: SegmentSolution | None = None
-    change_monitor: ChangeMonitor = field(default_factory=ChangeMonitor)
-    excited_segments: list[ExcitedSegments] = field(default_factory=list)  # by block of the normal equations
-    pieces: int = 0  # number of pieces finished
-    changed_at: float = -math.inf
 
 
 def current_lines(state: EstimatorState) -> Array:
     """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses."""
     lines = sampled_transform.current(state.transform)
-    if state.servo_states is not None and state.first_impulses.size:
+    if state.servo_states is not None and state.segment.first_impulses.size:
         model, time = state.model, state.transform.last
-        first = state.first_impulses
+        first = state.segment.first_impulses
         if model.spectrum.rate:
-            first = first * math.exp(0.5 * model.spectrum.rate * (state.segment_start - time))
+            first = first * math.exp(0.5 * model.spectrum.rate * (state.segment.start - time))
         lines[:, model.layout.rates] += state.servo_states.impulses(model.spectrum.omega, time) - first
     return lines

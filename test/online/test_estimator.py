@@ -56,7 +56,7 @@ def flown(samples: Sequence[Sequence[float]], times: Sequence[float], method: st
 
 def left_out(state: EstimatorState) -> int:
     """Samples that were counted as left out."""
-    return sum(state.incomplete.values())
+    return sum(state.inputs.incomplete.values())
 
 
 @given(
@@ -80,7 +80,11 @@ def test_any_times(spoilt: list[tuple[int, float]]) -> None:
     for row, time in spoilt:
         times[row] = time
     state = flown(SAMPLES.tolist(), times)
-    assert math.isnan(state.begin) or state.previous is None or abs(state.previous[0]) < estimator.LIMIT
+    assert (
+        math.isnan(state.inputs.begin)
+        or state.inputs.previous is None
+        or abs(state.inputs.previous[0]) < estimator.LIMIT
+    )
 
 
 @given(st.permutations(range(60)), st.sampled_from(METHODS))
@@ -130,7 +134,7 @@ def test_what_is_left_out_is_counted_by_its_column() -> None:
     times[105] = times[99]
     times[106] = math.inf
     state = flown(samples, times)
-    assert state.incomplete == {"alpha": 2, "V": 1, "rho": 1, "de": 1, "time": 2}
+    assert state.inputs.incomplete == {"alpha": 2, "V": 1, "rho": 1, "de": 1, "time": 2}
 
 
 def test_nonsense_in_the_middle_leaves_the_estimates_alone() -> None:
@@ -158,8 +162,8 @@ def test_settling_counts_from_the_first_sample() -> None:
     for time, sample in zip((TIME + 50.0).tolist(), SAMPLES.tolist(), strict=True):
         estimator.update(state, time, sample)
         if time < 52.0:
-            assert state.previous is None
-    assert state.segment_start >= 52.0
+            assert state.inputs.previous is None
+    assert state.segment.start >= 52.0
 
 
 def test_a_model_of_offsets_alone_is_refused() -> None:
@@ -181,7 +185,7 @@ def test_what_was_flown_long_ago_is_forgotten(settings: OnlineSettings) -> None:
     for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, t, sample)
     assert estimate(state).derivatives["Cm_de"].value == pytest.approx(0.6 * TRUTH["Cm_de"], rel=0.02)
-    assert len(state.window_segments) <= 6
+    assert len(state.finished.in_window) <= 6
 
 
 def test_memory_does_not_grow() -> None:
@@ -193,10 +197,10 @@ def test_memory_does_not_grow() -> None:
     for i, (t, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
         estimator.update(state, t, sample)
         if i in (1199, 2399):
-            change_monitor = state.change_monitor
+            change_monitor = state.changes.monitor
             sizes.append(
                 [
-                    len(state.window_segments),
+                    len(state.finished.in_window),
                     len(change_monitor.pieces),
                     len(change_monitor.references),
                     len(change_monitor.typical_statistic),

@@ -57,7 +57,7 @@ def test_what_holds_of_a_moment_holds_of_all_estimates() -> None:
     current, latest, last = current_solution(state), state.latest, state.transform.last
     assert current is not None and latest is not None
     assert set(judge(state, latest, current, last + 1.01 * STALE)) == {status.STALE}
-    state.changed_at = last - 0.99 * SETTLING
+    state.changes.changed_at = last - 0.99 * SETTLING
     assert set(judge(state, latest, current, last)) == {status.CHANGED}
 
 

@@ -37,7 +37,7 @@ def with_inferred_angles(
     if absent:
         raise InputError(f"{source}: no {' or '.join(angles)}, and no complete {', '.join(absent)} to infer them from")
     filter_ = flow_angle_filter.init(aircraft)
-    if filter_.kinematics is None:
+    if filter_.model is None:
         raise InputError(
             f"{source}: no {' or '.join(angles)}; they can be inferred where the aircraft file has CL_alpha and CY_beta"
         )

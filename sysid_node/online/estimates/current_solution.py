@@ -37,7 +37,7 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
         return None
     lines, time = current_lines(state), state.transform.last
     integrals = latest.integrals + lines[-1]
-    impulses = edges(state.model.spectrum.omega, state.segment_start, time) if state.servos else None
+    impulses = edges(state.model.spectrum.omega, state.segment.start, time) if state.servos else None
     gram = products(lines, state.line_model, impulses)
     gram += latest.base
     growth, noise = growth_since(latest, time), latest.compensation

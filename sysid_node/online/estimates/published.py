@@ -103,7 +103,7 @@ def _nothing_known(state: EstimatorState) -> dict[str, DerivativeEstimate]:
 def _unknown(state: EstimatorState, name: str) -> DerivativeEstimate:
     """A derivative of which nothing is known, and why."""
     reason = regression_signals.unformed(state.model.aircraft).get(name.partition("_")[0])
-    if reason is None and state.incomplete and state.samples == 0:
-        column = max(state.incomplete, key=lambda column: state.incomplete[column])
+    if reason is None and state.inputs.incomplete and state.segment.samples == 0:
+        column = max(state.inputs.incomplete, key=lambda column: state.inputs.incomplete[column])
         reason = f"{column} not measured"
     return DerivativeEstimate(name, math.nan, math.inf, -math.inf, math.inf, False, reason or "converging")

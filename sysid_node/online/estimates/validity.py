@@ -80,10 +80,10 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     biased = latest.lag_test.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{latest.lag_test.blamed_control[i]} not on time") for i in c[biased].tolist()]
     objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
-    if not state.thrust_known:
+    if not state.inputs.thrust_known:
         objections[table.needs_thrust] = status.THRUST
     if state.flow.active:
-        structure, at = state.model.aircraft.model_structure, state.piece_start
+        structure, at = state.model.aircraft.model_structure, state.segment.piece_start
         for i, name in enumerate(table.names):
             reason = flow_angle_filter.why_unknown(state.flow, at, name, structure[name.partition("_")[0]])
             objections[i] = words.code(reason) if reason else objections[i]
@@ -108,7 +108,7 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
     codes = np.zeros(good.shape, np.uint8)
     if np.count_nonzero(good) < good.size:
         np.copyto(codes, _reasons(state, basis, current, inflation, buried, poor), where=~good)
-    if current.time - state.changed_at < SETTLING:
+    if current.time - state.changes.changed_at < SETTLING:
         codes[:] = status.CHANGED
     if now - current.time > STALE:
         codes[:] = status.STALE

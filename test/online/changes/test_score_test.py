@@ -89,7 +89,7 @@ def flown(samples: Array, time: Array, method: str) -> EstimatorState:
 def looked(state: EstimatorState, span: int) -> ScoreTest:
     model = state.model
     tests = ChangeTests(
-        model.equations, model.instrument_model, model.spectrum, state.change_monitor, state.transform.last, math.inf
+        model.equations, model.instrument_model, model.spectrum, state.changes.monitor, state.transform.last, math.inf
     )
     found = next((found for _, found in tests.contradictions([span])), None)
     assert found is not None

@@ -1,0 +1,190 @@
+"""The estimates of a renewal and their covariances, from the finished segments and the present one."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online.alignment import flow_angle_errors
+from sysid_node.online.changes.score_test import Reference
+from sysid_node.online.frequency.regression_signals import OFFSET
+from sysid_node.online.regression import (
+    actuator_lag_test,
+    gust_correlation,
+    least_squares,
+    normal_equations,
+    regressor_noise,
+    weak_instruments,
+)
+from sysid_node.online.regression.actuator_lag_test import LagTest
+from sysid_node.online.regression.information import Information
+from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.selection_bias import selection_bias_factors
+from sysid_node.online.segment_information import finished_information, line_seconds, measure_segment
+from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.systematic import estimation
+from sysid_node.online.systematic.estimation import SystematicErrors
+from sysid_node.online.systematic.imperfections import line_model, remapped
+from sysid_node.online.systematic.servo_model import ServoModel
+
+Array = NDArray[np.float64]
+SERVO_STEPS = 2  # changes of the servos at most in one renewal
+TIMING_EVERY = 4  # pieces at least between tests for actuator lag, which changes more slowly still
+
+
+def solve_with_servos(state: EstimatorState, lines: Array) -> None:
+    """Renew the estimates from the transform's ``lines``, again if the estimated servo times have notably changed."""
+    imperfect = state.model.imperfections
+    for _ in range(SERVO_STEPS):
+        _solve_all(state, measure_segment(state, lines))
+        latest, servos = state.latest, state.servos
+        if imperfect is None or servos is None or latest is None or latest.systematic is None:
+            return
+        if latest.systematic.pieces != state.finished.pieces:
+            return
+        step = estimation.notable_step(imperfect, servos, latest.systematic)
+        if step is None:
+            return
+        _move_servos(state, step)
+    _solve_all(state, measure_segment(state, lines))
+
+
+def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
+    """Replace the controls by what these servos make of them, in all that is remembered."""
+    model, imperfect, before = state.model, state.model.imperfections, state.servos
+    assert imperfect is not None
+    assert before is not None
+    state.servos = servos
+    if state.servo_states is not None:
+        state.servo_states.lateness = servos.lateness.tolist()
+    state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied)
+
+    def moved(info: Information) -> Information:
+        return remapped(info, imperfect, model.instrument_model, model.layout, model.spectrum, (before, servos))
+
+    state.finished.information = moved(state.finished.information)
+    state.finished.in_window = deque((end, moved(info)) for end, info in state.finished.in_window)
+    for excited in state.changes.excited:
+        segments = [replace(segment, said=moved(segment.said)) for segment in excited.segments]
+        excited.segments = deque(segments, maxlen=excited.segments.maxlen)
+    # earlier estimates used other columns, so they are no reference any more
+    state.changes.monitor.references.clear()
+
+
+def _solve_all(state: EstimatorState, segment: Information) -> None:
+    """Renew the estimates and their covariances, from the finished segments and the present one."""
+    past = finished_information(state)
+    total = past + segment
+    gram = total.grams.sum(axis=0)
+    instrument_strength, solution, compensation = _solve(state, total, gram)
+    equations, table, now = state.equations, state.model.table, state.transform.last
+    spread = least_squares.uncertainty(equations, solution, total)
+    noise_alone = spread.covariance
+    if state.flow.active:
+        spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
+    gusts = _gust_shares(state, total, equations, solution, spread)
+    scale = solution.residual[:, None] * np.abs(solution.inverse.diagonal())
+    inflation = gust_correlation.inflation(spread, gusts)
+    variance = inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
+    mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
+    none = np.zeros(len(equations.coefficients), dtype=bool)
+    lag_test, timed = _lag_test(state, solution, spread, gram)
+    state.latest = SegmentSolution(
+        time=now,
+        pieces=state.finished.pieces,
+        timed=timed,
+        total=total,
+        solution=solution,
+        uncertainty=spread,
+        compensation=compensation,
+        base=past.grams.sum(axis=0),
+        integrals=past.integrals,
+        trim_noise=spread.bands[:, 0] * total.energy,
+        factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
+        lag_test=lag_test,
+        instrument_strength=instrument_strength,
+        selection_bias_factors=selection_bias_factors(
+            equations, solution, spread, instrument_strength, gram, *state.model.prior
+        ),
+        anderson_rubin=weak_instruments.anderson_rubin_bounds(
+            equations, table, solution, gram, spread, noise_alone, mean, gusts
+        ),
+        outside_model=none,
+        contradicted=none,
+        systematic=_systematic(state, total, solution, spread, inflation),
+    )
+    state.changes.monitor.references.append(Reference(now, equations, solution, spread))
+
+
+def _systematic(
+    state: EstimatorState, total: Information, solution: Solution, spread: Uncertainty, inflation: Array
+) -> SystematicErrors | None:
+    """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for."""
+    model, servos = state.model, state.servos
+    if model.imperfections is None or servos is None or not solution.usable:
+        return None
+    last = state.latest.systematic if state.latest is not None else None
+    if last is not None and last.holds(state.finished.pieces, servos, total.energy):
+        return last
+    return estimation.systematic_errors(
+        model.imperfections,
+        model.aircraft,
+        model.layout,
+        model.spectrum,
+        model.instrument_model,
+        servos,
+        state.equations,
+        solution,
+        spread,
+        total,
+        inflation,
+        state.finished.pieces,
+        last.changes if last is not None else None,
+    )
+
+
+def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:
+    """The instruments' strength, the solution by the equations that it allows, and the noise's part in them."""
+    full, last = state.model.equations, state.latest
+    instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
+    equations = state.equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
+    compensation = None
+    if last is not None and last.solution.usable:
+        share = regressor_noise.allowed(
+            equations, last.solution, last.uncertainty.density, total.bias / line_seconds(state, total)
+        )
+        compensation = least_squares.bias_of(equations, total.bias * share[:, None] * share)
+    solution = least_squares.solve(equations, gram, compensation)
+    if compensation is not None and not solution.usable:
+        solution, compensation = least_squares.solve(equations, gram), None
+    return instrument_strength, solution, compensation
+
+
+def _lag_test(state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[LagTest, int]:
+    """The test for actuator lag, carried out every few pieces, and the number of pieces when it was."""
+    latest, pieces = state.latest, state.finished.pieces
+    if latest is not None and pieces - latest.timed < TIMING_EVERY:
+        return latest.lag_test, latest.timed
+    return actuator_lag_test.examine(state.equations, state.model.layout, solution, spread, gram), pieces
+
+
+def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
+    """(C, P, P) covariance that errors of the aircraft file cause through reconstructed flow angles."""
+    model = state.model
+    return flow_angle_errors.reconstruction_covariance(
+        state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.equations, solution, total
+    )
+
+
+def _gust_shares(
+    state: EstimatorState, total: Information, equations: NormalEquations, solution: Solution, spread: Uncertainty
+) -> Array:
+    """(C,) share of the residuals that are gusts."""
+    aircraft, omega = state.model.aircraft, state.model.spectrum.omega
+    per_line, step = total.bias / line_seconds(state, total), total.energy / max(total.samples, 1.0)
+    sensed = gust_correlation.sensed(aircraft, equations, solution, per_line, total.noise_moments, step, omega)
+    return gust_correlation.share_of_gusts(spread, sensed)
