@@ -2,5 +2,6 @@
 
 ``streaming`` aligns message by message as they arrive; ``whole_record`` does the same for a recording.
 ``flow_angle_filter`` estimates angle of attack and sideslip where no vane measures them (``flow_angle_model``,
-``_equations`` and ``_errors`` hold its parts), and ``schedule`` says when estimates fall due. The samples go to ``frequency``.
+``_equations`` and ``_errors`` hold its parts), and ``schedule`` says when estimates fall due. The samples go to
+``frequency``.
 """
