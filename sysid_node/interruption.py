@@ -45,16 +45,16 @@ def end_on_signals(say: Callable[[int], None]) -> None:
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
-    heard = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
-    for number in heard:
+    handled = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    for number in handled:
         signal.signal(number, lambda *_: None)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    threading.Thread(target=_end, args=(reader, frozenset(heard), say), name="signals", daemon=True).start()
+    threading.Thread(target=_end, args=(reader, frozenset(handled), say), name="signals", daemon=True).start()
 
 
-def _end(reader: int, heard: frozenset[int], say: Callable[[int], None]) -> None:
+def _end(reader: int, handled: frozenset[int], say: Callable[[int], None]) -> None:
     number = 0
-    while number not in heard:
+    while number not in handled:
         number = os.read(reader, 1)[0]
     with _indivisible:
         for action in reversed(list(_actions.values())):

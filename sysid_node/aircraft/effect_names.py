@@ -44,10 +44,10 @@ class EffectNames:
     ) -> dict[str, EffectParameter]:
         """The parameters by name for an aircraft with these controls, with or without throttle, and derivatives."""
         named = [*controls, *(("throttle",) if throttle and self.throttle else ())]
-        own = [EffectParameter(c + p.name, p.unit, p.lower, p.upper) for p in self.each for c in named]
+        varying = [EffectParameter(c + p.name, p.unit, p.lower, p.upper) for p in self.each for c in named]
         if self.derivatives:
-            own += [EffectParameter(name, "1" if name.endswith("_0") else "1/rad") for name in derivatives]
-        return {p.name: p for p in (*own, *self.fixed)}
+            varying += [EffectParameter(name, "1" if name.endswith("_0") else "1/rad") for name in derivatives]
+        return {p.name: p for p in (*varying, *self.fixed)}
 
 
 def _fixed(*parameters: tuple[str, str, float, float]) -> EffectNames:

@@ -84,9 +84,9 @@ class Replay(EstimatedRun):
             faults=self.faults,
             remarks=[*flow_angle_filter.remarks(flow), *([carried] if carried else [])],
         )
-        said = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
+        publishing = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
         signals = replace(result.signals, flight=self._with_attitude(result.signals.flight))
-        return replace(result, settings={**result.settings, **said}, signals=signals)
+        return replace(result, settings={**result.settings, **publishing}, signals=signals)
 
     def _with_attitude(self, flight: FlightRecord | None) -> FlightRecord | None:
         """The flight with roll, pitch and heading, of which the estimator takes none, where they were recorded."""
@@ -183,8 +183,8 @@ def _estimated(
 def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> FaultVerdict:
     """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
     pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
-    heard = (RecordedEstimates(stamp, identifier_estimates(estimates)) for stamp, estimates in pairs)
-    return judge(found.aircraft, FaultSettings(), found.streams, recorded_commands(bag), heard, progress)
+    published = (RecordedEstimates(stamp, identifier_estimates(estimates)) for stamp, estimates in pairs)
+    return judge(found.aircraft, FaultSettings(), found.streams, recorded_commands(bag), published, progress)
 
 
 def replay_settings(values: Mapping[str, object]) -> tuple[OnlineSettings, float]:

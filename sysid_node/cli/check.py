@@ -11,7 +11,7 @@ from rich.table import Table
 
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
-from sysid_node.flight.logs.rates import said_rate
+from sysid_node.flight.logs.rates import rate_text
 from sysid_node.flight.logs.survey import Survey, survey
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _show(found: Survey) -> None:
         table.add_column(heading, justify="right" if heading == "rate" else "left", no_wrap=True)
     for row in found.rows:
         style = "red" if row.verdict != "ok" else ""
-        rate = f"{said_rate(row.rate)} Hz" if row.rate else "-"
+        rate = f"{rate_text(row.rate)} Hz" if row.rate else "-"
         cells = (row.signal, row.source, rate, row.gaps, row.clock, row.verdict)
         table.add_row(*cells, style=style)
     console.print(table)

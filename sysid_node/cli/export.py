@@ -116,9 +116,9 @@ def _write(form: str, aircraft: Aircraft, specs: list[str]) -> tuple[str, list[s
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
     effects = Simulator(aircraft).effects(specs) if specs or aircraft.effect_values() else {}
-    held = EFFECTS if form == "jsbsim" else ()
-    asked = parameters.parse(specs)
-    left_out = [name for name in effects if name not in held and name not in asked]
+    expressible = EFFECTS if form == "jsbsim" else ()
+    requested = parameters.parse(specs)
+    left_out = [name for name in effects if name not in expressible and name not in requested]
     if form != "jsbsim" and aircraft.tables:
         left_out.append(f"{len(aircraft.tables)} table{'s' * (len(aircraft.tables) > 1)}")
     if form == "jsbsim" and effects.get("actuator_lag", {}).get("damping"):

@@ -94,8 +94,9 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
     if not 0 <= args.seed < 2**63:
         raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
     recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
-    held = args.actuator_rate if args.surfaces == "commanded" else None
-    simulator = Simulator(load_aircraft(args.aircraft), max(_HELD_RATE if held else _RATE, args.rate, held or 0.0))
+    command_rate = args.actuator_rate if args.surfaces == "commanded" else None
+    rate = max(_HELD_RATE if command_rate else _RATE, args.rate, command_rate or 0.0)
+    simulator = Simulator(load_aircraft(args.aircraft), rate)
     conditions = SortieConditions(
         args.effect,
         args.airspeed,
@@ -105,7 +106,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         args.noise,
         args.seed,
         rotary_gusts=not args.linear_gusts,
-        command_rate=held,
+        command_rate=command_rate,
     )
     sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
     return sortie, recorder.record(sortie), _beside(recorder, sortie)

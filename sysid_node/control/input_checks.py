@@ -56,13 +56,13 @@ class InputChecks:
         self.counts.update(f"{name} implausible, dropped" for name in wrong)
         return measured._replace(**dict.fromkeys(wrong, math.nan)) if wrong else measured
 
-    def excitation(self, asked: Sequence[float]) -> Array:
+    def excitation(self, requested: Sequence[float]) -> Array:
         """(3,) rad: the excitation, within its limits; none where a value is not finite."""
-        if not all(map(math.isfinite, asked)):
+        if not all(map(math.isfinite, requested)):
             self.counts["excitation not finite, dropped"] += 1
             return np.zeros(len(self.largest_excitation))
-        within: Array = np.clip(np.asarray(asked, dtype=float), -self.largest_excitation, self.largest_excitation)
-        if (within != asked).any():
+        within: Array = np.clip(np.asarray(requested, dtype=float), -self.largest_excitation, self.largest_excitation)
+        if (within != requested).any():
             self.counts["excitation clipped"] += 1
         return within
 

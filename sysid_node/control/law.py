@@ -199,14 +199,14 @@ def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -
     law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (late - law.surfaces)
 
 
-def _limited(law: LawState, asked: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
+def _limited(law: LawState, wanted: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
     """The command (3,) within its limits of amplitude and rate, and which surfaces are limited."""
-    within = np.clip(asked, -law.limits, law.limits)
+    within = np.clip(wanted, -law.limits, law.limits)
     if law.command is not None:
         reach = law.settings.command_rate * step
         within = np.clip(within, law.command - reach, law.command + reach)
     law.command, law.at_limit = within, np.abs(within) >= law.limits
-    return within, np.abs(within - asked) > 1e-9
+    return within, np.abs(within - wanted) > 1e-9
 
 
 def _integrate(law: LawState, errors: tuple[Array, Array], limited: NDArray[np.bool_], step: float) -> None:
@@ -227,10 +227,10 @@ def _thrust(
     weight = law.aircraft.mass * GRAVITY
     drag = d.get("CD_0", 0.0) + d.get("CD_alpha", 0.0) * level + d.get("CD_k", 0.0) * (weight / load) ** 2
     error = _finite(points.airspeed - measured.airspeed, 0.0)
-    asked = load * drag + weight * math.sin(late.theta - level - late.alpha) + law.thrust
-    asked += SPEED_GAIN * law.aircraft.mass * error
-    given = min(max(asked, 0.0), law.most_thrust)
-    if given == asked:
+    wanted = load * drag + weight * math.sin(late.theta - level - late.alpha) + law.thrust
+    wanted += SPEED_GAIN * law.aircraft.mass * error
+    given = min(max(wanted, 0.0), law.most_thrust)
+    if given == wanted:
         law.thrust += SPEED_INTEGRAL * law.aircraft.mass * error * step
     return given
 

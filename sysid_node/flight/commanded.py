@@ -80,9 +80,10 @@ def known_from(stamps: Stamps, controls: Array) -> int | None:
     jump = changes[middle] > SMALLEST
     for i in (i for i in range(2 * AROUND + 1) if i != AROUND):
         jump &= changes[i : i + count] < least
-    own = period[middle]
-    told = jump.any(axis=1) & ((own <= LONGEST_PERIOD) | (changes[middle].max(axis=1) > FASTEST * own / 1e9))
-    found = np.flatnonzero(told)
+    periods = period[middle]
+    fastest = FASTEST * periods / 1e9
+    is_command_step = jump.any(axis=1) & ((periods <= LONGEST_PERIOD) | (changes[middle].max(axis=1) > fastest))
+    found = np.flatnonzero(is_command_step)
     return int(found[NEEDED - 1]) + 2 * AROUND + 1 if found.size >= NEEDED else None
 
 
@@ -112,8 +113,8 @@ def commands_of(aircraft: Aircraft, carried: str, *, servos: bool = True) -> Com
     if carried == "positions":
         return None
     models = servos_of(aircraft) if servos else (Servo(),) * (1 + len(aircraft.controls))
-    said = carried == "commands"
-    return Commands(models, said, (-1, 0) if said else None)
+    is_commanded = carried == "commands"
+    return Commands(models, is_commanded, (-1, 0) if is_commanded else None)
 
 
 def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool) -> str:

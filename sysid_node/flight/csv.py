@@ -67,7 +67,7 @@ def _plausible(flight: FlightRecord) -> FlightRecord:
 def _naming(path: Path) -> Iterator[None]:
     """A context in which errors and warnings about a file's content name the file."""
     try:
-        with warnings.catch_warnings(record=True) as said:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             yield
     except FileNotFoundError:
@@ -76,7 +76,7 @@ def _naming(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: cannot be read as CSV: {error}") from error
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
-    for warning in said:
+    for warning in caught:
         warnings.warn(f"{path}: {warning.message}", warning.category, stacklevel=4)
 
 

@@ -149,12 +149,12 @@ def _second_order(servo: Servo, error: float, rate: float, step: float) -> tuple
 
 def in_words(aircraft: Aircraft) -> str:
     """What the aircraft file says of the servos, as the end of a sentence."""
-    said = [
+    servos_in_words = [
         f"{name} {', '.join(words)}"
         for name, servo in zip(aircraft.controls, servos_of(aircraft)[1:], strict=True)
         if (words := _words(servo))
     ]
-    return "; ".join(said) or "nothing"
+    return "; ".join(servos_in_words) or "nothing"
 
 
 def _words(servo: Servo) -> list[str]:

@@ -69,7 +69,7 @@ def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
     state.finished.information = moved(state.finished.information)
     state.finished.in_window = deque((end, moved(info)) for end, info in state.finished.in_window)
     for excited in state.changes.excited:
-        segments = [replace(segment, said=moved(segment.said)) for segment in excited.segments]
+        segments = [replace(segment, information=moved(segment.information)) for segment in excited.segments]
         excited.segments = deque(segments, maxlen=excited.segments.maxlen)
     # earlier estimates used other columns, so they are no reference any more
     state.changes.monitor.references.clear()

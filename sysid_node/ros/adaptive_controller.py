@@ -222,14 +222,14 @@ class AdaptiveController(LoopNode):
     def _watch(self) -> None:
         """Without an IMU: no feedback, and the surfaces return to their positions in level flight."""
         if self._imu.silent():
-            silence = time.monotonic() - self._imu.heard
+            silence = time.monotonic() - self._imu.last_arrival
             self._steps_without_imu += 1
             self._fly(Measurements(self._now + silence, *(math.nan,) * (len(Measurements._fields) - 1)))
 
     def _fly(self, sensed: Measurements) -> None:
         start = time.perf_counter()
-        heard, extra = self._extra
-        excitation = extra if time.monotonic() - heard < EXCITATION_AGE else controller.NO_EXCITATION
+        received, extra = self._extra
+        excitation = extra if time.monotonic() - received < EXCITATION_AGE else controller.NO_EXCITATION
         command = controller.step(self._state, sensed, self._points.current(time.monotonic()), excitation)
         self._steps, self._steps_at_limit = self._steps + 1, self._steps_at_limit + self._state.law.at_limit
         stamp = self._start_ns + round(NANOSECONDS * sensed.time)

@@ -76,9 +76,9 @@ class Exciter(LoopNode):
 
     def __init__(self) -> None:
         super().__init__("exciter", PARAMETERS)
-        asked = {name: self.values[name] for name in ("watch", *RANGES)}
-        asked |= {name: tuple(self.values[name].split()) for name in ("derivatives", "manoeuvre")}
-        self._state = exciter.init(self.aircraft, ExcitationSettings(**asked))
+        settings = {name: self.values[name] for name in ("watch", *RANGES)}
+        settings |= {name: tuple(self.values[name].split()) for name in ("derivatives", "manoeuvre")}
+        self._state = exciter.init(self.aircraft, ExcitationSettings(**settings))
         self._inertial, self._air = (-math.inf, (math.nan,) * 3), (-math.inf, math.nan)
         self._logged = 0
         self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first

@@ -113,10 +113,10 @@ class LiveScene:
         time = np.array([(stamp - start_ns) / 1e9 for stamp, _ in news.imu])
         columns = dict(zip(_IMU, np.array([values for _, values in news.imu]).T, strict=True))
         last, actuation = self._last, self._actuation
-        columns |= _held(time, start_ns, _AIR, news.air, last)
+        columns |= _interpolated(time, start_ns, _AIR, news.air, last)
         rows = [(at, actuation.of_message(actuation.places(tuple(j)), tuple(j.values()))) for at, j in news.joints]
         accepted = [(stamp, values) for stamp, values in rows if not isinstance(values, str)]
-        columns |= _held(time, start_ns, ("thrust", *self._aircraft.control_symbols), accepted, last)
+        columns |= _interpolated(time, start_ns, ("thrust", *self._aircraft.control_symbols), accepted, last)
         if last is not None:
             keep = time > last[0]
             time = np.append(last[0], time[keep])
@@ -181,7 +181,7 @@ def _emptied(panel: Panel) -> Panel:
     return replace(panel, curves=[replace(curve, time=none, values=none) for curve in panel.curves])
 
 
-def _held(
+def _interpolated(
     time: Array,
     start_ns: int,
     names: Sequence[str],

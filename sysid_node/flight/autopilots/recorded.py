@@ -36,36 +36,36 @@ def read_recorded(path: str | Path, adapter: Adapter) -> Streams:
     Raises InputError where the bag cannot be read, lacks a topic or the definition of a message, or gives no sample.
     """
     path = Path(path)
-    said = f"bag {path.name}"
+    source = f"bag {path.name}"
     try:
-        return streams_of_samples(_read(path, adapter, said), said)
+        return streams_of_samples(_read(path, adapter, source), source)
     except InputError:
         raise
     except Exception as error:  # parsers of a damaged file raise all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{said}: cannot be read: {words}; give a rosbag2 folder, .mcap or .db3 file") from error
+        raise InputError(f"{source}: cannot be read: {words}; give a rosbag2 folder, .mcap or .db3 file") from error
 
 
-def _read(path: Path, adapter: Adapter, said: str) -> list[LoggedSample]:
+def _read(path: Path, adapter: Adapter, source: str) -> list[LoggedSample]:
     with checked_files(path) as files, Reader(files) as reader:
         chosen = [connection for connection in reader.connections if connection.topic in adapter.topics]
         if not chosen:
-            raise InputError(f"{said}: none of the autopilot's topics in it; expected {', '.join(adapter.topics)}")
-        return list(_samples(reader, chosen, _types(chosen, adapter, said), adapter))
+            raise InputError(f"{source}: none of the autopilot's topics in it; expected {', '.join(adapter.topics)}")
+        return list(_samples(reader, chosen, _types(chosen, adapter, source), adapter))
 
 
-def _types(connections: list[Connection], adapter: Adapter, said: str) -> Typestore:
+def _types(connections: list[Connection], adapter: Adapter, source: str) -> Typestore:
     """The type store, with the definitions of the messages that the bag holds."""
     store = deepcopy(type_store())
     for connection in connections:
         wanted = adapter.topics[connection.topic]
         if connection.msgtype != wanted:
-            raise InputError(f"{said}: topic {connection.topic} is {connection.msgtype}, expected {wanted}")
+            raise InputError(f"{source}: topic {connection.topic} is {connection.msgtype}, expected {wanted}")
         if connection.msgtype in store.fielddefs:
             continue
         if not connection.msgdef.data:
             raise InputError(
-                f"{said}: no definition of {connection.msgtype} in it; convert it to mcap where that is installed"
+                f"{source}: no definition of {connection.msgtype} in it; convert it to mcap where that is installed"
             )
         found = get_types_from_msg(connection.msgdef.data, connection.msgtype)
         store.register({name: fields for name, fields in found.items() if name not in store.fielddefs})

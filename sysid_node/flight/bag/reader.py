@@ -89,10 +89,10 @@ def _not_found(path: Path) -> str:
     return f"no bag: neither metadata.yaml nor an .mcap or .db3 file in {path}"
 
 
-def _remedy(path: Path, said: str) -> str:
+def _remedy(path: Path, reason: str) -> str:
     if path.is_file() and path.suffix not in (".mcap", ".db3"):
         return "give a rosbag2 folder, .mcap or .db3 file; sysid convert makes a bag of a log"
-    if path.is_dir() and ("metadata" in said or "Rosbag2 version" in said):
+    if path.is_dir() and ("metadata" in reason or "Rosbag2 version" in reason):
         return f"its metadata.yaml is damaged; run: ros2 bag reindex {path}"
     mcap = path.suffix == ".mcap" or (path.is_dir() and any(path.glob("*.mcap")))
     repair = "mcap recover FILE.mcap -o NEW.mcap" if mcap else "sqlite3 FILE.db3 .recover | sqlite3 NEW.db3"

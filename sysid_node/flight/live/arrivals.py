@@ -27,7 +27,7 @@ class Arrivals:
     topic: str
     silent_after: float
     clock: Callable[[], float] = time.monotonic  # s
-    heard: float = -math.inf  # s, by ``clock``, of the last message
+    last_arrival: float = -math.inf  # s, by ``clock``, of the last message
     stamp: float = math.nan  # s, the newest
     start: tuple[float, float] = (math.nan, math.nan)  # s, ``clock`` and stamp when the stamps began, or were set
     intervals: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))  # s between stamps
@@ -44,9 +44,9 @@ class Arrivals:
         """Take a message with a stamp (s). False where it is not newer than the messages before it."""
         now = self.clock()
         if self.silent():
-            self._add(f"was silent for {now - self.heard:.1f} s")
+            self._add(f"was silent for {now - self.last_arrival:.1f} s")
         step, expected = stamp - self.stamp, self._expected_step(now)
-        self.heard = now
+        self.last_arrival = now
         if -STEP_BACK < step <= 0.0:
             self._add("out of order")
             return False
@@ -64,13 +64,13 @@ class Arrivals:
 
     def silent(self) -> bool:
         """Whether the topic is silent now; never before the first message."""
-        return math.isfinite(self.heard) and self.clock() - self.heard > self.silent_after
+        return math.isfinite(self.last_arrival) and self.clock() - self.last_arrival > self.silent_after
 
     def troubles(self) -> list[str]:
         """The problems since the last call, in words."""
         words, self.events = list(dict.fromkeys(self.events)), []
         if self.silent():
-            words.append(f"silent for {self.clock() - self.heard:.1f} s")
+            words.append(f"silent for {self.clock() - self.last_arrival:.1f} s")
         share = self.missing / max(self.received + self.missing, 1)
         if share > SHARE:
             words.append(f"{100.0 * share:.0f} % lost")
@@ -86,9 +86,9 @@ class Arrivals:
         A simulation runs faster or slower than the real clock, so that stamps go on at another pace during a silence.
         """
         began, stamp = self.start
-        lasted = self.heard - began
+        lasted = self.last_arrival - began
         pace = (self.stamp - stamp) / lasted if lasted > 1.0 else 1.0
-        expected = pace * (now - self.heard)
+        expected = pace * (now - self.last_arrival)
         return expected if math.isfinite(expected) else 0.0
 
     def _add(self, event: str) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.flight.frames import euler_from_quaternion
 from sysid_node.flight.logs.autopilot_log import AutopilotLog, Signal
-from sysid_node.flight.logs.rates import rate_of, said_rate
+from sysid_node.flight.logs.rates import rate_of, rate_text
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps
 
@@ -78,8 +78,8 @@ def air_data(log: AutopilotLog, imu: Signal, attitude: Array, airspeed: Signal) 
     remarks: tuple[str, ...] = ()
     if rate < FAST_AIRSPEED and stamps.size > 1:
         at, speed = _completed(imu, attitude, stamps, speed)
-        said = f"airspeed: {airspeed.source} comes at {said_rate(rate)} Hz"
-        remarks = (f"{said}; between its samples it moves as the IMU says",)
+        description = f"airspeed: {airspeed.source} comes at {rate_text(rate)} Hz"
+        remarks = (f"{description}; between its samples it moves as the IMU says",)
     else:
         at = stamps
     density = _at(log.density, 0, at) if len(log.density) else np.full(at.size, np.nan)

@@ -24,23 +24,23 @@ def reading_log(path: str | Path) -> Iterator[None]:
     Warns (InputWarning) where they would have printed about damage.
     """
     name = Path(path).name
-    said: list[str] = []
+    messages: list[str] = []
     try:
-        with _heard(said):
+        with _collected(messages):
             yield
     except (InputError, ImportError):
         raise
     except Exception as error:  # parsers of a damaged file raise all kinds of exceptions
         words = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise InputError(f"{name}: is damaged and cannot be read ({words}); copy it from the vehicle again") from error
-    if said:
-        first = " ".join(said[0].split())[:100]
-        text = f"{name}: is damaged in {len(said)} places, which are left out, first: {first}"
+    if messages:
+        first = " ".join(messages[0].split())[:100]
+        text = f"{name}: is damaged in {len(messages)} places, which are left out, first: {first}"
         warnings.warn(text, InputWarning, stacklevel=3)
 
 
 @contextmanager
-def _heard(said: list[str]) -> Iterator[None]:
+def _collected(messages: list[str]) -> Iterator[None]:
     """Put the lines that are printed, by Python and by compiled code, into ``said``."""
     printed = io.StringIO()
     with tempfile.TemporaryFile() as written:
@@ -58,7 +58,7 @@ def _heard(said: list[str]) -> Iterator[None]:
             os.close(before)
         written.seek(0)
         lines = [*printed.getvalue().splitlines(), *written.read(2**20).decode("utf-8", "replace").splitlines()]
-        said += [line for line in lines if line.strip()]
+        messages += [line for line in lines if line.strip()]
 
 
 def _restore(before: int) -> None:

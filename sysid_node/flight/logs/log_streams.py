@@ -46,14 +46,14 @@ def flight_of_log(log: AutopilotLog, outputs: str = "") -> LogFlight:
     attitude = attitude_at(log.attitude, imu.stamp_ns)
     air, remarks = air_data(log, imu, attitude, airspeed)
     joints = _joints(log, outputs)
-    told = (*said_part(log), *remarks, *log.remarks)
+    all_remarks = (*part_remarks(log), *remarks, *log.remarks)
     streams = Streams(
         ImuStream(_arrival(imu), imu.values, attitude, "base_link", source=imu.source, remedy=_remedy(log, IMU)),
         AirDataStream(_arrival(air), air.values, source=airspeed.source, remedy=_remedy(log, AIRSPEED)),
         joints,
         log.name,
     )
-    return LogFlight(in_order_of_logging(streams), told)
+    return LogFlight(in_order_of_logging(streams), all_remarks)
 
 
 def _remedy(log: AutopilotLog, role: str) -> str:
@@ -120,7 +120,7 @@ def _flown_part(log: AutopilotLog, signal: Signal) -> Signal:
     return signal.selected(within(log.flown, signal.stamp_ns))
 
 
-def said_part(log: AutopilotLog) -> tuple[str, ...]:
+def part_remarks(log: AutopilotLog) -> tuple[str, ...]:
     """Which part of the log is taken, a sentence."""
     if log.flown is not None and not log.flown:
         return ("never flew as a fixed wing (on the ground, or hovering)",)

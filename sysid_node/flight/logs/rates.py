@@ -41,7 +41,7 @@ class SampleRate(NamedTuple):
         if self.rate >= 0.93 * self.needed:  # stamps of a logger scatter
             return ""
         why = " for commands in steps" if self.needed == NEEDED_FOR_STEPS else ""
-        return f"{self.source} comes at {said_rate(self.rate)} Hz; {self.needed:g} Hz are needed{why}"
+        return f"{self.source} comes at {rate_text(self.rate)} Hz; {self.needed:g} Hz are needed{why}"
 
 
 def rate_of(stamps: Stamps) -> float:
@@ -51,7 +51,7 @@ def rate_of(stamps: Stamps) -> float:
     return 1e9 / float(np.median(steps)) if steps.size else 0.0
 
 
-def said_rate(rate: float) -> str:
+def rate_text(rate: float) -> str:
     """A rate as a text: one decimal below 10 Hz, unless it is a whole number."""
     return f"{round(rate, 1):g}" if rate < 10.0 else f"{rate:.0f}"
 

@@ -15,7 +15,7 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.logs.autopilot_log import AutopilotLog, Commands, Signal
 from sysid_node.flight.logs.content import content_of
 from sysid_node.flight.logs.flown import within
-from sysid_node.flight.logs.log_streams import missing_airspeed, said_part
+from sysid_node.flight.logs.log_streams import missing_airspeed, part_remarks
 from sysid_node.flight.logs.opening import is_table, read_autopilot_log
 from sysid_node.flight.logs.rates import SampleRate, rate_of, rates_of_log, rates_of_streams
 from sysid_node.flight.logs.record_streams import streams_from_record
@@ -89,7 +89,7 @@ def survey(path: str | Path) -> Survey:
     if log is None:
         streams = streams_from_record(read_csv(path)) if is_table(path) else read_streams(path)
         return _surveyed(path.name, content_of(path).value, _of_streams(streams), (), {})
-    remarks = (*said_part(log), *(remark for remark in log.remarks if len(log.imu)))
+    remarks = (*part_remarks(log), *(remark for remark in log.remarks if len(log.imu)))
     return _surveyed(path.name, log.autopilot, _of_log(log), remarks, log.remedies)
 
 
@@ -191,11 +191,11 @@ def _excitation(signals: _Signals) -> dict[str, str]:
         rates = rates[np.isfinite(rates)]
         turned = float(np.degrees(np.std(rates))) if rates.size else 0.0
         word = "hardly" if turned < _HARDLY else "weakly" if turned < _WEAKLY else "well"
-        said = f"{word}, {turned:.1f} deg/s"
+        description = f"{word}, {turned:.1f} deg/s"
         if control in signals.commands.names:
             values = signals.commands.signal.values[:, signals.commands.names.index(control)]
-            said += f" by {_spread(values, in_radians=signals.in_radians)} of {control}"
-        found[axis] = said
+            description += f" by {_spread(values, in_radians=signals.in_radians)} of {control}"
+        found[axis] = description
     return found
 
 

@@ -33,7 +33,7 @@ class Segment:
 
     end: float  # s
     energy: Array  # of each control
-    said: Information
+    information: Information
 
 
 @dataclass
@@ -63,13 +63,13 @@ def no_excited_segments(equations: NormalEquations, layout: Layout) -> list[Exci
     return [ExcitedSegments(columns[np.isin(columns, moved)]) for columns in blocks]
 
 
-def remember(known: Sequence[ExcitedSegments], said: Information, end: float) -> None:
+def remember(known: Sequence[ExcitedSegments], information: Information, end: float) -> None:
     """Remember a segment that ended at ``end`` (s) where its controls moved much."""
-    energies = said.grams.sum(axis=0).diagonal()
+    energies = information.grams.sum(axis=0).diagonal()
     for excited in known:
         energy = energies[excited.controls]
         if excited.is_comparable(energy):
-            excited.segments.append(Segment(end, energy, said))
+            excited.segments.append(Segment(end, energy, information))
 
 
 def estimates_of(excited: ExcitedSegments, full: NormalEquations, since: float, before: float) -> Reference | None:
@@ -77,11 +77,11 @@ def estimates_of(excited: ExcitedSegments, full: NormalEquations, since: float, 
     chosen = [s for s in excited.segments if since < s.end <= before + 1e-6 and excited.is_comparable(s.energy)]
     if not chosen:
         return None
-    said = chosen[0].said
+    information = chosen[0].information
     for segment in chosen[1:]:
-        said = said + segment.said
-    gram = said.grams.sum(axis=0)
-    instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), said)
+        information = information + segment.information
+    gram = information.grams.sum(axis=0)
+    instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), information)
     equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
     solution = least_squares.solve(equations, gram)
-    return Reference(chosen[-1].end, equations, solution, least_squares.uncertainty(equations, solution, said))
+    return Reference(chosen[-1].end, equations, solution, least_squares.uncertainty(equations, solution, information))

@@ -42,7 +42,7 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     c = table.coefficient
     start, _, stop = state.model.settings.frequencies
     # an equation with one weak instrument is solved by least squares, which gusts bias
-    held = np.where(equations.belongs > 0.0, latest.instrument_strength.strength[:, None], np.inf).min(axis=0)
+    strength = np.where(equations.belongs > 0.0, latest.instrument_strength.strength[:, None], np.inf).min(axis=0)
     objections, squares = _objections(state, latest), student_95(freedom)[c] ** 2
     cautions = np.where(
         table.offset, latest.selection_bias_factors.max(axis=0)[c], latest.selection_bias_factors[table.unknown, c]
@@ -51,7 +51,7 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     systematic = _systematic(state, latest)
     stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
     return ValidityBasis(
-        unobjected=(held >= normal_equations.STRONG)[c] & (objections == status.OK),
+        unobjected=(strength >= normal_equations.STRONG)[c] & (objections == status.OK),
         objections=objections,
         squares=squares,
         longest=longest,

@@ -96,6 +96,6 @@ def with_strong_instruments(full: NormalEquations, strength: Array) -> NormalEqu
 def with_least_squares_in(full: NormalEquations, blocks: tuple[int, ...]) -> NormalEquations:
     """The equations, with least squares in these blocks; made once and kept in ``variants``."""
     if blocks not in full.variants:
-        own = np.isin(full.group, blocks)
-        full.variants[blocks] = replace(full, instruments=np.where(own, full.columns, full.instruments))
+        chosen = np.isin(full.group, blocks)
+        full.variants[blocks] = replace(full, instruments=np.where(chosen, full.columns, full.instruments))
     return full.variants[blocks]

@@ -112,8 +112,8 @@ def _predict_outputs(Z: Array, equations: NormalEquations, solution: Solution, p
     """
     N = Z.shape[-1] // 2
     for c, output in enumerate(place[equations.outputs].tolist()):
-        own = np.flatnonzero(equations.belongs[:, c])
-        columns, theta = place[equations.columns[own]], solution.theta[own, c]
+        unknowns = np.flatnonzero(equations.belongs[:, c])
+        columns, theta = place[equations.columns[unknowns]], solution.theta[unknowns, c]
         for offset in (0, N):
             Z[..., offset + columns] += Z[..., offset + output, None] * theta
             Z[..., offset + output] = 0.0
@@ -129,8 +129,8 @@ def _projection(
     exogenous = [*place[changes.layout.deflections], *range(columns.servos.start, columns.instruments.stop)]
     chosen[exogenous] = True
     chosen[N:] = chosen[:N]
-    own = of_block & (equations.columns == equations.instruments)
-    chosen[place[equations.columns[own]]] = True
+    unknowns = of_block & (equations.columns == equations.instruments)
+    chosen[place[equations.columns[unknowns]]] = True
     at = np.flatnonzero(chosen & (gram.diagonal() > TINY))
     scale = 1.0 / np.sqrt(gram.diagonal()[at])
     within = gram[np.ix_(at, at)] * scale[:, None] * scale + PROJECTION_RIDGE * np.eye(at.size)

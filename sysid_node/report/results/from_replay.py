@@ -93,12 +93,12 @@ def _servo_remarks(aircraft: Aircraft, history: Sequence[Estimates]) -> list[str
     known = {name: d for name, d in history[-1].servos.items() if d.valid} if history else {}
     late = {name: of_servo(servo)[0] for name, servo in zip(aircraft.controls, servos_of(aircraft)[1:], strict=True)}
     stated = aircraft.effects.get("actuator_lag", {}).keys() | aircraft.effects.get("command_delay", {}).keys()
-    told = [
+    delays = [
         f"{name} {1e3 * d.value:.0f} \u00b1 {1e3 * half_width(d):.0f} ms "
         f"(the file says {f'{1e3 * late[name]:.0f} ms' if name in stated else 'nothing'})"
         for name, d in known.items()
     ]
-    return [f"Controls follow what is recorded of them later by: {', '.join(told)}."] if told else []
+    return [f"Controls follow what is recorded of them later by: {', '.join(delays)}."] if delays else []
 
 
 def _change_remark(noticed: Sequence[float]) -> list[str]:

@@ -91,11 +91,11 @@ def each_control(
 
     def parameters(layout: Layout) -> tuple[Parameter, ...]:
         names = (*layout.controls, *((THROTTLE,) if throttle else ()))
-        own = (
+        per_control = (
             Parameter(c, shared.unit, f"{shared.meaning}, {c}: added", shared.scale, lower=-size, upper=size)
             for c in names
         )
-        return (shared, *own, *others)
+        return (shared, *per_control, *others)
 
     return parameters
 

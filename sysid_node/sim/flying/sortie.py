@@ -91,8 +91,8 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieCondi
 
 def _all_effects(conditions: SortieConditions) -> dict[str, dict[str, float]]:
     """The effects asked for, and turbulence and noise of the conditions where these effects are not given."""
-    asked = conditions.effects if isinstance(conditions.effects, Mapping) else parse(conditions.effects)
-    effects = {name: dict(values) for name, values in asked.items()}
+    requested = conditions.effects if isinstance(conditions.effects, Mapping) else parse(conditions.effects)
+    effects = {name: dict(values) for name, values in requested.items()}
     if conditions.turbulence not in INTENSITIES:
         raise InputError(f"turbulence {conditions.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
     intensity = INTENSITIES[conditions.turbulence]

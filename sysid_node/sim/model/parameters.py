@@ -120,8 +120,8 @@ def _check_given_once(effect: str, meant: Mapping[str, tuple[Parameter, float]])
 
 def _value_of_control(effect: str, shared: Parameter, control: str, value: float) -> float:
     """What the vector's entries of a control add up to, from the value that is stated for it."""
-    own = replace(shared, name="", reciprocal=control) if shared.reciprocal else replace(shared, name=control)
-    return _resolve(effect, {own.name: own}, control, value)[1]
+    of_control = replace(shared, name="", reciprocal=control) if shared.reciprocal else replace(shared, name=control)
+    return _resolve(effect, {of_control.name: of_control}, control, value)[1]
 
 
 @dataclass(frozen=True)

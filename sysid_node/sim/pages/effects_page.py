@@ -144,16 +144,17 @@ def _section(simulator: Simulator, effect: Effect) -> str:
 def _rows_of_controls(effect: Effect, parameters: Sequence[Parameter]) -> list[str]:
     """The rows of what all controls share, of each control, and of the rest."""
     shared, names = parameters[0], EFFECT_NAMES[effect.name]
-    known, (own,) = {p.name for p in names.fixed}, names.each
+    known, (per_control,) = {p.name for p in names.fixed}, names.each
     rows = [_row(replace(shared, meaning=f"{shared.meaning}, all controls"))]
     for parameter in parameters[1:]:
         if parameter.name in known:
             rows.append(_row(parameter))
             continue
         neutral, scale = (1.0 / x if shared.reciprocal and x else x for x in (shared.neutral, shared.scale))
-        size = f"{'inf' if shared.reciprocal else f'{neutral:g}'} | {scale:g} | {own.lower:g} to {own.upper:g}"
+        bounds = f"{per_control.lower:g} to {per_control.upper:g}"
+        size = f"{'inf' if shared.reciprocal else f'{neutral:g}'} | {scale:g} | {bounds}"
         meaning = f"largest {shared.reciprocal}" if shared.reciprocal else shared.meaning
-        rows.append(f"| {parameter.name} | {own.unit} | {size} | {meaning}, {parameter.name} alone |")
+        rows.append(f"| {parameter.name} | {per_control.unit} | {size} | {meaning}, {parameter.name} alone |")
     return rows
 
 

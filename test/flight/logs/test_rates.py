@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sysid_node.flight.logs.autopilot_log import AutopilotLog, Commands, Signal, absent
-from sysid_node.flight.logs.rates import rate_of, rates_of_log, said_rate
+from sysid_node.flight.logs.rates import rate_of, rate_text, rates_of_log
 from sysid_node.flight.logs.steps import MOSTLY, share_in_steps
 
 
@@ -20,7 +20,7 @@ def test_a_doublet_moves_in_steps_and_a_sine_does_not():
 
 
 def test_rates_are_said_as_people_write_them():
-    assert [said_rate(rate) for rate in (2.96, 3.04, 4.8, 12.3, 205.2)] == ["3", "3", "4.8", "12", "205"]
+    assert [rate_text(rate) for rate in (2.96, 3.04, 4.8, 12.3, 205.2)] == ["3", "3", "4.8", "12", "205"]
     assert rate_of(np.array([0, 10_000_000, 20_000_000, 500_000_000])) == 100.0
     assert rate_of(np.array([5])) == 0.0
 

@@ -90,14 +90,14 @@ def _choose(reader: AnyReader, name: str) -> _Chosen:
         ours = _ours(connection.topic, adapter)
         if ours is not None:
             by_topic.setdefault(ours, []).append(connection)
-    heard: dict[int, tuple[str, ...]] = {}
+    received: dict[int, tuple[str, ...]] = {}
     for ours, connections in by_topic.items():
         best = max(connections, key=lambda c: c.msgcount)
-        heard[best.id] = (*heard.get(best.id, ()), ours)
+        received[best.id] = (*received.get(best.id, ()), ours)
     if autopilot == "mavros" and MAVROS_IMU not in by_topic and MAVROS_ATTITUDE in by_topic:
-        (only,) = [key for key, names in heard.items() if MAVROS_ATTITUDE in names]
-        heard[only] = (MAVROS_ATTITUDE, MAVROS_IMU)
-    return _Chosen(autopilot, heard)
+        (only,) = [key for key, names in received.items() if MAVROS_ATTITUDE in names]
+        received[only] = (MAVROS_ATTITUDE, MAVROS_IMU)
+    return _Chosen(autopilot, received)
 
 
 def _sources(reader: AnyReader, chosen: _Chosen) -> dict[str, str]:

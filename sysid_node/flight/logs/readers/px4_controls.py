@@ -68,7 +68,7 @@ def _from_servos(
     signal, remarks = _refined(signal, topic, names, vtol=vtol)
     flaps = [i for i, kind in enumerate(kinds) if kind in _FLAPS]
     if flaps:
-        flap = _held(servos, np.mean(servos.values[:, flaps], axis=1), signal.stamp_ns)
+        flap = _last_values(servos, np.mean(servos.values[:, flaps], axis=1), signal.stamp_ns)
         names, signal = (*names, "flap"), _with_column(signal, flap)
     throttle = _throttle(topic, parameters, signal.stamp_ns)
     if throttle is not None:
@@ -99,10 +99,10 @@ def _refined(servos: Signal, topic: Topic, names: tuple[str, ...], *, vtol: bool
     fine = np.empty((len(torque), len(names)))
     for i in range(len(names)):
         design = np.column_stack([at_servos[inside, i], np.ones(int(inside.sum()))])
-        told = servos.values[inside, i]
-        coefficients = np.linalg.lstsq(design, told, rcond=None)[0]
-        errors = np.abs(told - design @ coefficients)  # large where a step falls between two samples of the torque
-        if float(np.quantile(errors, 0.8)) > _REPRODUCED * float(np.std(told)) + 1e-4:
+        outputs = servos.values[inside, i]
+        coefficients = np.linalg.lstsq(design, outputs, rcond=None)[0]
+        errors = np.abs(outputs - design @ coefficients)  # large where a step falls between two samples of the torque
+        if float(np.quantile(errors, 0.8)) > _REPRODUCED * float(np.std(outputs)) + 1e-4:
             return servos, ("vehicle_torque_setpoint does not reproduce actuator_servos and is not used",)
         fine[:, i] = coefficients[0] * torque.values[:, i] + coefficients[1]
     remark = f"servos: vehicle_torque_setpoint reproduces actuator_servos ({len(servos)} samples) and stands for them"
@@ -118,7 +118,7 @@ def _throttle(topic: Topic, parameters: Parameters, at_ns: Stamps) -> Array | No
     motors = topic("actuator_motors", tuple(f"control[{i}]" for i in forward or [0]))
     if not len(motors) or not forward:
         return None
-    return _held(motors, np.nan_to_num(motors.values).mean(axis=1), at_ns)  # PX4 stops a motor by NaN
+    return _last_values(motors, np.nan_to_num(motors.values).mean(axis=1), at_ns)  # PX4 stops a motor by NaN
 
 
 def _servos_of_pulses(topic: Topic, parameters: Parameters, count: int) -> Signal:
@@ -152,11 +152,11 @@ def _from_axes(topic: Topic, *, vtol: bool) -> tuple[Commands, tuple[str, ...]]:
     return Commands(names, Signal(name, commands.stamp_ns, values)), ()
 
 
-def _held(signal: Signal, values: Array, at_ns: Stamps) -> Array:
+def _last_values(signal: Signal, values: Array, at_ns: Stamps) -> Array:
     """Values (N,) at other times: the last one of before."""
     place = np.searchsorted(signal.stamp_ns, at_ns, side="right") - 1
-    held: Array = values[np.clip(place, 0, values.size - 1)]
-    return held
+    last_values: Array = values[np.clip(place, 0, values.size - 1)]
+    return last_values
 
 
 def _interpolated(signal: Signal, at_ns: Stamps) -> Array:

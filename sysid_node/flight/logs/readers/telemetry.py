@@ -115,17 +115,18 @@ class _Clock:
     """The autopilot's time of a message, ns."""
 
     def __init__(self, rows: Rows) -> None:
-        own = [(row.received_ns, row.fields["time_boot_ms"] * 1_000_000) for row in rows["ATTITUDE"]]
-        self._ahead = min((received - boot for received, boot in own), default=0)
+        boot_times = [(row.received_ns, row.fields["time_boot_ms"] * 1_000_000) for row in rows["ATTITUDE"]]
+        self._ahead = min((received - boot for received, boot in boot_times), default=0)
 
     def of(self, row: _Row) -> int:
         """The message's own time since the start; where it has none or another epoch, when it was received."""
         if "time_boot_ms" in row.fields:
             return int(row.fields["time_boot_ms"]) * 1_000_000
         received = row.received_ns - self._ahead
-        own = int(row.fields.get("time_usec", 0)) * 1000
-        own += round((received - own) / (2**32 * 1000)) * 2**32 * 1000  # the counter of 32 bits wraps in 71.6 min
-        return own if own > 0 and abs(own - received) < 2_000_000_000 else received
+        stamp = int(row.fields.get("time_usec", 0)) * 1000
+        # the counter of 32 bits wraps in 71.6 min
+        stamp += round((received - stamp) / (2**32 * 1000)) * 2**32 * 1000
+        return stamp if stamp > 0 and abs(stamp - received) < 2_000_000_000 else received
 
 
 def _signal(rows: list[_Row], clock: _Clock, source: str, columns: tuple[str, ...]) -> Signal:

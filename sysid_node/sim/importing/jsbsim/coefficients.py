@@ -115,26 +115,26 @@ class CoefficientModel:
 
     def axes(self, aerodynamics: Sequence[Element]) -> dict[str, Axis]:
         """The variables with their nodes: regular ones, and the points of the model's tables."""
-        own = self._own_points(aerodynamics)
+        points_of_tables = self._points_of_tables(aerodynamics)
         centre, speed = self.centre, self._steady.state.airspeed
         axes = {}
         for name, regular in (("alpha", _ALPHA), ("beta", _BETA)):
             low, high = _LARGEST[name]
-            points = [x for x in own.get(name, []) if low <= x <= high]
+            points = [x for x in points_of_tables.get(name, []) if low <= x <= high]
             axes[name] = Axis.of([*regular, *points], centre[name], 0.004)
         for name, size in _RATES.items():
             axes[name] = Axis.of(size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), 0.0, 0.1 * size)
-        speeds = [x for x in own.get("V", []) if 0.6 * speed <= x <= 1.4 * speed]
+        speeds = [x for x in points_of_tables.get("V", []) if 0.6 * speed <= x <= 1.4 * speed]
         axes["V"] = Axis.of([*(speed * np.array(_SPEEDS)), *speeds], speed, 0.01 * speed)
         for symbol, surface in self._surfaces.items():
             low, high = float(surface.deflection[0]), float(surface.deflection[-1])
-            points = [x for x in own.get(symbol, []) if low <= x <= high]
+            points = [x for x in points_of_tables.get(symbol, []) if low <= x <= high]
             middle = 0.0 if low < 0.0 < high else 0.5 * (low + high)
             regular = np.concatenate([np.linspace(low, middle, 4), np.linspace(middle, high, 4)])
             axes[symbol] = Axis.of([*regular, *points], float(np.clip(centre[symbol], low, high)), 0.01 * (high - low))
         return axes
 
-    def _own_points(self, aerodynamics: Sequence[Element]) -> dict[str, list[float]]:
+    def _points_of_tables(self, aerodynamics: Sequence[Element]) -> dict[str, list[float]]:
         """By variable the points of the model's tables over it."""
         degree = math.pi / 180.0
         meaning = {

@@ -54,7 +54,7 @@ class Program:
         os.environ.setdefault("JSBSIM_DEBUG", "0")  # no banner; it is read when the program starts
         import jsbsim  # noqa: PLC0415  # an optional dependency
 
-        said = collect_messages()
+        messages = collect_messages()
         self.fdm: Any = jsbsim.FGFDMExec(str(files.folder))
         self.fdm.set_debug_level(0)
         self._rate = rate
@@ -65,7 +65,7 @@ class Program:
         except Exception as error:
             raise InputError(f"model {files.label}: JSBSim does not load it: {' '.join(str(error).split())}") from error
         if not loaded:
-            why = said[-1] if said else "run JSBSim on it to see why"
+            why = messages[-1] if messages else "run JSBSim on it to see why"
             raise InputError(f"model {files.label}: JSBSim does not load it: {why}")
         self._settled: tuple[float, float] | None = None
         self._set_if_there({"propulsion/fuel_freeze": 1.0, "atmosphere/turb-type": 0.0})
