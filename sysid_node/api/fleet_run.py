@@ -21,8 +21,11 @@ from sysid_node.fleet.outcome import FleetSettings
 from sysid_node.fleet.plan import Plan, PlannedFlight
 from sysid_node.fleet.results import FleetResults
 from sysid_node.fleet.state.store import FILES, STATE, FleetState
+from sysid_node.fleet.statistics.summarise import summarise
 from sysid_node.fleet.tables import document, write_tables
+from sysid_node.report import fleet as fleet_report
 from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.results.fleet_report import FleetReport
 
 SUMMARY = "fleet.json"
 
@@ -54,8 +57,8 @@ def run_fleet(
     inputs: Iterable[str | Path] = (),
     say: Callable[[str], None] = lambda text: None,
     progress: Progress = lambda share, doing: None,
-) -> FleetResults:
-    """Do what is missing or changed of a fleet, and write its tables and ``fleet.json`` into ``out``.
+) -> FleetReport:
+    """Do what is missing or changed of a fleet; write its page, tables, tails' files and ``fleet.json`` into ``out``.
 
     ``inputs``: paths that ``out`` must not hold. ``say`` is called with the address of the workers' dashboard, and
     ``progress`` with the share done (0..1) and the flight that came back last. Raises InputError where settings are
@@ -78,10 +81,13 @@ def run_fleet(
                     say(opened.client.dashboard_link)
                     work_through(plan, state, out, opened, estimate_flight, limits, tell)
             results = assembled(plan, state)
-            folder.publish(lambda place: write_results(place, results, settings))
+            loaded = (plan.aircraft_of(flight) for flight in catalogue.flights)
+            files = {aircraft.name: aircraft for aircraft in loaded if aircraft is not None}
+            found = FleetReport(results, summarise(results, files), files)
+            folder.publish(lambda place: write_results(place, found, settings))
         finally:
             state.close()
-    return results
+    return found
 
 
 @contextmanager
@@ -97,10 +103,12 @@ def planned(catalogue: Catalogue, out: str | Path, settings: FleetSettings) -> I
             state.close()
 
 
-def write_results(folder: Path, results: FleetResults, settings: FleetSettings) -> None:
-    """Write the tables and ``fleet.json``. Raises OSError."""
-    write_tables(folder, results)
-    text = json.dumps(document(results, settings.as_dict()), indent=2, ensure_ascii=False, default=str)
+def write_results(folder: Path, found: FleetReport, settings: FleetSettings) -> None:
+    """Write the page, the tables, the tails' aircraft files and ``fleet.json``. Raises OSError, InputError."""
+    write_tables(folder, found.results)
+    fleet_report.write(found.results, found.summary, folder, found.files)
+    content = {**document(found.results, settings.as_dict()), "summary": found.summary.to_json()}
+    text = json.dumps(content, indent=2, ensure_ascii=False, default=str)
     (folder / SUMMARY).write_text(text + "\n", encoding="utf-8")
 
 

@@ -19,7 +19,7 @@ from sysid_node.errors import InputError
 if TYPE_CHECKING:
     from sysid_node.fleet.outcome import FleetSettings
     from sysid_node.fleet.plan import PlannedFlight
-    from sysid_node.fleet.results import FleetResults
+    from sysid_node.report.results.fleet_report import FleetReport
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> None:
     inputs = [] if args.catalogue.is_dir() else [args.catalogue]
     workers = fleet_run.WorkersWanted(args.workers or len(os.sched_getaffinity(0)), args.scheduler, args.memory)
     with progress_bar("fleet", quiet=args.quiet) as progress:
-        results = fleet_run.run_fleet(
+        found = fleet_run.run_fleet(
             catalogue,
             args.out,
             settings,
@@ -84,8 +84,8 @@ def run(args: argparse.Namespace) -> None:
             progress=progress,
         )
     if not args.quiet:
-        _show(results, args.out)
-    fleet_run.require_results(results)
+        _show(found, args.out)
+    fleet_run.require_results(found.results)
 
 
 def _check_numbers(args: argparse.Namespace) -> None:
@@ -128,12 +128,17 @@ def _show_plan(flights: list[PlannedFlight]) -> None:
     print(f"{counts['to do']} to do, {counts['done']} done, {counts['wrong']} with a fault")
 
 
-def _show(results: FleetResults, out: Path) -> None:
-    """Print how many flights gave a result, and why the others did not."""
+def _show(found: FleetReport, out: Path) -> None:
+    """Print how many flights gave a result, why the others did not, and what the flights tell together."""
+    from sysid_node.report.wording.fleet import findings  # noqa: PLC0415  # with the results there, it is quick
+
+    results = found.results
     tails = {flight.tail for flight in results.flights}
     print(f"{len(results.flights)} flights of {len(tails)} aircraft, {len(results.refusals)} refused")
     for refusal in results.refusals[:_SHOWN]:
         print(f"  refused {refusal.flight}: {refusal.reason}")
     if len(results.refusals) > _SHOWN:
         print(f"  and {len(results.refusals) - _SHOWN} more in {out / 'refusals.csv'}")
-    print(out / "fleet.json")
+    for sentence in findings(found):
+        print(sentence)
+    print(out / "report.html")

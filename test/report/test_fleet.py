@@ -65,20 +65,20 @@ def test_the_page_draws_what_is_open_without_a_complaint(written, browse):
     assert page.plots == 5
 
 
-def test_tables_hold_every_estimate_and_the_drift(written):
+def test_tables_hold_every_weight_and_the_drift(written):
     folder, results, summary = written
-    estimates = rows_of(folder / "estimates.csv")
-    assert len(estimates) == sum(len(flight.names) for flight in results.flights)
-    assert float(estimates[0]["value"]) == results.flights[0].values[0]
+    weights = rows_of(folder / "fleet_weights.csv")
+    assert len(weights) == sum(len(flight.names) for flight in results.flights)
+    assert 0.0 < float(weights[0]["weight"]) < 1.0
     assert [row["tail"] for row in rows_of(folder / "drift.csv") if row["significant"] == "true"] == ["t3"]
-    assert {row["account"] for row in rows_of(folder / "causes.csv")} == {"simulator"}
+    assert {row["account"] for row in rows_of(folder / "pooled_causes.csv")} == {"simulator"}
     population = rows_of(folder / "population.csv")[0]
-    assert float(population["mean"]) == summary.populations["cdrw", population["name"]].fit.mean
+    assert float(population["mean"]) == summary.populations["cdrw", population["derivative"]].fit.mean
 
 
 def test_parquet_holds_what_the_csv_holds(written):
     parquet = pytest.importorskip("pyarrow.parquet")
-    for name in ("estimates", "population", "tails", "drift", "causes"):
+    for name in ("fleet_weights", "population", "tails", "drift", "pooled_causes"):
         table, rows = parquet.read_table(written[0] / f"{name}.parquet"), rows_of(written[0] / f"{name}.csv")
         assert table.column_names == list(rows[0])
         assert table.num_rows == len(rows)

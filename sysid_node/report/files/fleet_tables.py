@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -18,14 +18,14 @@ Table = tuple[Sequence[str], list[Row]]
 
 
 def write_fleet_tables(folder: Path, report: FleetReport) -> None:
-    """Write ``estimates``, ``population``, ``tails``, ``drift`` and ``causes``, each as .csv and .parquet."""
+    """Write what the flights tell together: five tables, each as .csv and .parquet."""
     summary = report.summary
     for name, (head, rows) in {
-        "estimates": _estimates(report),
+        "fleet_weights": _weights(summary),
         "population": _population(summary),
         "tails": _tails(summary),
         "drift": _drift(summary),
-        "causes": _causes(summary),
+        "pooled_causes": _causes(summary),
     }.items():
         write_table(folder / f"{name}.csv", head, rows, blank_nan=True)
         _write_parquet(folder / f"{name}.parquet", head, rows)
@@ -47,33 +47,19 @@ def _cell(value: object) -> object:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-def _estimates(report: FleetReport) -> Table:
-    """Every estimate of every flight, valid or not, with the fleet's weight in its combination."""
-    owed = {
-        (flight, p.series.name): weight
-        for p in report.summary.populations.values()
+def _weights(summary: FleetSummary) -> Table:
+    """The weight that the fleet's other flights have in each flight's combined estimate."""
+    rows: list[Row] = [
+        (flight, *key, weight)
+        for key, p in summary.populations.items()
         for flight, weight in zip(p.series.flight, p.owed.tolist(), strict=True)
-    }
-    head = (
-        "flight", "aircraft", "tail", "configuration", "date", "name", "value", "standard_error", "statistical_error",
-        "valid", "owed_to_fleet",
-    )  # fmt: skip
-
-    def rows() -> Iterator[Row]:
-        for f in report.results.flights:
-            who = (f.flight, f.aircraft, f.tail, f.configuration, f.date.isoformat())
-            total = np.sqrt(np.maximum(np.diag(f.covariance), 0.0))
-            statistical = np.sqrt(np.maximum(np.diag(f.statistical_covariance), 0.0))
-            for k, name in enumerate(f.names):
-                numbers = float(f.values[k]), float(total[k]), float(statistical[k])
-                yield (*who, name, *numbers, bool(f.valid[k]), owed.get((f.flight, name), math.nan))
-
-    return head, list(rows())
+    ]
+    return ("flight", "aircraft", "derivative", "weight"), rows
 
 
 def _population(summary: FleetSummary) -> Table:
     head = (
-        "aircraft", "name", "flights", "tails", "mean", "standard_error", "lower", "upper", "scatter_of_tails",
+        "aircraft", "derivative", "flights", "tails", "mean", "standard_error", "lower", "upper", "scatter_of_tails",
         "scatter_of_tails_lower", "scatter_of_tails_upper", "scatter_of_flights", "scatter_of_flights_lower",
         "scatter_of_flights_upper", "file", "differs",
     )  # fmt: skip
@@ -90,7 +76,7 @@ def _population(summary: FleetSummary) -> Table:
 def _tails(summary: FleetSummary) -> Table:
     """Each tail's derivative: its own mean, its estimate with the fleet, and how far it lies from the others."""
     head = (
-        "aircraft", "tail", "name", "flights", "own", "own_error", "level", "level_error", "systematic_error",
+        "aircraft", "tail", "derivative", "flights", "own", "own_error", "level", "level_error",
         "shrinkage", "distance", "distance_error", "adjusted_p", "stands_out", "next_value", "next_tolerance",
     )  # fmt: skip
     rows: list[Row] = []
@@ -117,8 +103,8 @@ def _tails(summary: FleetSummary) -> Table:
 
 def _drift(summary: FleetSummary) -> Table:
     head = (
-        "aircraft", "tail", "name", "kind", "change", "error", "before", "since", "first", "last", "configuration",
-        "p_value", "adjusted_p", "significant",
+        "aircraft", "tail", "derivative", "kind", "change", "error", "before", "since", "first", "last",
+        "configuration", "p_value", "adjusted_p", "significant",
     )  # fmt: skip
     rows: list[Row] = [
         (

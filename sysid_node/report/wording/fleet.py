@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
+from itertools import groupby
 
 from sysid_node.fleet.results import MaintenanceNote
-from sysid_node.fleet.statistics.causes import PooledCause, TailCause
+from sysid_node.fleet.statistics.causes import PooledCause
 from sysid_node.fleet.statistics.drift import Drift
 from sysid_node.fleet.statistics.series import DAY
+from sysid_node.report.results.fleet_report import FleetReport
 from sysid_node.report.wording.names import short_meaning
 from sysid_node.report.wording.numbers import MINUS, likely, listing, number
 
@@ -67,10 +69,14 @@ def account_words(cause: PooledCause) -> str:
     return "Single flights named it, and neither the type nor a tail has it with an even chance."
 
 
-def tail_cause_words(cause: TailCause) -> str:
-    """A tail that has a cause alone, with its probability and the date from which on."""
-    since = "" if cause.since is None else f", since {date_words(cause.since)}"
-    return f"{cause.tail} ({likely(cause.own)}{since})"
+def findings(report: FleetReport) -> list[str]:
+    """What has changed, tail by tail, and whose each cause is: a sentence each."""
+    drifting = [
+        tail_sentence(tail, list(found), report.maintenance(tail))
+        for (_, tail), found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
+    ]
+    causes = [f"{c.label} ({c.aircraft}): {account_words(c)}" for c in report.summary.causes if c.account != "flight"]
+    return [*drifting, *causes]
 
 
 def _signed(value: float, digits: int) -> str:
