@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from xml.etree.ElementTree import Element
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,26 +20,17 @@ from sysid_node.aircraft.model import (
     UncertainValue,
 )
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
-from sysid_node.errors import InputError
 from sysid_node.sim.importing.expansion import Axis, Expansion, expand, largest_error
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.jsbsim.actuators import Servo, chain_to, read_servo
+from sysid_node.sim.importing.jsbsim.actuators import Servo
 from sysid_node.sim.importing.jsbsim.coefficients import CoefficientModel
-from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model, find_model, outputs_of, sections
-from sysid_node.sim.importing.jsbsim.program import Flight, Program
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, Surface, find_surfaces, gains_to
-from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, default_airspeeds, find_trim, no_trim
+from sysid_node.sim.importing.jsbsim.files import ModelFiles
+from sysid_node.sim.importing.jsbsim.program import Program
+from sysid_node.sim.importing.jsbsim.surfaces import Surface
+from sysid_node.sim.importing.jsbsim.survey import surveyed
+from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
 Array = NDArray[np.float64]
-
-#: Altitude (m) where none is given: above ground effect.
-DEFAULT_ALTITUDE = 1000.0
-
-#: Rate at which the flight control system is watched, Hz.
-_WATCH_RATE = 100.0
-
-#: JSBSim's usual rate (Hz), by which delays that are given in frames become times.
-_FRAMES = 120.0
 
 #: A table's smallest part, as a share of what each variable changes in an ordinary flight.
 _SHARE = 5e-4
@@ -69,62 +57,18 @@ def read_jsbsim(model: str, airspeed: float | None = None, altitude: float | Non
 
 def read_model(model: str, airspeed: float | None = None, altitude: float | None = None) -> JsbsimModel:
     """The same with what a flight in JSBSim itself needs."""
-    files = find_model(model)
-    try:
-        return _read(files, airspeed, DEFAULT_ALTITUDE if altitude is None else altitude)
-    except (KeyError, ValueError, RuntimeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"model {files.label}: JSBSim stops: {' '.join(str(error).split())}") from error
-
-
-def _read(files: ModelFiles, airspeed: float | None, altitude: float) -> JsbsimModel:
-    parts = sections(files)
-    aerodynamics = [part for part in parts if part.tag == "aerodynamics"]
-    systems = [part for part in parts if part.tag != "aerodynamics"]
-    start = Flight(50.0, 0.03, theta=0.03, altitude=altitude, throttle=0.5)
-    with tempfile.TemporaryDirectory(prefix="sysid-") as place:
-        stock = Program(copy_model(files, Path(place) / "stock", ()), _WATCH_RATE)
-        speeds = [airspeed] if airspeed is not None else default_airspeeds(stock, start)
-        surfaces = find_surfaces(stock, aerodynamics, replace(start, airspeed=speeds[0]), _WATCH_RATE)
-        if not surfaces:
-            raise InputError(
-                f"model {files.label}: no command moves a surface that the aerodynamics read; it must be an aeroplane"
-            )
-        servos = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
-        moved = {name for surface in surfaces for name in surface.properties}
-        program = Program(copy_model(files, Path(place) / "driven", moved))
-        steady = _steady(files, program, surfaces, [replace(start, airspeed=speed) for speed in speeds])
-        surfaces = _usual_signs(program, surfaces, steady)
-        steady = SteadyFlight(steady.state, {s.name: s.sign * steady.deflections[s.name] for s in surfaces})
-        model = CoefficientModel(program, surfaces, steady)
-        axes = model.axes(aerodynamics)
-        expansion = expand(model, axes, _tolerance(model, axes))
-        aircraft = _aircraft(files, program, surfaces, steady, model, expansion, servos)
-        notes = [*_notes(program, surfaces, steady, model, servos), *_remainder(model, expansion, axes)]
-    return JsbsimModel(files, tuple(surfaces), steady, Imported(aircraft, tuple(notes)))
-
-
-def _steady(files: ModelFiles, program: Program, surfaces: Sequence[Surface], states: list[Flight]) -> SteadyFlight:
-    for state in states:
-        found = find_trim(program, surfaces, state)
-        if found is not None:
-            return found
-    raise no_trim(files.name, states[0].airspeed)
-
-
-def _usual_signs(program: Program, surfaces: Sequence[Surface], steady: SteadyFlight) -> list[Surface]:
-    """The surfaces with the aircraft file's signs: a positive deflection pitches down, rolls and yaws left."""
-    place = {"elevator": 4, "aileron": 3, "rudder": 5}
-
-    def moment(name: str, change: float) -> float:
-        driven: dict[str, float] = {}
-        for surface in surfaces:
-            driven |= surface.at(steady.deflections[surface.name] + (change if surface.name == name else 0.0))
-        program.put(steady.state, driven)
-        return float(program.loads().air[place[name]])
-
-    return [s.flipped() if moment(s.name, 0.02) > moment(s.name, -0.02) else s for s in surfaces]
+    with surveyed(model, airspeed, altitude) as found:
+        survey, program, aerodynamics = found
+        model_ = CoefficientModel(program, survey.surfaces, survey.steady)
+        axes = model_.axes(aerodynamics)
+        expansion = expand(model_, axes, _tolerance(model_, axes))
+        aircraft = _aircraft(survey.files, program, survey.surfaces, survey.steady, model_, expansion, survey.servos)
+        notes = [
+            *_notes(program, survey.surfaces, survey.steady, model_, survey.servos),
+            *_remainder(model_, expansion, axes),
+        ]
+        imported = Imported(aircraft, tuple(notes))
+    return JsbsimModel(survey.files, survey.surfaces, survey.steady, imported)
 
 
 def _tolerance(model: CoefficientModel, axes: Mapping[str, Axis]) -> Array:
@@ -137,13 +81,6 @@ def _tolerance(model: CoefficientModel, axes: Mapping[str, Axis]) -> Array:
         rows += [{**model.centre, name: axis.centre + sign * step} for sign in (-1.0, 1.0)]
     found = model({name: np.array([row[name] for row in rows]) for name in model.centre})
     return np.asarray(_SHARE * np.ptp(found, axis=0) + 1e-9)
-
-
-def _servo(program: Program, surface: Surface, systems: Sequence[Element], state: Flight) -> Servo:
-    """The servo of a control; ``program`` runs the model with its own flight control system."""
-    chain = chain_to(surface.position, systems, COMMANDS[surface.name])
-    names = [name for component in chain for name in outputs_of(component)]
-    return read_servo(chain, gains_to(program, surface, names, state, _WATCH_RATE), _FRAMES)
 
 
 def _aircraft(

@@ -1,0 +1,118 @@
+"""What of a JSBSim model is found before its coefficients: controls, servos, masses and a steady flight."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from sysid_node.errors import InputError
+from sysid_node.sim.importing.jsbsim.actuators import Servo, chain_to, read_servo
+from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model, find_model, outputs_of, sections
+from sysid_node.sim.importing.jsbsim.program import Flight, Program
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, Surface, find_surfaces, gains_to
+from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, default_airspeeds, find_trim, no_trim
+
+#: Altitude (m) where none is given: above ground effect.
+DEFAULT_ALTITUDE = 1000.0
+
+#: Rate at which the flight control system is watched, Hz.
+_WATCH_RATE = 100.0
+
+#: JSBSim's usual rate (Hz), by which delays that are given in frames become times.
+_FRAMES = 120.0
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is known of a model before its coefficients are expanded."""
+
+    files: ModelFiles
+    surfaces: tuple[Surface, ...]  # with the aircraft file's signs
+    steady: SteadyFlight
+    servos: Mapping[str, Servo]  # by control
+    mass: float  # kg
+    inertia: Mapping[str, float]  # kg m^2
+    geometry: tuple[float, float, float]  # m^2, m, m
+    cg_in: tuple[float, float, float]  # in JSBSim's structural axes, inches
+    engines: int
+
+
+def survey_model(model: str, airspeed: float | None = None, altitude: float | None = None) -> Survey:
+    """A model's controls, steady flight, servos and masses. Raises InputError."""
+    with surveyed(model, airspeed, altitude) as (survey, _, _):
+        return survey
+
+
+@contextmanager
+def surveyed(
+    model: str, airspeed: float | None, altitude: float | None
+) -> Iterator[tuple[Survey, Program, list[Element]]]:
+    """A model's survey, JSBSim with its surfaces free, and its aerodynamics. Raises InputError where JSBSim stops."""
+    files = find_model(model)
+    try:
+        with tempfile.TemporaryDirectory(prefix="sysid-") as place:
+            yield _survey(files, Path(place), airspeed, DEFAULT_ALTITUDE if altitude is None else altitude)
+    except (KeyError, ValueError, RuntimeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"model {files.label}: JSBSim stops: {' '.join(str(error).split())}") from error
+
+
+def _survey(
+    files: ModelFiles, place: Path, airspeed: float | None, altitude: float
+) -> tuple[Survey, Program, list[Element]]:
+    parts = sections(files)
+    aerodynamics = [part for part in parts if part.tag == "aerodynamics"]
+    systems = [part for part in parts if part.tag != "aerodynamics"]
+    start = Flight(50.0, 0.03, theta=0.03, altitude=altitude, throttle=0.5)
+    stock = Program(copy_model(files, place / "stock", ()), _WATCH_RATE)
+    speeds = [airspeed] if airspeed is not None else default_airspeeds(stock, start)
+    surfaces = find_surfaces(stock, aerodynamics, replace(start, airspeed=speeds[0]), _WATCH_RATE)
+    if not surfaces:
+        raise InputError(
+            f"model {files.label}: no command moves a surface that the aerodynamics read; it must be an aeroplane"
+        )
+    servos = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
+    moved = {name for surface in surfaces for name in surface.properties}
+    program = Program(copy_model(files, place / "driven", moved))
+    steady = _steady(files, program, surfaces, [replace(start, airspeed=speed) for speed in speeds])
+    surfaces = _usual_signs(program, surfaces, steady)
+    steady = SteadyFlight(steady.state, {s.name: s.sign * steady.deflections[s.name] for s in surfaces})
+    cg = (program.fdm["inertia/cg-x-in"], program.fdm["inertia/cg-y-in"], program.fdm["inertia/cg-z-in"])
+    survey = Survey(
+        files, tuple(surfaces), steady, servos, program.mass, program.inertia, program.geometry, cg, program.engines
+    )
+    return survey, program, aerodynamics
+
+
+def _steady(files: ModelFiles, program: Program, surfaces: Sequence[Surface], states: list[Flight]) -> SteadyFlight:
+    for state in states:
+        found = find_trim(program, surfaces, state)
+        if found is not None:
+            return found
+    raise no_trim(files.name, states[0].airspeed)
+
+
+def _usual_signs(program: Program, surfaces: Sequence[Surface], steady: SteadyFlight) -> list[Surface]:
+    """The surfaces with the aircraft file's signs: a positive deflection pitches down, rolls and yaws left."""
+    place = {"elevator": 4, "aileron": 3, "rudder": 5}
+
+    def moment(name: str, change: float) -> float:
+        driven: dict[str, float] = {}
+        for surface in surfaces:
+            driven |= surface.at(steady.deflections[surface.name] + (change if surface.name == name else 0.0))
+        program.put(steady.state, driven)
+        return float(program.loads().air[place[name]])
+
+    return [s.flipped() if moment(s.name, 0.02) > moment(s.name, -0.02) else s for s in surfaces]
+
+
+def _servo(program: Program, surface: Surface, systems: Sequence[Element], state: Flight) -> Servo:
+    """The servo of a control; ``program`` runs the model with its own flight control system."""
+    chain = chain_to(surface.position, systems, COMMANDS[surface.name])
+    names = [name for component in chain for name in outputs_of(component)]
+    return read_servo(chain, gains_to(program, surface, names, state, _WATCH_RATE), _FRAMES)
