@@ -154,6 +154,31 @@ def course_of(model: ResidualModel, size: int) -> Course:
     return Course(given.motion, given.signals.commands, altitude, still, still, begins)
 
 
+class Beginnings(NamedTuple):
+    """What short flights of any simulator are flown with and read by, N samples (arrays)."""
+
+    body: Array  # (N, 13) the state with which a short flight would begin, ``sim.model.state.STATES``
+    air: Array  # (N, 3) velocity of the air along body axes since the short flight began, m/s
+    commands: Array  # (N, controls + 1) at the time of the motion, rad, thrust N
+    measured: Array  # (N, 12) readings at the time of the motion, columns ``layout.OUTPUTS``
+
+
+@partial(jax.jit, static_argnums=0)
+def _beginnings(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Beginnings:
+    chain = Chain.of(layout, model, theta, step, course.altitude[0])
+    samples = corrected_motion(chain, course.motion)
+    arriving = command.arrive(layout, chain.effects, course.commands, step)
+    parts = (_starts(samples, course).body, _air(samples, course.begins, step), arriving)
+    return Beginnings(*parts, _measured(chain, course.motion))  # type: ignore[arg-type]
+
+
+def beginnings(model: ResidualModel, theta: Array, course: Course) -> Beginnings:
+    """The states, air, commands and readings of a flight, as the instruments' effects of parameters (P,) have them."""
+    s, samples = model.simulator, len(model.record)
+    found = _beginnings(s.layout, s.model, jnp.asarray(theta), course, jnp.asarray(s.step))
+    return Beginnings(*(np.asarray(series)[:samples] for series in found))
+
+
 def simulate_beside(model: ResidualModel, theta: Array, course: Course) -> tuple[Array, Array, Array]:
     """Simulated readings (N, 12), measured ones (N, 12) and the air's motion (N, 3), as in ``Readings``."""
     s, samples = model.simulator, len(model.record)
@@ -165,6 +190,11 @@ def simulate_beside(model: ResidualModel, theta: Array, course: Course) -> tuple
 def simulation_error(model: ResidualModel, theta: Array, course: Course) -> Array:
     """Measured minus simulated readings (N, 12) for parameters (P,); angles within half a turn."""
     simulated, measured, _ = simulate_beside(model, theta, course)
-    error: Array = measured - simulated
+    return without_jumps(measured - simulated)
+
+
+def without_jumps(error: Array) -> Array:
+    """Errors of readings (N, 12) with those of roll and heading within half a turn."""
+    error = error.copy()
     error[:, _ANGLES] = (error[:, _ANGLES] + np.pi) % (2.0 * np.pi) - np.pi
     return error

@@ -62,10 +62,19 @@ def simulation_gap(base: Evidence, final: Evidence) -> Gap | None:
     pairs = list(zip(base.flights, final.flights, strict=True))
     simulated = [pair for pair in pairs if can_be_simulated(pair[0].model)]
     tables = [_table(before.model, before.points, after.points) for before, after in simulated]
+    return gap_of_errors([evidence.model for evidence in final.flights], tables)
+
+
+def gap_of_errors(models: Sequence[ResidualModel], tables: Sequence[Array]) -> Gap | None:
+    """The gap from each flight's mean squares (5 + K, S, R) by short flight and reading.
+
+    They are those of the motion, of the sensors' noise, of the errors by the file, with the fitted derivatives and with
+    the causes, and of the errors of K flights for the noise floor. None as for ``simulation_gap``.
+    """
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return None
     motion, noise, *errors = np.concatenate(tables, axis=1)
-    flights = [evidence.model.flight for evidence in final.flights]
+    flights = [model.flight for model in models]
     lateral = all(flight.lateral for flight in flights)
     unread = {angle for flight in flights for angle in flight.inferred}
     unread |= thrust.THRUST_READINGS if any(not flight.metered for flight in flights) else set()
@@ -95,7 +104,7 @@ def can_be_simulated(model: ResidualModel) -> bool:
 
 def side_by_side(model: ResidualModel, points: Sequence[Array]) -> SideBySide:
     """A flight with its simulation by the file and as corrected; ``points`` are parameters (P,) by group of windows."""
-    course, neutral = course_of(model, _size(model)), model.simulator.neutral()
+    course, neutral = course_of_flight(model), model.simulator.neutral()
     _, measured, _ = simulate_beside(model, neutral, course)
     before, after = (measured - e for e in (simulation_error(model, neutral, course), _errors(model, points, course)))
     return SideBySide(model.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
@@ -140,18 +149,29 @@ def _blocks(count: int, random: np.random.Generator) -> NDArray[np.intp]:
 
 
 def _table(model: ResidualModel, base: Sequence[Array], final: Sequence[Array]) -> Array:
-    """Mean squares (5 + K, S, R) by short flight and reading.
+    """Mean squares as for ``gap_of_errors``, by parameters (P,) of each group of windows without and with causes."""
+    course, neutral = course_of_flight(model), model.simulator.neutral()
+    measured = simulate_beside(model, neutral, course)[1]
+    errors = [_errors(model, points, course) for points in ([neutral] * len(base), base, final)]
+    return mean_squares(model, final[len(final) // 2], course, measured, errors)
 
-    They are those of the motion, of the sensors' noise, of the errors by the file, with the fitted derivatives
-    (``base``) and with the causes (``final``), and of the errors of K flights for the noise floor.
+
+def mean_squares(model: ResidualModel, theta: Array, course: Course, measured: Array, errors: Sequence[Array]) -> Array:
+    """Mean squares as for ``gap_of_errors`` of measured readings (N, 12) and three errors (N, 12).
+
+    The noise floor is that of parameters (P,).
     """
-    course, neutral = course_of(model, _size(model)), model.simulator.neutral()
-    measured = _cut(model, simulate_beside(model, neutral, course)[1])
-    errors = [_squares(model, _errors(model, points, course)) for points in ([neutral] * len(base), base, final)]
-    floors, noise = zip(*noise_floor_errors(model, final[len(final) // 2], course), strict=True)
-    motion = ((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
+    by_flight = _cut(model, measured)
+    floors, noise = zip(*noise_floor_errors(model, theta, course), strict=True)
+    motion = ((by_flight - by_flight.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
     sensors = np.mean([_squares(model, each) for each in noise], axis=0)
-    return np.stack([motion, sensors, *errors, *(_squares(model, floor) for floor in floors)])
+    squares = [_squares(model, error) for error in errors]
+    return np.stack([motion, sensors, *squares, *(_squares(model, floor) for floor in floors)])
+
+
+def course_of_flight(model: ResidualModel) -> Course:
+    """The course of a flight that is simulated in short flights."""
+    return course_of(model, _size(model))
 
 
 def _errors(model: ResidualModel, points: Sequence[Array], course: Course) -> Array:

@@ -13,8 +13,8 @@ from sysid_node.errors import InputError
 _CONSTANT = re.compile(rb"""<!ENTITY\s+[\w.-]+\s+(?:"[^"&%<]{0,200}"|'[^'&%<]{0,200}')\s*>""")
 
 
-def parse_xml(path: Path) -> Element:
-    """The root element of an XML file.
+def parse_xml(path: Path, *, comments: bool = False) -> Element:
+    """The root element of an XML file, with its comments as elements if wanted.
 
     Raises InputError where the file cannot be read, is not XML, or declares entities that name other files or each
     other: those read what they should not, or expand without end. Plain constants, which JSBSim's systems declare, are
@@ -30,7 +30,8 @@ def parse_xml(path: Path) -> Element:
             f"{path}: declares XML entities other than constants, or is not UTF-8; remove what it declares"
         )
     try:
-        return ElementTree.fromstring(content)
+        parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=comments))
+        return ElementTree.fromstring(content, parser)
     except ElementTree.ParseError as error:
         line, column = error.position
         raise InputError(f"{path}:{line}: not XML (column {column}); give the model's file") from error

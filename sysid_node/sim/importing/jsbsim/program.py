@@ -112,7 +112,7 @@ class Program:
 
     def _settle(self, throttle: float) -> None:
         """Engines into their steady running at this throttle and airspeed."""
-        self.fdm.suspend_integration()
+        self.suspend()
         self._levers(throttle)
         self.fdm.run()
         self.fdm["propulsion/set-running"] = -1  # at full throttle, whatever the levers say
@@ -120,9 +120,13 @@ class Program:
         self.fdm.run()
         self.fdm.get_propulsion().get_steady_state()
         self.fdm.run()
-        self._resume()
+        self.resume()
 
-    def _resume(self) -> None:
+    def suspend(self) -> None:
+        """The aircraft stands still while its systems run on."""
+        self.fdm.suspend_integration()
+
+    def resume(self) -> None:
         """Integrate again; an engine that was started within a suspension has made JSBSim forget its step."""
         self.fdm.resume_integration()
         if self.fdm.integration_suspended():
@@ -206,10 +210,10 @@ class Program:
 
     def step(self, frames: int) -> None:
         """Let systems run on for so many frames while the aircraft stands still."""
-        self.fdm.suspend_integration()
+        self.suspend()
         for _ in range(frames):
             self.fdm.run()
-        self._resume()
+        self.resume()
 
     def read(self, names: Sequence[str]) -> Array:
         """Values of properties."""

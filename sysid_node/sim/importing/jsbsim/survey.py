@@ -27,6 +27,14 @@ _FRAMES = 120.0
 
 
 @dataclass(frozen=True)
+class ServoChain:
+    """The components between a control's command and its position, by the properties that they write."""
+
+    outputs: tuple[str, ...]  # of all components
+    gains: Mapping[str, float]  # rad of the surface per unit of a property
+
+
+@dataclass(frozen=True)
 class Survey:
     """What is known of a model before its coefficients are expanded."""
 
@@ -34,6 +42,7 @@ class Survey:
     surfaces: tuple[Surface, ...]  # with the aircraft file's signs
     steady: SteadyFlight
     servos: Mapping[str, Servo]  # by control
+    chains: Mapping[str, ServoChain]  # by control
     mass: float  # kg
     inertia: Mapping[str, float]  # kg m^2
     geometry: tuple[float, float, float]  # m^2, m, m
@@ -76,7 +85,8 @@ def _survey(
         raise InputError(
             f"model {files.label}: no command moves a surface that the aerodynamics read; it must be an aeroplane"
         )
-    servos = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
+    found = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
+    servos, chains = {n: servo for n, (servo, _) in found.items()}, {n: chain for n, (_, chain) in found.items()}
     moved = {name for surface in surfaces for name in surface.properties}
     program = Program(copy_model(files, place / "driven", moved))
     steady = _steady(files, program, surfaces, [replace(start, airspeed=speed) for speed in speeds])
@@ -84,7 +94,16 @@ def _survey(
     steady = SteadyFlight(steady.state, {s.name: s.sign * steady.deflections[s.name] for s in surfaces})
     cg = (program.fdm["inertia/cg-x-in"], program.fdm["inertia/cg-y-in"], program.fdm["inertia/cg-z-in"])
     survey = Survey(
-        files, tuple(surfaces), steady, servos, program.mass, program.inertia, program.geometry, cg, program.engines
+        files,
+        tuple(surfaces),
+        steady,
+        servos,
+        chains,
+        program.mass,
+        program.inertia,
+        program.geometry,
+        cg,
+        program.engines,
     )
     return survey, program, aerodynamics
 
@@ -111,8 +130,9 @@ def _usual_signs(program: Program, surfaces: Sequence[Surface], steady: SteadyFl
     return [s.flipped() if moment(s.name, 0.02) > moment(s.name, -0.02) else s for s in surfaces]
 
 
-def _servo(program: Program, surface: Surface, systems: Sequence[Element], state: Flight) -> Servo:
+def _servo(program: Program, surface: Surface, systems: Sequence[Element], state: Flight) -> tuple[Servo, ServoChain]:
     """The servo of a control; ``program`` runs the model with its own flight control system."""
     chain = chain_to(surface.position, systems, COMMANDS[surface.name])
     names = [name for component in chain for name in outputs_of(component)]
-    return read_servo(chain, gains_to(program, surface, names, state, _WATCH_RATE), _FRAMES)
+    gains = gains_to(program, surface, names, state, _WATCH_RATE)
+    return read_servo(chain, gains, _FRAMES), ServoChain(tuple(names), gains)
