@@ -19,6 +19,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.diagnose import diagnose as diagnose_flights
 from sysid_node.gap.document import document
 from sysid_node.gap.flightdata.gap_flight import load_gap_flight
+from sysid_node.gap.reflying import InSimulator, fly_in
 from sysid_node.report.drawing.plotly_figure import plotly_figure
 from sysid_node.report.files.gap_folder import UNFINISHED, write_gap
 from sysid_node.report.files.output_folder import output_folder
@@ -26,6 +27,7 @@ from sysid_node.report.files.run_folder import REPORT
 from sysid_node.report.sections.gap.flight import flight_figures
 from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.report.sections.gap.waterfall import waterfall
+from sysid_node.sim.correcting.user_simulator import user_simulator
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -36,6 +38,7 @@ class GapDiagnosis:
     """A diagnosis with its verdict, causes and size. ``diagnosis`` holds all that the program found."""
 
     diagnosis: Diagnosis
+    flown: InSimulator | None = None  # what the correction does in the user's simulator
 
     @property
     def verdict(self) -> str:
@@ -50,7 +53,7 @@ class GapDiagnosis:
     @cached_property
     def document(self) -> dict[str, Any]:
         """The content of ``gap.json``."""
-        return dict(document(self.diagnosis))
+        return dict(document(self.diagnosis, self.flown))
 
     @property
     def causes(self) -> list[dict[str, Any]]:
@@ -81,7 +84,7 @@ class GapDiagnosis:
 
     def write(self, folder: Path) -> None:
         """Write what ``sysid gap`` writes into a folder that holds nothing else. Raises InputError."""
-        write_gap(folder, self.diagnosis)
+        write_gap(folder, self.diagnosis, self.flown)
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write what ``sysid gap`` writes; returns the path of the report.
@@ -104,6 +107,7 @@ def diagnose(
     flights: FlightFile | Sequence[FlightFile],
     *,
     holdout: Sequence[FlightFile] = (),
+    simulator: str | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> GapDiagnosis:
@@ -111,19 +115,24 @@ def diagnose(
 
     The gap is measured on ``holdout``; without it, on parts of the flights that were not fitted. ``resume``: a folder
     for finished steps, from which an interrupted diagnosis goes on. ``progress`` is called with the share done (0..1)
-    and what is being done. A diagnosis takes about a minute for a minute of flight.
+    and what is being done. A diagnosis takes about a minute for a minute of flight. ``simulator``: ``jsbsim:NAME`` or
+    ``jsbsim:FILE``, a model of the same aircraft; the correction is written into a copy of it, and both fly there.
 
     Raises InputError where the aircraft file has no tolerances, a flight cannot be read, is fitted and held out at
-    once, or shows no motion.
+    once, or shows no motion, and where the simulator's model cannot be read or is another aircraft's.
     """
     flights = [flights] if isinstance(flights, FlightFile) else list(flights)
     if not flights:
         raise InputError("no flight to diagnose; give at least one")
     aircraft = flights[0].aircraft
+    theirs = None if simulator is None else user_simulator(simulator, aircraft)
     fitted, held_out = (
         [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group] for group in (flights, holdout)
     )
     keep = None if resume is None else Path(resume)
-    return GapDiagnosis(
-        diagnose_flights(aircraft, fitted, held_out, progress or (lambda share, doing: None), keep=keep)
-    )
+    report = progress or (lambda share, doing: None)
+    found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep)
+    if theirs is None:
+        return GapDiagnosis(found)
+    report(0.99, f"the held-out commands in {theirs.label}")
+    return GapDiagnosis(found, fly_in(theirs, found))

@@ -22,6 +22,11 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("bags", metavar="BAG", type=Path, nargs="+", help=options.LOG_HELP)
     options.add_aircraft(parser)
     options.add_holdout(parser)
+    parser.add_argument(
+        "--simulator",
+        metavar="jsbsim:NAME|FILE",
+        help="your simulator's model: the correction is written into a copy, and both fly the held-out commands there",
+    )
     options.add_out(parser, "; started again with the same folder, an interrupted run continues where it stopped")
     options.add_reading(parser)
     return parser
@@ -39,7 +44,8 @@ def run(args: argparse.Namespace) -> None:
     inputs = options.inputs_of([*args.bags, *args.holdout], args.aircraft)
     with output_folder(args.out, "gap", inputs=inputs, force=args.force, working=[UNFINISHED]) as out:
         with progress_bar("gap", quiet=args.quiet) as progress:
-            found = diagnose(flights, holdout=holdout, resume=args.out / UNFINISHED, progress=progress)
+            found = diagnose(flights, holdout=holdout, simulator=args.simulator,
+                             resume=args.out / UNFINISHED, progress=progress)  # fmt: skip
         out.publish(found.write)
     if not args.quiet:
         print(found.words)

@@ -59,6 +59,12 @@ class Priors:
     widening: float = _threshold(
         5.0, "1", "factor on the tolerances of one coefficient's derivatives where these are the candidate"
     )
+    ideal: float = _threshold(
+        0.02,
+        "1",
+        "1 sigma of a derivative of a simulator's file (ideal: true) that states none, as a share of its size: "
+        "tables of an imported model are right within about a hundredth",
+    )
     scale: float = _threshold(3.0, "1", "1 sigma of a candidate's parameter, as a multiple of its plausible scale")
     inferred_angle: float = _threshold(0.01, "rad", "1 sigma of the mean error of a flow angle that no vane measured")
     gusty: float = _threshold(

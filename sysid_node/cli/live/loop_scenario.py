@@ -8,10 +8,11 @@ from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
 
+#: Servos of an aircraft whose file states none.
 ACTUATORS = "actuator_lag:time_constant=0.05"
 ONSET, EXCITE_AT = 30.0, 3.0  # s: failure and first excitation
 NODES: Mapping[str, tuple[str, ...]] = {
-    "flight_simulator": (f"effects:='{ACTUATORS}'",),
+    "flight_simulator": (),
     "identifier": (),
     "exciter": ("watch:=true", "accuracy:=0.15"),
     "fault_monitor": (),
@@ -33,9 +34,14 @@ class LoopScenario:
     out: Path
 
     @property
+    def effects(self) -> str:
+        """The simulator's effects beside those of the aircraft file: servos, where the file states none."""
+        return "" if "actuator_lag" in self.aircraft.effects else ACTUATORS
+
+    @property
     def effects_after_failure(self) -> str:
         """The simulator's effects from ``ONSET`` on."""
-        return f"{ACTUATORS} {self.fail}" if self.fail else ACTUATORS
+        return " ".join(part for part in (self.effects, self.fail) if part)
 
     def check_effects(self) -> None:
         """Raise InputError on effects that the simulator would refuse half a minute later."""
@@ -48,7 +54,7 @@ class LoopScenario:
         """The command-line arguments of a node."""
         parameters = [f"aircraft:={self.name}", *NODES[node]]
         if node == "flight_simulator":
-            parameters.append(f"turbulence:={self.turbulence}")
+            parameters += [f"effects:='{self.effects}'", f"turbulence:={self.turbulence}"]
         if node == "identifier":
             parameters.append(f"method:={self.method}")
         if node == "adaptive_controller":

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from sysid_node.flight.record import Array
-from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, derivative_tolerances
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import EFFECTS, Simulator
 
@@ -170,9 +170,9 @@ def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str
 def _per_coefficient(simulator: Simulator) -> list[Candidate]:
     """Derivatives beyond their tolerances, one coefficient's at a time: all together would fit almost anything."""
     by_coefficient: dict[str, list[int]] = {}
+    tolerances = derivative_tolerances(simulator.aircraft)
     for i, (effect, parameter) in enumerate(simulator.parameters):
-        known = simulator.aircraft.derivatives.get(parameter.name)
-        if effect == DERIVATIVE_ERROR and known is not None and known.tolerance:
+        if effect == DERIVATIVE_ERROR and parameter.name in tolerances:
             by_coefficient.setdefault(parameter.name.partition("_")[0], []).append(i)
     return [
         Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {coefficient}", (), ((),), tuple(entries))

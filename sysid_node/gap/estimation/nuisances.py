@@ -90,14 +90,25 @@ class HeldOutFlight:
     nuisances: Nuisances
 
 
+def derivative_tolerances(aircraft: Aircraft) -> dict[str, float]:
+    """1 sigma of the derivatives that may be off.
+
+    A simulator's file (``ideal``) need not state any: it is then right within a small share of each derivative.
+    """
+    stated = {name: d.tolerance for name, d in aircraft.derivatives.items() if d.tolerance}
+    if stated or not aircraft.ideal:
+        return stated
+    return {name: THRESHOLDS.priors.ideal * abs(d.value) for name, d in aircraft.derivatives.items() if d.value}
+
+
 def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[ResidualModel] = ()) -> Nuisances:
     """The nuisance parameters of one of an aircraft's flights, with limits by the flight's own rates.
 
     They are the same parameters for all flights that are diagnosed together, ``others`` included. Raises InputError
-    where the aircraft file has no tolerances.
+    where the aircraft file has no tolerances and is no simulator's.
     """
     models = (model, *others)
-    tolerances = {n: d.tolerance for n, d in aircraft.derivatives.items() if d.tolerance}
+    tolerances = derivative_tolerances(aircraft)
     if not tolerances:
         raise InputError(
             f"aircraft {aircraft.name!r}: no derivative has a tolerance, so what is a gap cannot be told from an "

@@ -11,6 +11,7 @@ from sysid_node.errors import InputError
 from sysid_node.gap.correction import corrected_aircraft, effect_options
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
+from sysid_node.gap.reflying import InSimulator
 from sysid_node.report.files.gap_flights import FLIGHTS, write_flights
 from sysid_node.report.pages.gap_page import write_gap_report
 
@@ -18,9 +19,16 @@ from sysid_node.report.pages.gap_page import write_gap_report
 UNFINISHED = "unfinished"
 
 
-def write_gap(folder: Path, found: Diagnosis) -> None:
-    """Writes gap.json, the tables, corrected.yaml, effects.txt and report.html. Raises InputError."""
-    content = document(found)
+#: Folder in the results' that holds the user's simulator's model with the correction.
+CORRECTED_SIMULATOR = "corrected_simulator"
+
+
+def write_gap(folder: Path, found: Diagnosis, flown: InSimulator | None = None) -> None:
+    """Writes gap.json, the tables, corrected.yaml, effects.txt and report.html. Raises InputError.
+
+    ``flown`` is what the correction does in the user's simulator, whose corrected model is written as well.
+    """
+    content = document(found, flown)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
@@ -32,6 +40,8 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
         (folder / "corrected.yaml").write_text(dump_aircraft(corrected_aircraft(found)), encoding="utf-8")
         (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
         write_flights(folder / FLIGHTS, found)
-        write_gap_report(folder / "report.html", found)
+        if flown is not None:
+            flown.write_model(found, folder / CORRECTED_SIMULATOR)
+        write_gap_report(folder / "report.html", found, flown)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder as --out") from None

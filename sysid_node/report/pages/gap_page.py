@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.reflying import InSimulator
 from sysid_node.report.pages.render import render_page
-from sysid_node.report.sections.gap import candidates, flight, opening, shape, waterfall
+from sysid_node.report.sections.gap import candidates, flight, opening, reflown, shape, waterfall
 from sysid_node.report.sections.section import Section
 
 
-def write_gap_report(path: Path, found: Diagnosis) -> None:
-    """Write the page as one HTML file."""
+def write_gap_report(path: Path, found: Diagnosis, flown: InSimulator | None = None) -> None:
+    """Write the page as one HTML file; ``flown`` is what the correction does in the user's simulator."""
     title = f"The simulator against the flight: {found.aircraft.name}"
-    path.write_text(render_page(title, SECTIONS, found), encoding="utf-8")
+    sections = list(SECTIONS)
+    if flown is not None:
+        there = Section("reflown", f"Flown in {flown.simulator.label}", "gap/reflown.html.j2", _reflown(flown))
+        sections.insert(_AFTER_CHANNELS, there)
+    path.write_text(render_page(title, sections, found), encoding="utf-8")
+
+
+def _reflown(flown: InSimulator) -> Callable[[Diagnosis], Mapping[str, Any]]:
+    return lambda found: reflown.reflown(found, flown)
+
+
+#: Place of the section about the user's simulator.
+_AFTER_CHANNELS = 2
 
 
 SECTIONS: tuple[Section[Diagnosis], ...] = (

@@ -1,11 +1,12 @@
 """The director of ``sysid loop``, against a watch that replays what nodes would report; no ROS is needed."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.cli.live.loop_director import PERIOD, LoopDirector
 from sysid_node.cli.live.loop_scenario import LoopScenario, set_points
 from sysid_node.errors import InputError
@@ -63,6 +64,15 @@ def test_the_failure_begins_once_at_its_time() -> None:
     assert time == pytest.approx(30.0, abs=2 * PERIOD)
     assert effects == f"actuator_lag:time_constant=0.05 {FAIL}"
     assert [event.text for event in director.events] == ["excitation asked for", FAIL]
+
+
+def test_servos_that_the_file_states_are_flown_before_and_after_the_failure() -> None:
+    aircraft = load_aircraft("cdrw")
+    stated = replace(aircraft, effects={"actuator_lag": {"elevator": UncertainValue(0.12)}})
+    for known, servos in ((aircraft, "actuator_lag:time_constant=0.05"), (stated, "")):
+        scenario = LoopScenario(known, "cdrw", FAIL, 35.0, True, "none", "sls_rft", Path("out"))
+        assert f"effects:='{servos}'" in scenario.arguments("flight_simulator")
+        assert scenario.effects_after_failure == f"{servos} {FAIL}".strip()
 
 
 def test_an_aborted_excitation_is_requested_again_after_a_pause() -> None:

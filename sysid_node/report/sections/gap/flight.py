@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, can_be_simulated, side_by_side
+from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, SideBySide, can_be_simulated, side_by_side
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, PALE, VERMILION, Figure
 from sysid_node.report.drawing.thinning import thin_curve
@@ -55,14 +55,22 @@ def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved; each short flight is a separate line."""
     place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
     record = side_by_side(found.models[place], found.check.final.flights[place].points)
+    return short_flight_panels(record, list(found.size.per_channel))
+
+
+def short_flight_panels(
+    record: SideBySide, names: Sequence[str], words: tuple[str, str] = ("file", "corrected")
+) -> list[Panel]:
+    """Some readings of a flight beside its simulation; ``words`` name the simulation before and after correction."""
     span = _worst(record.time, (record.before - record.measured)[:, [OUTPUTS.index(n) for n in READINGS]])
     begins = record.begins[span].copy()
     panels = []
-    for name in found.size.per_channel:
+    for name in names:
         k = OUTPUTS.index(name)
         before, after = (series[span, k].copy() for series in (record.before, record.after))
         before[begins], after[begins] = np.nan, np.nan  # a line ends where the simulator restarts
-        panels.append(_panel(name, record.time[span], record.measured[span, k], before, after, _UNITS.get(name, "")))
+        panels.append(_panel(name, record.time[span], record.measured[span, k], before, after,
+                             _UNITS.get(name, ""), words))  # fmt: skip
     return panels
 
 
@@ -90,9 +98,12 @@ def _coefficients(found: Diagnosis) -> list[Panel]:
     return panels
 
 
-def _panel(name: str, time: Array, measured: Array, before: Array, after: Array, unit: str = "") -> Panel:
+def _panel(
+    name: str, time: Array, measured: Array, before: Array, after: Array, unit: str = "",
+    words: tuple[str, str] = ("file", "corrected"),
+) -> Panel:  # fmt: skip
     time, *curves = thin_curve(time, measured, before, after)
-    styles = (("measured", PALE, "solid", 4.5), ("file", VERMILION, "solid", 1.2), ("corrected", BLUE, "solid", 1.4))
+    styles = (("measured", PALE, "solid", 4.5), (words[0], VERMILION, "solid", 1.2), (words[1], BLUE, "solid", 1.4))
     traces = [
         figures.line(time, c, n, colour=colour, dash=dash, width=width)
         for c, (n, colour, dash, width) in zip(curves, styles, strict=True)

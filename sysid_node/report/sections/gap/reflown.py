@@ -1,0 +1,34 @@
+"""The flight as flown in the user's simulator, with its model as it was and with the correction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.reflying import InSimulator
+from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.report.sections.gap.flight import short_flight_panels
+from sysid_node.report.sections.gap.names import WORDS, label_words, percent
+from sysid_node.report.wording.numbers import number
+
+_STAGES = ("before", "after", "noise_floor")
+
+
+def reflown(found: Diagnosis, flown: InSimulator) -> Mapping[str, Any]:
+    """Errors before and after as flown there, the traces of both, and what the simulator's model cannot hold."""
+    left_out = [(label_words(effect), why) for effect, why in flown.left_out.items()]
+    content: dict[str, Any] = {"left_out": left_out, "simulator": flown.simulator.label, "window": f"{WINDOW:g} s"}
+    if flown.result is None:
+        return {**content, "flown": False}
+    gap, (low, high) = flown.result.gap, flown.result.gap.ci95
+    rows = [(WORDS[name], *(percent(errors[s]) for s in _STAGES)) for name, errors in gap.per_channel.items()]
+    return {
+        **content,
+        "flown": True,
+        "closed": f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)})",
+        "rows": rows,
+        "whole": ("all together", *(percent(getattr(gap, stage)) for stage in _STAGES)),
+        "held_out": found.held_out,
+        "panels": short_flight_panels(flown.result.flights[0], list(gap.per_channel), ("as it was", "corrected")),
+    }
