@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from withheld.instruments import SUITES, Log, readings, record
-from withheld.pilot import RATE as PILOT_RATE
-from withheld.pilot import Pilot
+from bench.withheld.plants.instruments import SUITES, Log, readings, record
+from bench.withheld.plants.pilot import RATE as PILOT_RATE
+from bench.withheld.plants.pilot import Pilot
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre

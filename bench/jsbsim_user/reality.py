@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from withheld.motion import DivergedError, Instant
+from bench.withheld.plants.motion import DivergedError, Instant
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model

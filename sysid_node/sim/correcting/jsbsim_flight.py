@@ -109,9 +109,11 @@ class JsbsimFlyer:
         """Rows (last - first, 15) of one short flight."""
         program, fdm = self.program, self.program.fdm
         self._still_air()
-        program.put(_state(flights, first, self._share(flights.commands[first])), self._driven(flights.commands[first]))
-        program.suspend()
         before = max(first - round(_WARM_UP * flights.rate), 0)
+        # JSBSim has no way to set an engine's speed: it begins at the steady one of the throttle's recent mean
+        recent = flights.commands[before : first + 1].mean(axis=0)
+        program.put(_state(flights, first, self._share(recent)), self._driven(recent))
+        program.suspend()
         for k in range(before, first):
             for row in self._between(flights.commands[k], flights.commands[k + 1]):
                 program.drive(self._driven(row))

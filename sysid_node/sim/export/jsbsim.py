@@ -1,8 +1,8 @@
 """The aircraft as a JSBSim model (JSBSim-ML 2.0).
 
 Coefficients are functions of JSBSim's own properties; forces are summed along body axes, and therefore do not depend on
-a convention of wind axes. Commands are ``fcs/<control>-cmd-rad`` (rad) and ``fcs/throttle-cmd-norm``. JSBSim's
-structural axes run aft, right, up, and its product of inertia is minus the usual Ixz.
+a convention of wind axes. Commands are ``fcs/<control>-cmd-rad`` (rad), to which JSBSim's usual
+``fcs/<control>-cmd-norm`` is added as a share of the control's limit, and ``fcs/throttle-cmd-norm``. JSBSim's structural axes run aft, right, up, and its product of inertia is minus the usual Ixz.
 """
 
 from __future__ import annotations
@@ -117,8 +117,14 @@ def _flight_control(root: Element, aircraft: Aircraft, effects: Effects) -> None
         _text(control, "property", "fcs/throttle-cmd-norm", value="0")
     channel = SubElement(control, "channel", name="actuators")
     for name, surface in aircraft.controls.items():
+        share = SubElement(channel, "pure_gain", name=f"fcs/{name}-share-rad")
+        _text(share, "input", f"fcs/{name}-cmd-norm")
+        _text(share, "gain", surface.limit or 1.0)
+        total = SubElement(channel, "summer", name=f"fcs/{name}-total-rad")
+        for source in (f"fcs/{name}-cmd-rad", f"fcs/{name}-share-rad"):
+            _text(total, "input", source)
         actuator = SubElement(channel, "actuator", name=f"fcs/{name}-position-rad")
-        _text(actuator, "input", f"fcs/{name}-cmd-rad")
+        _text(actuator, "input", f"fcs/{name}-total-rad")
         _actuator_dynamics(actuator, name, effects)
         if surface.limit is not None:
             clip = SubElement(actuator, "clipto")

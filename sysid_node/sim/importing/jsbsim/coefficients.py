@@ -44,7 +44,7 @@ class CoefficientModel:
         self.steady_loads: Loads = program.loads()
         self.mach_per_speed = program.mach / steady.state.airspeed
         force = self.steady_loads.engine
-        self.thrust = float(math.hypot(force[0], force[2])) if program.engines else 0.0
+        self.thrust = float(math.hypot(force[0], force[2])) if program.powered else 0.0
         self.inclination = math.atan2(-force[2], force[0]) if self.thrust > 0.0 else 0.0
         self.arm = float(force[4]) / self.thrust if self.thrust > 0.0 else 0.0
         self.unsteady = self._unsteady()

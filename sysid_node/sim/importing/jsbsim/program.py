@@ -21,6 +21,9 @@ FOOT, POUND, SLUG, INCH = 0.3048, 4.4482216152605, 14.5939029372064, 0.0254
 _MOMENT, _INERTIA = POUND * FOOT, SLUG * FOOT * FOOT
 _FORCES, _MOMENTS = ("x", "y", "z"), ("l", "m", "n")
 
+#: The external force and the lever of a model whose thrust is no engine's (``sim.export.jsbsim`` writes such models).
+_THRUST, _LEVER = "external_reactions/thrust", "fcs/throttle-cmd-norm"
+
 
 @dataclass(frozen=True)
 class Flight:
@@ -80,6 +83,11 @@ class Program:
                 self.fdm[name] = value
 
     @property
+    def powered(self) -> bool:
+        """Whether a throttle gives thrust: of engines, or of an external force called thrust."""
+        return self.engines > 0 or (self.has(_LEVER) and self.has(f"{_THRUST}/magnitude"))
+
+    @property
     def engines(self) -> int:
         """How many engines the model has."""
         return int(self.fdm.get_propulsion().get_num_engines())
@@ -133,6 +141,8 @@ class Program:
             self.fdm.set_dt(1.0 / self._rate)
 
     def _levers(self, throttle: float) -> None:
+        if self.powered and not self.engines:
+            self.fdm[_LEVER] = throttle
         for i in range(self.engines):
             levers = {"throttle": throttle, "mixture": 1.0, "advance": 1.0}
             for lever, share in levers.items():
@@ -147,16 +157,25 @@ class Program:
     def loads(self) -> Loads:
         """The loads of the present state."""
         fdm = self.fdm
-        parts = []
-        for part in ("aero", "prop"):
-            if part == "prop" and not self.engines:
-                parts.append(np.zeros(6))
-                continue
-            force = [fdm[f"forces/fb{axis}-{part}-lbs"] * POUND for axis in _FORCES]
-            moment = [fdm[f"moments/{axis}-{part}-lbsft"] * _MOMENT for axis in _MOMENTS]
-            parts.append(np.array([*force, *moment]))
+        air, engine = self._part("aero"), self._part("prop") if self.engines else self._thrust_force()
+        if self.has("forces/fbx-external-lbs"):  # forces that the model adds to its aerodynamics
+            air = air + self._part("external") - (0.0 if self.engines else engine)
         density = fdm["atmosphere/rho-slugs_ft3"] * SLUG / FOOT**3
-        return Loads(parts[0], parts[1], density, float(fdm["aero/alphadot-rad_sec"]))
+        return Loads(air, engine, density, float(fdm["aero/alphadot-rad_sec"]))
+
+    def _part(self, part: str) -> Array:
+        """Force (N) and moment (N m) about the centre of gravity (6,) of one part of the forces."""
+        force = [self.fdm[f"forces/fb{axis}-{part}-lbs"] * POUND for axis in _FORCES]
+        moment = [self.fdm[f"moments/{axis}-{part}-lbsft"] * _MOMENT for axis in _MOMENTS]
+        return np.array([*force, *moment])
+
+    def _thrust_force(self) -> Array:
+        """Force (N) and moment (N m) (6,) of an external force called thrust, in place of an engine."""
+        if not self.has(f"{_THRUST}/magnitude"):
+            return np.zeros(6)
+        force = np.array([self.fdm[f"{_THRUST}/{axis}"] for axis in "xyz"]) * self.fdm[f"{_THRUST}/magnitude"] * POUND
+        place = self.place(*(float(self.fdm[f"{_THRUST}/location-{axis}-in"]) for axis in "xyz"))
+        return np.concatenate([force, np.cross(place, force)])
 
     def accelerations(self) -> Array:
         """Rates of u, v, w (m/s^2) and p, q, r (rad/s^2), (6,), of the present state."""

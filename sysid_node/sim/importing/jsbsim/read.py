@@ -98,7 +98,7 @@ def _aircraft(
         for s in surfaces
     }
     throttle = None
-    if program.engines and model.thrust > 0.0:
+    if program.powered and model.thrust > 0.0:
         throttle = Throttle("throttle", model.thrust / state.throttle, model.inclination, model.arm)
     return Aircraft(
         name=files.name,
@@ -162,7 +162,7 @@ def _notes(
     ]
     if left:
         notes.append(f"Terms of {', '.join(left)} in the rate of alpha are left out; a file has those of CL and Cm.")
-    if program.engines:
+    if program.powered:
         notes.append(
             f"Thrust is {model.thrust:.0f} N at throttle {steady.state.throttle:.2f} and {steady.state.airspeed:.1f} "
             "m/s, and proportional to the throttle; how it changes with airspeed is in the tables over V, at this "

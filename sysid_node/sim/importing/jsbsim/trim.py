@@ -29,7 +29,7 @@ class SteadyFlight:
 
 def find_trim(program: Program, surfaces: Sequence[Surface], state: Flight) -> SteadyFlight | None:
     """The steady flight at the state's airspeed and altitude; None where there is none."""
-    powered = program.engines > 0
+    powered = program.powered
     names = ["alpha", "phi", "theta", *(s.name for s in surfaces), *(["throttle"] if powered else [])]
     bounds = {"alpha": (-0.3, 0.4), "phi": (-0.3, 0.3), "theta": (-0.6, 0.5), "throttle": (0.0, 1.0)}
     bounds |= {s.name: (float(s.deflection[0]), float(s.deflection[-1])) for s in surfaces}
