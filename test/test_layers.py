@@ -40,7 +40,7 @@ ROOMS = {
     ),
     "gap": (
         "thresholds", "flightdata", "residuals", "estimation", "instruments", "selection", "validation", "verdict",
-        "diagnose", "document", "correction",
+        "diagnose", "document", "correction", "reflying",
     ),
 }  # fmt: skip
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+
 from bench.withheld.plants.instruments import SUITES, Log, readings, record
 from bench.withheld.plants.pilot import RATE as PILOT_RATE
 from bench.withheld.plants.pilot import Pilot
-
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.bag.writer import write_streams

@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from bench.withheld.plants.motion import DivergedError, Instant
 
+from bench.withheld.plants.motion import DivergedError, Instant
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model
 from sysid_node.sim.importing.jsbsim.program import FOOT, POUND, SLUG, Program

@@ -19,7 +19,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.diagnose import diagnose as diagnose_flights
 from sysid_node.gap.document import document
 from sysid_node.gap.flightdata.gap_flight import load_gap_flight
-from sysid_node.gap.reflying import InSimulator, fly_in
+from sysid_node.gap.reflying import InSimulator, fly_in, reflown_content
 from sysid_node.report.drawing.plotly_figure import plotly_figure
 from sysid_node.report.files.gap_folder import UNFINISHED, write_gap
 from sysid_node.report.files.output_folder import output_folder
@@ -53,7 +53,8 @@ class GapDiagnosis:
     @cached_property
     def document(self) -> dict[str, Any]:
         """The content of ``gap.json``."""
-        return dict(document(self.diagnosis, self.flown))
+        there = {} if self.flown is None else {"reflown": reflown_content(self.flown)}
+        return {**document(self.diagnosis), **there}
 
     @property
     def causes(self) -> list[dict[str, Any]]:

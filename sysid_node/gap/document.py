@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,23 +22,20 @@ from sysid_node.gap.verdict.next_flight import named
 from sysid_node.sim import Simulator
 from sysid_node.sim.model.parameters import StatedParameter, stated_parameters
 
-if TYPE_CHECKING:
-    from sysid_node.gap.reflying import InSimulator
 
-
-def document(found: Diagnosis, flown: InSimulator | None = None) -> dict[str, Any]:
-    """The content of gap.json; ``flown`` is what the correction does in the user's simulator."""
+def document(found: Diagnosis) -> dict[str, Any]:
+    """The content of gap.json."""
     attribution = found.attribution
     left = attribution.structure_left
     return {
         "verdict": found.verdict,
         "aircraft": found.aircraft.name,
         "gap": {
-            **_gap(found.size),
+            **gap_content(found.size),
             "measured_by": "short_flights" if found.simulation_gap else "forces_and_kinematics",
             "window_s": WINDOW if found.simulation_gap else found.models[0].windows.length,
             "held_out": found.held_out,
-            "forces_and_kinematics": {**_gap(found.gap), "window_s": found.models[0].windows.length},
+            "forces_and_kinematics": {**gap_content(found.gap), "window_s": found.models[0].windows.length},
         },
         "air_motion": found.air_motion if found.models[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
@@ -53,22 +50,7 @@ def document(found: Diagnosis, flown: InSimulator | None = None) -> dict[str, An
             "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
         },
         "next_flight": found.next_flight,
-        **({} if flown is None else {"reflown": _reflown(flown)}),
     }
-
-
-def _reflown(flown: InSimulator) -> dict[str, Any]:
-    """The gap as flown in the user's simulator: null errors where short flights could not be flown there."""
-    content: dict[str, Any] = {"simulator": flown.simulator.label, "left_out": dict(flown.left_out)}
-    names = ("before", "after", "noise_floor", "shrink_percent", "ci95", "intervals", "per_channel")
-    if flown.result is None:
-        return {**dict.fromkeys(names), **content}
-    gap = _gap(flown.result.gap)
-    channels = {
-        channel: {stage: errors[stage] for stage in names[:3]} for channel, errors in gap["per_channel"].items()
-    }
-    ends = {name: ends for name, ends in gap["intervals"].items() if name in names}
-    return {**{name: gap[name] for name in names}, "intervals": ends, "per_channel": channels, **content}
 
 
 def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
@@ -93,7 +75,8 @@ def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
     ]
 
 
-def _gap(gap: Gap) -> dict[str, Any]:
+def gap_content(gap: Gap) -> dict[str, Any]:
+    """A gap's errors, shrinkage and intervals."""
     return {
         "before": gap.before,
         "tolerances": gap.tolerances,

@@ -6,9 +6,11 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
+from sysid_node.gap.document import gap_content
 from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.validation.reflown import Reflown, reflown
 from sysid_node.sim.correcting.user_simulator import UserSimulator
@@ -34,3 +36,17 @@ def fly_in(simulator: UserSimulator, found: Diagnosis) -> InSimulator:
         before, after = simulator.flyers(model, found.models[0].simulator.rate)
     thetas = [transferred_parameters(found.attribution.corrected, each) for each in found.models]
     return InSimulator(simulator, reflown(found.models, thetas, before, after), model.left_out)
+
+
+def reflown_content(flown: InSimulator) -> dict[str, Any]:
+    """``reflown`` of gap.json: the gap as flown in the user's simulator: null errors where short flights could not be flown there."""
+    content: dict[str, Any] = {"simulator": flown.simulator.label, "left_out": dict(flown.left_out)}
+    names = ("before", "after", "noise_floor", "shrink_percent", "ci95", "intervals", "per_channel")
+    if flown.result is None:
+        return {**dict.fromkeys(names), **content}
+    gap = gap_content(flown.result.gap)
+    channels = {
+        channel: {stage: errors[stage] for stage in names[:3]} for channel, errors in gap["per_channel"].items()
+    }
+    ends = {name: ends for name, ends in gap["intervals"].items() if name in names}
+    return {**{name: gap[name] for name in names}, "intervals": ends, "per_channel": channels, **content}

@@ -11,7 +11,7 @@ from sysid_node.errors import InputError
 from sysid_node.gap.correction import corrected_aircraft, effect_options
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.gap.reflying import InSimulator
+from sysid_node.gap.reflying import InSimulator, reflown_content
 from sysid_node.report.files.gap_flights import FLIGHTS, write_flights
 from sysid_node.report.pages.gap_page import write_gap_report
 
@@ -28,7 +28,7 @@ def write_gap(folder: Path, found: Diagnosis, flown: InSimulator | None = None) 
 
     ``flown`` is what the correction does in the user's simulator, whose corrected model is written as well.
     """
-    content = document(found, flown)
+    content = {**document(found), **({} if flown is None else {"reflown": reflown_content(flown)})}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)

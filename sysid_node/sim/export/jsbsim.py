@@ -2,7 +2,8 @@
 
 Coefficients are functions of JSBSim's own properties; forces are summed along body axes, and therefore do not depend on
 a convention of wind axes. Commands are ``fcs/<control>-cmd-rad`` (rad), to which JSBSim's usual
-``fcs/<control>-cmd-norm`` is added as a share of the control's limit, and ``fcs/throttle-cmd-norm``. JSBSim's structural axes run aft, right, up, and its product of inertia is minus the usual Ixz.
+``fcs/<control>-cmd-norm`` is added as a share of the control's limit, and ``fcs/throttle-cmd-norm``. JSBSim's
+structural axes run aft, right, up, and its product of inertia is minus the usual Ixz.
 """
 
 from __future__ import annotations
