@@ -39,7 +39,7 @@ def fly_in(simulator: UserSimulator, found: Diagnosis) -> InSimulator:
 
 
 def reflown_content(flown: InSimulator) -> dict[str, Any]:
-    """``reflown`` of gap.json: the gap as flown in the user's simulator: null errors where short flights could not be flown there."""
+    """``reflown`` of gap.json; errors are null where short flights could not be flown in the user's simulator."""
     content: dict[str, Any] = {"simulator": flown.simulator.label, "left_out": dict(flown.left_out)}
     names = ("before", "after", "noise_floor", "shrink_percent", "ci95", "intervals", "per_channel")
     if flown.result is None:
