@@ -9,9 +9,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
-
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
 from sysid_node.errors import InputError
@@ -112,19 +109,17 @@ def _settings(args: argparse.Namespace) -> FleetSettings:
 
 def _show_plan(flights: list[PlannedFlight]) -> None:
     """Print a line for each flight: what would be done, or what is wrong with it."""
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("flight", "tail", "aircraft", "date", "what would be done"):
-        table.add_column(heading, no_wrap=True)
+    rows = [("flight", "tail", "aircraft", "date", "what would be done")]
     counts: Counter[str] = Counter()
     for flight in flights:
         entry = flight.entry
-        what = "nothing: is done" if flight.done else entry.fault or "identify"
+        what = "nothing, it is done" if flight.done else entry.fault or "identify"
         counts["wrong" if entry.fault else "done" if flight.done else "to do"] += 1
         date = entry.date.date().isoformat() if entry.date else "the log's"
-        tail, aircraft = entry.tail or "the log's", Path(entry.aircraft).name
-        table.add_row(entry.flight, tail, aircraft, date, what, style="red" if entry.fault else "")
-    console = Console(highlight=False, soft_wrap=True, markup=False)
-    console.print(table)
+        rows.append((entry.flight, entry.tail or "the log's", Path(entry.aircraft).name, date, what))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
     print(f"{counts['to do']} to do, {counts['done']} done, {counts['wrong']} with a fault")
 
 
