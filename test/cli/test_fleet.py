@@ -130,7 +130,6 @@ def test_of_two_commands_on_one_folder_the_second_says_so(fleet: Path, capsys: p
     ("more", "said"),
     [
         (("--set", "widow=3"), "widow"),
-        (("--method", "magic"), "method 'magic': expected one of"),
         (("--workers", "0"), "--workers 0: expected 1 to 1000"),
         (("--time-limit", "0"), "--time-limit 0: expected a number of seconds"),
         (("--retries", "-1"), "--retries -1: expected 0 to 100"),
