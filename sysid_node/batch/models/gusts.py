@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.batch.models.model import Parameter
+from sysid_node.dynamics.airflow import speed_of, velocity_of
 
 Signals = Mapping[str, jax.Array]
 
@@ -79,11 +80,11 @@ def gust_rates(s: Signals, span: float) -> dict[str, jax.Array]:
 
 def _flow(s: Signals) -> dict[str, jax.Array]:
     """V, alpha, beta relative to the gusting air."""
-    forward, still = s["V"] * jnp.cos(s["beta"]), jnp.zeros_like(s["V"])
-    u = forward * jnp.cos(s["alpha"]) - s.get("gust_u", still)
-    v = s["V"] * jnp.sin(s["beta"]) - s.get("gust_v", still)
-    w = forward * jnp.sin(s["alpha"]) - s.get("gust_w", still)
-    speed = jnp.sqrt(u**2 + v**2 + w**2)
+    still = jnp.zeros_like(s["V"])
+    gusts = (s.get(name, still) for name in ("gust_u", "gust_v", "gust_w"))
+    velocity = velocity_of((s["V"], s["alpha"], s["beta"]), jnp)
+    u, v, w = (inertial - gust for inertial, gust in zip(velocity, gusts, strict=True))
+    speed = speed_of((u, v, w), jnp)
     return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}
 
 

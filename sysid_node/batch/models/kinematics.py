@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
 from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.dynamics.airflow import wind_axes_rates
 from sysid_node.dynamics.atmosphere import GRAVITY
 
 Signals = Mapping[str, jax.Array]
@@ -32,15 +33,10 @@ SENSOR_ERRORS = {
 def flow_rates(s: Signals, force: tuple[jax.Array, jax.Array, jax.Array]) -> dict[str, jax.Array]:
     """Derivatives of V, alpha, beta from signals V alpha beta p q r phi theta and the specific force (body axes)."""
     fx, fy, fz = force
-    ca, sa, cb, sb = jnp.cos(s["alpha"]), jnp.sin(s["alpha"]), jnp.cos(s["beta"]), jnp.sin(s["beta"])
     st, ct, sp, cp = jnp.sin(s["theta"]), jnp.cos(s["theta"]), jnp.sin(s["phi"]), jnp.cos(s["phi"])
-    gx, gy, gz = fx - GRAVITY * st, fy + GRAVITY * ct * sp, fz + GRAVITY * ct * cp
-    along = gx * ca + gz * sa
-    return {
-        "V": along * cb + gy * sb,
-        "alpha": (gz * ca - gx * sa) / (s["V"] * cb) + s["q"] - (s["p"] * ca + s["r"] * sa) * sb / cb,
-        "beta": (gy * cb - along * sb) / s["V"] + s["p"] * sa - s["r"] * ca,
-    }
+    acceleration = fx - GRAVITY * st, fy + GRAVITY * ct * sp, fz + GRAVITY * ct * cp
+    flow, rates = (s["V"], s["alpha"], s["beta"]), (s["p"], s["q"], s["r"])
+    return dict(zip(("V", "alpha", "beta"), wind_axes_rates(flow, rates, acceleration, jnp), strict=True))
 
 
 def attitude_rates(s: Signals) -> dict[str, jax.Array]:

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import GRAVITY
 
 INPUTS = ("de", "V", "beta", "p", "r", "phi", "theta", "ax", "rho", "q_measured")
@@ -54,8 +55,7 @@ class _ShortPeriod:
         s, inertia = dict(zip(INPUTS, u, strict=True)), self.aircraft.inertia
         alpha, q = x
         CZ, Cm = self._coefficients(x, s, theta)
-        cb = jnp.cos(s["beta"])
-        ub, vb, wb = s["V"] * jnp.cos(alpha) * cb, s["V"] * jnp.sin(s["beta"]), s["V"] * jnp.sin(alpha) * cb
+        ub, vb, wb = velocity_of((s["V"], alpha, s["beta"]), jnp)
         udot = s["r"] * vb - q * wb - GRAVITY * jnp.sin(s["theta"]) + s["ax"]
         gravity = GRAVITY * jnp.cos(s["theta"]) * jnp.cos(s["phi"])
         wdot = q * ub - s["p"] * vb + gravity + self._normal_acceleration(s, CZ)
