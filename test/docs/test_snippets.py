@@ -113,8 +113,8 @@ def test_commands_within_sentences_exist(page: Path) -> None:
         known = build_parser(name).format_help() + options_of(name)
         for option in re.findall(r"(?<!\S)--[a-z-]+", command):
             assert option in known, f"{name_of(page)}: `{command}`: {option} is no option of sysid {name}"
-    for bench in re.findall(r"`(?:python )?((?:bench|docs|tools)/\w[\w/]*\.py)", text):
-        assert (ROOT / bench).is_file(), f"{name_of(page)}: {bench} is not there"
+    for path in re.findall(r"`(?:python )?((?:bench|docs|tools|sysid_node|test)/\w[\w/]*(?:\.py|/))", text):
+        assert (ROOT / path).exists(), f"{name_of(page)}: {path} is not there"
 
 
 def options_of(name: str) -> str:
