@@ -40,7 +40,7 @@ ROOMS = {
     ),
     "gap": (
         "thresholds", "flightdata", "residuals", "estimation", "instruments", "selection", "validation", "verdict",
-        "diagnose", "document", "correction", "reflying",
+        "surrogate", "diagnose", "document", "correction", "reflying",
     ),
 }  # fmt: skip
 

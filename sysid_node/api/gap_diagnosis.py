@@ -109,30 +109,37 @@ def diagnose(
     *,
     holdout: Sequence[FlightFile] = (),
     simulator: str | None = None,
+    simulated: Sequence[FlightFile] = (),
     resume: str | Path | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> GapDiagnosis:
     """Finds where the simulator of the aircraft file and the flights differ, and which effect causes it.
 
-    The gap is measured on ``holdout``; without it, on parts of the flights that were not fitted. ``resume``: a folder
+    The gap is measured on ``holdout``; without it, on parts of the flights that were not fitted. ``simulated`` are
+    flights recorded in a simulator of any kind: it is identified from them, the aircraft file being a first guess, and
+    the flights are held against it instead. ``resume``: a folder
     for finished steps, from which an interrupted diagnosis goes on. ``progress`` is called with the share done (0..1)
     and what is being done. A diagnosis takes about a minute for a minute of flight. ``simulator``: ``jsbsim:NAME`` or
     ``jsbsim:FILE``, a model of the same aircraft; the correction is written into a copy of it, and both fly there.
 
     Raises InputError where the aircraft file has no tolerances, a flight cannot be read, is fitted and held out at
-    once, or shows no motion, and where the simulator's model cannot be read or is another aircraft's.
+    once, or shows no motion; where the simulator's model cannot be read or is another aircraft's; and where the
+    simulated flights do not suffice.
     """
     flights = [flights] if isinstance(flights, FlightFile) else list(flights)
     if not flights:
         raise InputError("no flight to diagnose; give at least one")
     aircraft = flights[0].aircraft
+    if simulator is not None and simulated:
+        raise InputError("simulator and simulated: both are given; give the simulator's model, or flights recorded in it")
     theirs = None if simulator is None else user_simulator(simulator, aircraft)
-    fitted, held_out = (
-        [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group] for group in (flights, holdout)
+    fitted, held_out, of_simulator = (
+        [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group]
+        for group in (flights, holdout, simulated)
     )
     keep = None if resume is None else Path(resume)
     report = progress or (lambda share, doing: None)
-    found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep)
+    found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep, simulated=of_simulator)
     if theirs is None:
         return GapDiagnosis(found)
     report(0.99, f"the held-out commands in {theirs.label}")

@@ -27,6 +27,10 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         metavar="jsbsim:NAME|FILE",
         help="your simulator's model: the correction is written into a copy, and both fly the held-out commands there",
     )
+    meaning = (
+        "flights recorded in your simulator, on the same topics: it is identified from them, and stands in its place"
+    )
+    parser.add_argument("--simulated", metavar="SIM", type=Path, nargs="+", action="extend", default=[], help=meaning)
     options.add_out(parser, "; started again with the same folder, an interrupted run continues where it stopped")
     options.add_reading(parser)
     return parser
@@ -37,14 +41,14 @@ def run(args: argparse.Namespace) -> None:
     from sysid_node.api.gap_diagnosis import diagnose  # noqa: PLC0415  # JAX takes its time
     from sysid_node.report.files.gap_folder import UNFINISHED  # noqa: PLC0415
 
-    flights, holdout = (
+    flights, holdout, simulated = (
         [load(path, args.aircraft, topics=args.topic, body_frame=args.body_frame) for path in paths]
-        for paths in (args.bags, args.holdout)
+        for paths in (args.bags, args.holdout, args.simulated)
     )
-    inputs = options.inputs_of([*args.bags, *args.holdout], args.aircraft)
+    inputs = options.inputs_of([*args.bags, *args.holdout, *args.simulated], args.aircraft)
     with output_folder(args.out, "gap", inputs=inputs, force=args.force, working=[UNFINISHED]) as out:
         with progress_bar("gap", quiet=args.quiet) as progress:
-            found = diagnose(flights, holdout=holdout, simulator=args.simulator,
+            found = diagnose(flights, holdout=holdout, simulator=args.simulator, simulated=simulated,
                              resume=args.out / UNFINISHED, progress=progress)  # fmt: skip
         out.publish(found.write)
     if not args.quiet:

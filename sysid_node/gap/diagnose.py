@@ -17,9 +17,11 @@ from sysid_node.gap.residuals.admissibility import require_admissible, require_d
 from sysid_node.gap.residuals.air_motion import gust_speed
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.residuals.simulator_error import with_simulator_error
 from sysid_node.gap.selection.candidate_fitter import Progress
 from sysid_node.gap.selection.confusion import Confusion, confusion_of
 from sysid_node.gap.selection.forward_selection import Attribution, attribute
+from sysid_node.gap.surrogate.identify import Surrogate, identify_simulator
 from sysid_node.gap.validation.holdout import Check, validate
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.verdict import localisation
@@ -45,6 +47,7 @@ class Diagnosis:
     confusion: Confusion
     next_flight: str
     air_motion: float  # rms of the air's motion across the flight path, m/s
+    surrogate: Surrogate | None = None  # the model of the user's simulator, where it was identified from its flights
 
     @property
     def verdict(self) -> str:
@@ -78,8 +81,12 @@ def diagnose(
     holdouts: Sequence[GapFlight],
     progress: Progress = lambda s, t: None,
     keep: Path | None = None,
+    simulated: Sequence[GapFlight] = (),
 ) -> Diagnosis:
     """The diagnosis of flights; the gap is measured on flights held out, or without these on parts of the same flights.
+
+    ``simulated`` are flights recorded in the user's own simulator. It is identified from them first, and the flights
+    are held against that model (``surrogate``); the aircraft then gives geometry, mass and first guesses.
 
     A single flight with a single manoeuvre is cut down to it (``manoeuvre_window``). ``keep`` is a folder for finished
     fits, from which an interrupted diagnosis goes on; its files are removed at the end. Raises InputError for an
@@ -87,13 +94,30 @@ def diagnose(
     in which no control surface moves.
     """
     require_distinct_flights(flights, holdouts)
+    if not simulated:
+        return _diagnosis(aircraft, flights, holdouts, progress, keep)
+    real = (*flights, *holdouts)
+    surrogate = identify_simulator(aircraft, simulated, real, lambda s, t: progress(0.4 * s, t))
+    later: Progress = lambda s, t: progress(0.4 + 0.6 * s, t)  # noqa: E731
+    return _diagnosis(surrogate.aircraft, flights, holdouts, later, keep, surrogate)
+
+
+def _diagnosis(
+    aircraft: Aircraft,
+    flights: Sequence[GapFlight],
+    holdouts: Sequence[GapFlight],
+    progress: Progress,
+    keep: Path | None,
+    surrogate: Surrogate | None = None,
+) -> Diagnosis:
+    """The diagnosis of flights held against an aircraft, which stands for a simulator where it is a surrogate."""
     progress(0.0, "reading the flights as forces and moments")
     if len(flights) == 1 and not holdouts:
         flights = [cut_to_manoeuvre(flights[0], aircraft.control_symbols)]
     simulator = Simulator(aircraft, ANALYSIS_RATE)
-    models = [require_admissible(residual_model_of(simulator, flight)) for flight in flights]
-    others = [require_admissible(residual_model_of(simulator, flight)) for flight in holdouts]
-    nuisances, *theirs = (nuisances_of(aircraft, model, (*models, *others)) for model in (models[0], *others))
+    models, others = ([_model_of(simulator, flight, surrogate) for flight in group] for group in (flights, holdouts))
+    room = surrogate.room if surrogate else {}
+    nuisances, *theirs = (nuisances_of(aircraft, model, (*models, *others), room) for model in (models[0], *others))
     held_out = [HeldOutFlight(*parts) for parts in zip(others, theirs, strict=True)]
     checkpoint = Checkpoint.of(keep, models)
     attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), checkpoint, held_out)
@@ -108,5 +132,11 @@ def diagnose(
     checkpoint.clear()
     return Diagnosis(
         aircraft, decision, scores, attribution, checked, bool(holdouts), found, localisation.missing(attribution),
-        confusion_of(attribution.base, attribution.first_stage), flight, air,
+        confusion_of(attribution.base, attribution.first_stage), flight, air, surrogate,
     )  # fmt: skip
+
+
+def _model_of(simulator: Simulator, flight: GapFlight, surrogate: Surrogate | None) -> ResidualModel:
+    """The residual model of a flight, with what the surrogate leaves of the simulator that it stands for."""
+    model = require_admissible(residual_model_of(simulator, flight))
+    return with_simulator_error(model, surrogate.error) if surrogate else model

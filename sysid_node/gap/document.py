@@ -50,6 +50,24 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
         },
         "next_flight": found.next_flight,
+        **_surrogate(found),
+    }
+
+
+def _surrogate(found: Diagnosis) -> dict[str, Any]:
+    """How well the model of the user's simulator stands for it, on simulated flight held out, where there is one."""
+    surrogate = found.surrogate
+    if surrogate is None:
+        return {}
+    return {
+        "surrogate": {
+            "per_channel": surrogate.error.per_channel,
+            "error": surrogate.error.total,
+            "effects": list(surrogate.effects),
+            "tables": [f"{t.coefficient} over {', '.join(t.over)}" for t in surrogate.tables],
+            "fitted_s": surrogate.fitted_seconds,
+            "held_out_s": surrogate.held_out_seconds,
+        }
     }
 
 

@@ -9,8 +9,9 @@ the derivatives, the file's effects and clock offsets; biases are each flight's 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +55,19 @@ class Nuisances:
     limit: Array  # largest deviation of each from the aircraft file's value
     shared: NDArray[np.bool_]  # whether all flights have the same value
     widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
+    factors: Array = field(default_factory=lambda: np.empty(0))  # by which each prior is widened; empty: the same
 
     def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
         """The nuisances without those that these effects replace; the priors of ``widened`` entries are widened."""
         gone = {e for e in effects if e != DERIVATIVE_ERROR}
         gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
-        wide = np.where(np.isin(self.indices, widened), THRESHOLDS.priors.widening, 1.0)
+        factors = self.factors if self.factors.size else np.full(len(self.indices), THRESHOLDS.priors.widening)
+        wide = np.where(np.isin(self.indices, widened), factors, 1.0)
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
         more = self.widened + float(np.log(wide[keep]).sum())
-        return Nuisances(indices, (self.sigma * wide)[keep], (self.limit * wide)[keep], self.shared[keep], more)
+        sigma, limit = (self.sigma * wide)[keep], (self.limit * wide)[keep]
+        return Nuisances(indices, sigma, limit, self.shared[keep], more, factors[keep])
 
     def places(self, flight: int) -> NDArray[np.intp]:
         """Places of one flight's nuisance parameters among those of all flights, the shared ones first."""
@@ -101,10 +105,17 @@ def derivative_tolerances(aircraft: Aircraft) -> dict[str, float]:
     return {name: THRESHOLDS.priors.ideal * abs(d.value) for name, d in aircraft.derivatives.items() if d.value}
 
 
-def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[ResidualModel] = ()) -> Nuisances:
+def nuisances_of(
+    aircraft: Aircraft,
+    model: ResidualModel,
+    others: Sequence[ResidualModel] = (),
+    room: Mapping[str, float] = MappingProxyType({}),
+) -> Nuisances:
     """The nuisance parameters of one of an aircraft's flights, with limits by the flight's own rates.
 
-    They are the same parameters for all flights that are diagnosed together, ``others`` included. Raises InputError
+    They are the same parameters for all flights that are diagnosed together, ``others`` included. ``room`` is 1 sigma
+    of errors of derivatives, by name, from which their priors are widened where they are a cause and where it is more
+    than the file's tolerance: a simulator knows its derivatives better than they agree with reality. Raises InputError
     where the aircraft file has no tolerances and is no simulator's.
     """
     models = (model, *others)
@@ -130,7 +141,10 @@ def nuisances_of(aircraft: Aircraft, model: ResidualModel, others: Sequence[Resi
     of_aircraft = ("derivative_error", "unsteady_aerodynamics", *CLOCKS, *(f"{name}" for name in believed))
     shared = np.array([name.startswith(of_aircraft) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
-    return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared)
+    given = {f"derivative_error.{name}": size for name, size in room.items()}
+    wider = [max(given[n] / s, 1.0) if n in given else 1.0 for n, s in sigma.items()]
+    factors = THRESHOLDS.priors.widening * np.array(wider)
+    return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared, factors=factors)
 
 
 #: Effects of the file that are no nuisance: what differs from flight to flight, and the beginning of a failure.

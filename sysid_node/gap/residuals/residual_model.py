@@ -6,8 +6,8 @@ of ``predictions``, transforms what they return, and keeps the spectra in its ``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeVar
 
@@ -68,6 +68,8 @@ class ResidualModel:
     inputs: PredictionInputs
     noise: Array  # (L, 12) power that the sensors' noise leaves in measured minus predicted
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, by the aircraft file
+    simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))  # (12,) see ``SimulatorError``
+    reading_errors: Mapping[str, float] = field(default_factory=dict)  # the same of short flights' readings
 
     @property
     def record(self) -> FlightRecord:
@@ -137,6 +139,12 @@ class ResidualModel:
         self._fill(slopes, theta, indices, [k for k, i in enumerate(indices) if i in kinematic])
         return slopes[:, :, len(COEFFICIENTS) :]
 
+    def series_by_derivative(self, theta: Array) -> Array:
+        """Derivatives (N, 6, D) of the predicted coefficients by each derivative of the aircraft file."""
+        s = self.simulator
+        slopes = slopes_by_derivative(s.layout, s.model, theta, self._acting(theta), self.inputs, self._flow(theta))
+        return joined(slopes, len(self.record))
+
     def programs(self) -> Iterator[Callable[[], object]]:
         """Calls of each compiled program of slopes: loading or compiling them takes a while."""
         neutral, kinematic = self.simulator.neutral(), kinematic_parameters(self.simulator.layout)
@@ -194,9 +202,7 @@ class ResidualModel:
 
     def _slopes_by_derivative(self, theta: Array) -> Complex:
         """Derivatives (W, L, 6, D) of the coefficients by each derivative of the aircraft file."""
-        s, samples = self.simulator, len(self.record)
-        slopes = slopes_by_derivative(s.layout, s.model, theta, self._acting(theta), self.inputs, self._flow(theta))
-        return self.windows.transform(joined(slopes, samples))
+        return self.windows.transform(self.series_by_derivative(theta))
 
     def _slopes_along(self, prediction: Prediction, theta: Array, indices: list[int]) -> Complex:
         """Derivatives (W, L, channels, K) by at most ``_MANY`` parameters; what is predicted is kept, too."""

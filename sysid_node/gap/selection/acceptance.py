@@ -14,7 +14,7 @@ accepted where all of these hold:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -93,6 +93,10 @@ class ComparisonScores(Protocol):
     def searched(self) -> int:
         """Number of effects that the candidate was picked from."""
 
+    @property
+    def simulator_error(self) -> Array:
+        """Error (12,) of the simulator's model, as a share of the motion; zero where the simulator itself is known."""
+
 
 @dataclass(frozen=True)
 class ComparisonTable:
@@ -109,6 +113,7 @@ class ComparisonTable:
     contribution: Array
     log_bayes_factor: float
     searched: int
+    simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
 
 
 def is_accepted(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -144,16 +149,24 @@ def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.
     In gusts most of what is left of forces and moments is weather; there what of it is structure counts, and the mean.
     """
     removed, motion = scores.power.removed, scores.motion
-    enough = _matters(scores.power, 1.0, motion, limits) | (removed > limits.large_error**2 * motion)
+    least = np.sqrt(limits.noticeable_error**2 + scores.simulator_error**2)
+    large = np.maximum(limits.large_error, scores.simulator_error)
+    enough = _matters(scores.power, 1.0, motion, least, limits) | (removed > large**2 * motion)
     if not scores.gusty:
         return np.asarray(enough)
     structure = scores.structure
     scale = scores.power.without / np.maximum(structure.total, 1e-300)  # of noise levels to power
-    of_forces = _matters(structure.coherent, scale, motion, limits) | _matters(scores.mean_power, 1.0, motion, limits)
+    of_forces = _matters(structure.coherent, scale, motion, least, limits)
+    of_forces |= _matters(scores.mean_power, 1.0, motion, least, limits)
     return np.where(np.arange(len(CHANNELS)) < len(COEFFICIENTS), of_forces, enough)
 
 
-def _matters(power: RemainingPower, scale: Array | float, motion: Array, limits: Acceptance) -> NDArray[np.bool_]:
-    """Channels (12,) on which enough of a power is removed: as a share of itself, and of the motion."""
+def _matters(
+    power: RemainingPower, scale: Array | float, motion: Array, least: Array, limits: Acceptance
+) -> NDArray[np.bool_]:
+    """Channels (12,) on which enough of a power is removed: as a share of itself, and of the motion.
+
+    ``least`` (12,) is the smallest error that counts, as a share of the motion.
+    """
     share = power.removed > limits.share_of_remainder * power.without
-    return np.asarray(share & (power.removed * scale > limits.noticeable_error**2 * motion))
+    return np.asarray(share & (power.removed * scale > least**2 * motion))

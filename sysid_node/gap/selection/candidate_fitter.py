@@ -60,7 +60,7 @@ class CandidateFitter:
 
         def work() -> dict[str, list[float]]:
             problem = VariableProjection(current.fit)
-            found = _in_parallel(
+            found = in_parallel(
                 lambda candidate: screened_or_infinite(current.fit, problem, candidate),
                 new,
                 lambda share: progress(0.5 * share, "a first look at every effect"),
@@ -109,7 +109,7 @@ class CandidateFitter:
 
         The best predicts best. Those whose fit gives no numbers are left out.
         """
-        fitted = _in_parallel(
+        fitted = in_parallel(
             lambda pair: (pair.explanation, self.add(*pair)),
             pairs,
             lambda share: progress(0.5 + 0.5 * share, "the likeliest effects"),
@@ -123,7 +123,7 @@ def _divergence_ignored() -> np.errstate:
     return np.errstate(over="ignore", invalid="ignore")
 
 
-def _in_parallel(
+def in_parallel(
     work: Callable[[_Work], _Result], items: Sequence[_Work], progress: Callable[[float], None]
 ) -> list[_Result]:
     """The work on each item, in their order.

@@ -113,6 +113,11 @@ class Comparison:
         """Number of effects."""
         return len(EFFECTS)
 
+    @property
+    def simulator_error(self) -> Array:
+        """Error (12,) of the simulator's model, as a share of the motion."""
+        return np.asarray(np.max([model.simulator_error for model in self.fitted.fit.models], axis=0))
+
     def table(self) -> ComparisonTable:
         """All scores as plain values."""
         return ComparisonTable(**{entry.name: getattr(self, entry.name) for entry in fields(ComparisonTable)})

@@ -8,7 +8,7 @@ the short flights (Kuensch (1989), Annals of Statistics 17(3)).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,16 @@ WINDOW = 2.0
 READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
 
 _COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
+
+#: The sensor of each reading, by its name in the aircraft file.
+_SENSOR_OF = {
+    **dict.fromkeys(("ax", "ay", "az"), "accel"),
+    **dict.fromkeys("pqr", "gyro"),
+    **dict.fromkeys(("phi", "theta"), "attitude"),
+    "V": "airspeed",
+    "alpha": "alpha",
+    "beta": "beta",
+}
 
 #: Bootstrap draws, and length of a block in short flights.
 _DRAWS, _BLOCK = 2000, 2
@@ -95,6 +105,27 @@ def weather_suffices(models: Sequence[ResidualModel]) -> bool:
         return False
     _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
     return weather_accounts_for(before, np.array(floors))
+
+
+def error_shares(models: Sequence[ResidualModel], noise: Mapping[str, float]) -> dict[str, float]:
+    """The file's simulator's error of each reading that moved, as a share of the motion, on short flights.
+
+    ``noise`` is 1 sigma of the sensors (SI, by the names of the aircraft file) that the motion must exceed to count.
+    Empty where no short flight can be simulated, or where the simulator diverges.
+    """
+    motions, errors = [np.empty((0, len(READINGS)))], [np.empty((0, len(READINGS)))]
+    for model in filter(can_be_simulated, models):
+        course, neutral = course_of(model, _size(model)), model.simulator.neutral()
+        measured = _cut(model, simulate_beside(model, neutral, course)[1])
+        motions.append(((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1))
+        errors.append(_squares(model, simulation_error(model, neutral, course)))
+    motion, error = (np.concatenate(parts) for parts in (motions, errors))
+    if not len(motion) or not np.isfinite(error).all():
+        return {}
+    least = THRESHOLDS.validation.motion * np.array([noise[_SENSOR_OF[name]] for name in READINGS]) ** 2
+    shares = np.sqrt(error.mean(axis=0) / np.maximum(motion.mean(axis=0), 1e-300))
+    moved = motion.mean(axis=0) > least
+    return {name: float(share) for name, share, counts in zip(READINGS, shares, moved, strict=True) if counts}
 
 
 def can_be_simulated(model: ResidualModel) -> bool:
@@ -166,7 +197,8 @@ def mean_squares(model: ResidualModel, theta: Array, course: Course, measured: A
     motion = ((by_flight - by_flight.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
     sensors = np.mean([_squares(model, each) for each in noise], axis=0)
     squares = [_squares(model, error) for error in errors]
-    return np.stack([motion, sensors, *squares, *(_squares(model, floor) for floor in floors)])
+    unknown = np.array([model.reading_errors.get(name, 0.0) for name in READINGS]) ** 2 * motion
+    return np.stack([motion, sensors, *squares, *(_squares(model, floor) + unknown for floor in floors)])
 
 
 def course_of_flight(model: ResidualModel) -> Course:

@@ -70,7 +70,8 @@ class VerdictScores:
     power_after: Array  # power left with the causes
     structure_deviations: Array  # test statistic of over-identification, standard deviations from its mean
     structure_share: Array  # share of the power left that is structure
-    sampling: Array  # power that stamps leave that are off by chance within a sample, as a share of the motion
+    sampling: Array  # power that stamps leave that are off by chance within a sample, as a share of the motion, and
+    # that a surrogate leaves of the simulator that it stands for
     simulation: SimulationScores | None  # none where no short flight can be simulated
 
 

@@ -44,9 +44,14 @@ def measure(models: Sequence[ResidualModel], attribution: Attribution, check: Ch
         power_after=power_left(evidence),
         structure_deviations=structure.deviations,
         structure_share=structure.share,
-        sampling=sampling_power(attribution.chosen.fit),
+        sampling=sampling_power(attribution.chosen.fit) + surrogate_error(models) ** 2,
         simulation=_simulation_scores(check.simulation_gap),
     )
+
+
+def surrogate_error(models: Sequence[ResidualModel]) -> Array:
+    """Error (12,) of the simulator's model, as a share of the motion; zero where the simulator itself is known."""
+    return np.asarray(np.max([model.simulator_error for model in models], axis=0))
 
 
 def _simulation_scores(gap: Gap | None) -> SimulationScores | None:

@@ -1,4 +1,4 @@
-"""The folder of a gap's diagnosis: ``gap.json``, its tables, the corrected aircraft and the report."""
+"""The folder of a diagnosis: ``gap.json``, tables, the corrected aircraft, the surrogate of a simulator, the report."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ from sysid_node.report.pages.gap_page import write_gap_report
 
 #: Folder in the results' that holds the finished steps of an interrupted diagnosis.
 UNFINISHED = "unfinished"
+
+#: The model of the user's simulator as an aircraft file, where it was identified from simulated flights.
+SURROGATE = "surrogate.yaml"
 
 
 #: Folder in the results' that holds the user's simulator's model with the correction.
@@ -38,6 +41,8 @@ def write_gap(folder: Path, found: Diagnosis, flown: InSimulator | None = None) 
         write_table(folder / "candidates.csv", ["effect", "probability", "share"],
                    [list(candidate.values()) for candidate in content["candidates"]])  # fmt: skip
         (folder / "corrected.yaml").write_text(dump_aircraft(corrected_aircraft(found)), encoding="utf-8")
+        if found.surrogate:
+            (folder / SURROGATE).write_text(dump_aircraft(found.surrogate.aircraft), encoding="utf-8")
         (folder / "effects.txt").write_text("".join(f"--effect {e}\n" for e in effect_options(found)), encoding="utf-8")
         write_flights(folder / FLIGHTS, found)
         if flown is not None:

@@ -140,6 +140,20 @@ def _unmeasured(found: Diagnosis) -> str:
     return " ".join([*sentences, *([] if all(model.flight.metered for model in found.models) else [_THRUST])])
 
 
+def _surrogate(found: Diagnosis) -> str:
+    """How well the model stands for the user's simulator, where it was identified from simulated flights."""
+    if found.surrogate is None:
+        return ""
+    error = found.surrogate.error
+    worst, most = max(error.per_channel.items(), key=lambda item: item[1])
+    return (
+        f"The simulator is known from {number(found.surrogate.fitted_seconds, 3)} s of its own flights. On "
+        f"{number(found.surrogate.held_out_seconds, 3)} s more of them this model of it is off by "
+        f"{percent(error.total)} of the motion, most in {WORDS.get(worst, worst)} ({percent(most)}); what is smaller "
+        "than that cannot be said of the simulator, and counts as noise."
+    )
+
+
 def _left_out(found: Diagnosis) -> str:
     """How much of the flight was not used."""
     seconds = sum(model.flight.left_out for model in found.models)
@@ -177,4 +191,4 @@ def _parameter(name: str, value: float, error: float, unit: str) -> str:
     return f"{parameter_words(name)} {with_interval(value, 1.96 * error)} {unit}".strip()
 
 
-_SENTENCES = (_size, _findings, _air_motion, _unmeasured, _left_out)
+_SENTENCES = (_size, _findings, _surrogate, _air_motion, _unmeasured, _left_out)
