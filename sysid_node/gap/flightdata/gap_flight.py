@@ -113,6 +113,16 @@ def _with_flow_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     )
 
 
+def inferred_again(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+    """The flight with its flow angles and thrust inferred anew where nobody measured them."""
+    record = flight.record
+    if flight.inferred:
+        record = inferred.with_inferred_angles(aircraft, record, flight.inferred, flight.source)
+    if not flight.metered:
+        record = with_inferred_thrust(aircraft, record)
+    return replace(flight, record=record)
+
+
 def _first_run(record: FlightRecord) -> FlightRecord:
     """The longest part without an interruption of more than half a second; its time begins at zero."""
     breaks = np.flatnonzero(np.diff(record.time) > 0.5)

@@ -11,7 +11,7 @@ from sysid_node.aircraft.model import Aircraft, Table
 from sysid_node.errors import InputError
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.convergence import converged
-from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.nuisances import Nuisances, nuisances_of
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight
 from sysid_node.gap.residuals.admissibility import require_admissible
 from sysid_node.gap.residuals.build import residual_model_of
@@ -67,7 +67,7 @@ def identify_simulator(
     nuisances = nuisances_of(guess, models[0], (*models, *others))
     fit = fit_simulator(models, nuisances, lambda share, text: progress(0.1 + 0.6 * share, text))
     progress(0.75, "curvature that the simulator's derivatives leave")
-    fit = _with_tables(fit, others)
+    fit = _with_tables(fit, nuisances, others)
     found = estimated_aircraft(aircraft, fit)
     _require_same_aircraft(aircraft, found, simulated)
     progress(0.9, "the simulator's model on simulated flight held out")
@@ -85,7 +85,7 @@ def _room(file: Aircraft, found: Aircraft) -> dict[str, float]:
     return {name: stated.get(name) or 0.2 * room(name, known) for name, known in found.derivatives.items()}
 
 
-def _with_tables(fit: CandidateFit, others: Sequence[ResidualModel]) -> CandidateFit:
+def _with_tables(fit: CandidateFit, nuisances: Nuisances, others: Sequence[ResidualModel]) -> CandidateFit:
     """The fit with tables for what it leaves, fitted again; the fit itself where it leaves no curvature."""
     guess, points = fit.simulator.aircraft, [flight.point for flight in fit.flights]
     found = curves(guess, residual_of(fit.models, points), residual_of(others, [_shared(fit)] * len(others)))
@@ -94,7 +94,6 @@ def _with_tables(fit: CandidateFit, others: Sequence[ResidualModel]) -> Candidat
     tables = (*guess.tables, *(curve.table for curve in found))
     simulator = Simulator(replace(guess, tables=tables), ANALYSIS_RATE)
     models = [replace(model, simulator=simulator) for model in fit.models]
-    nuisances = fit.nuisances if not fit.candidates else nuisances_of(guess, fit.models[0], fit.models)
     start = with_candidates(unfitted(models, nuisances), fit.candidates, nuisances, fit.values.tolist())
     return converged(start)
 
