@@ -131,7 +131,9 @@ def diagnose(
         raise InputError("no flight to diagnose; give at least one")
     aircraft = flights[0].aircraft
     if simulator is not None and simulated:
-        raise InputError("simulator and simulated: both are given; give the simulator's model, or flights recorded in it")
+        raise InputError(
+            "simulator and simulated: both are given; give the simulator's model, or flights recorded in it"
+        )
     theirs = None if simulator is None else user_simulator(simulator, aircraft)
     fitted, held_out, of_simulator = (
         [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group]
