@@ -69,7 +69,7 @@ def identify_simulator(
     progress(0.75, "curvature that the simulator's derivatives leave")
     fit = _with_tables(fit, nuisances, others)
     found = estimated_aircraft(aircraft, fit)
-    _require_same_aircraft(aircraft, found, simulated)
+    require_same_aircraft(aircraft, found, simulated)
     progress(0.9, "the simulator's model on simulated flight held out")
     known = Simulator(replace(found, noise=guess.noise), ANALYSIS_RATE)
     error = simulator_error([replace(model, simulator=known) for model in others], aircraft.noise)
@@ -106,7 +106,7 @@ def _shared(fit: CandidateFit) -> np.ndarray:
     return point
 
 
-def _require_same_aircraft(file: Aircraft, found: Aircraft, simulated: Sequence[GapFlight]) -> None:
+def require_same_aircraft(file: Aircraft, found: Aircraft, simulated: Sequence[GapFlight]) -> None:
     """Raises InputError where forces or moments are a multiple of what the file's mass and inertia make of them."""
     sources = ", ".join(flight.source for flight in simulated)
     for what, names, key in (("forces", _FORCES, "mass"), ("moments", _MOMENTS, "inertia")):

@@ -10,10 +10,11 @@ from gap_flights import fly
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import parse_aircraft
-from sysid_node.aircraft.model import Aircraft, Inertia, UncertainValue
+from sysid_node.aircraft.model import Aircraft, UncertainValue
 from sysid_node.errors import InputError
+from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.simulator_error import with_simulator_error
-from sysid_node.gap.surrogate.identify import Surrogate, identify_simulator
+from sysid_node.gap.surrogate.identify import Surrogate, identify_simulator, require_same_aircraft
 
 SERVOS = {"elevator": UncertainValue(0.09), "aileron": UncertainValue(0.04), "rudder": UncertainValue(0.04)}
 
@@ -76,8 +77,17 @@ def test_its_error_counts_as_noise_of_the_real_flight(surrogate: Surrogate, plai
     np.testing.assert_array_equal(bounded.simulator_error, surrogate.error.channels)
 
 
-def test_other_masses_are_said(file: Aircraft, simulated: list) -> None:
-    i = file.inertia
-    light = replace(file, inertia=Inertia(0.3 * i.Ixx, 0.3 * i.Iyy, 0.3 * i.Izz, 0.3 * i.Ixz))
-    with pytest.raises(InputError, match=r"the simulated moments are 0.[23][0-9]* times"):
-        identify_simulator(light, simulated, [], lambda share, text: None)
+def test_other_masses_are_said(aircraft: Aircraft, plain: GapFlight) -> None:
+    """Moments by an inertia of a third are a third of the file's."""
+    thirds = {
+        n: replace(d, value=d.value / 3.0) for n, d in aircraft.derivatives.items() if n[:2] in {"Cl", "Cm", "Cn"}
+    }
+    found = replace(aircraft, derivatives={**aircraft.derivatives, **thirds})
+    require_same_aircraft(aircraft, aircraft, [plain])
+    with pytest.raises(InputError, match=r"flight 1: by the inertia .* simulated moments are 0.33 times"):
+        require_same_aircraft(aircraft, found, [plain])
+
+
+def test_the_real_flight_is_no_simulated_one(file: Aircraft, simulated: list) -> None:
+    with pytest.raises(InputError, match="is the same recording"):
+        identify_simulator(file, simulated, simulated[:1], lambda share, text: None)
