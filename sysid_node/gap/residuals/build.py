@@ -42,8 +42,9 @@ _REALISATIONS = 4
 #: Least power of the sensors' noise, in the channels' units squared.
 _LEAST_NOISE = 1e-18
 
-#: Flights are padded to multiples of so many samples, because each length is another program to compile.
-_BLOCK = 500
+#: Lengths (samples) to which flights are padded; longer flights to multiples of ``_BLOCK``. Each length needs another
+#: set of programs, which takes more than a minute to compile; a prediction of thousands of samples takes milliseconds.
+_LENGTHS, _BLOCK = (1500, 3000), 6000
 
 #: Columns of the linear and angular accelerations that the inertial instruments measured.
 _ACCELERATIONS = (("ax", "ay", "az"), ("p_rate", "q_rate", "r_rate"))
@@ -122,7 +123,7 @@ def _noise_power(model: ResidualModel, random: np.random.Generator) -> Array:
 
 def _inputs(simulator: Simulator, record: FlightRecord, memory: ObserverMemory) -> tuple[PredictionInputs, Array]:
     """What predictions take from a record, padded, and the measured channels (N, 12)."""
-    signals, missing = signals_of(simulator, record), -len(record) % _BLOCK
+    signals, missing = signals_of(simulator, record), padded_length(len(record)) - len(record)
     motion = motion_of(record)
     signals, motion = (jax.tree.map(lambda x: _padded(x, missing), parts) for parts in (signals, motion))
     accelerations = [Vector(*(_padded(record[name], missing) for name in names)) for names in _ACCELERATIONS]
@@ -131,6 +132,11 @@ def _inputs(simulator: Simulator, record: FlightRecord, memory: ObserverMemory) 
     read = empty if motion is None else jnp.hstack([motion.air, motion.attitude])
     inputs = PredictionInputs(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
     return inputs, np.concatenate([forces, np.asarray(read)[: len(record)]], axis=1)
+
+
+def padded_length(samples: int) -> int:
+    """The length to which a flight of so many samples is padded, so that few programs are compiled."""
+    return next((length for length in _LENGTHS if samples <= length), -(-samples // _BLOCK) * _BLOCK)
 
 
 def _padded(series: Scalar | Array, missing: int) -> Scalar:

@@ -40,9 +40,10 @@ from sysid_node.sim import Simulator
 from sysid_node.sim.model import parameters
 from sysid_node.sim.prediction.coefficients import COEFFICIENTS
 
-#: Directions along which a prediction is differentiated at once: as many as most effects have parameters, or as many as
-#: there are biases and clocks.
-_FEW, _MANY = 3, 9
+#: Directions along which a prediction is differentiated at once: coefficients along as many as most effects have
+#: parameters, all channels along as many as there are biases and clocks. Fewer directions are filled up with zeros,
+#: which takes milliseconds; another program for fewer would take half a minute to compile.
+_WIDTHS = {force_coefficients: 3, all_channels: 9}
 
 _Result = TypeVar("_Result")
 
@@ -149,7 +150,6 @@ class ResidualModel:
         """Calls of each compiled program of slopes: loading or compiling them takes a while."""
         neutral, kinematic = self.simulator.neutral(), kinematic_parameters(self.simulator.layout)
         other = free_parameters(force_coefficients, self.simulator.layout)[:1]
-        yield partial(self._slopes_along, all_channels, neutral, kinematic[:_MANY])
         yield partial(self._slopes_along, all_channels, neutral, kinematic[:1])
         yield partial(self._slopes_along, force_coefficients, neutral, other)
         yield partial(self._slopes_by_derivative, neutral)
@@ -164,7 +164,7 @@ class ResidualModel:
             by_derivative = self._slopes_by_derivative(theta)
             slopes[:, :, :forces, linear] = by_derivative[..., [derivatives[indices[k]] for k in linear]]
         others = [k for k, index in enumerate(indices) if index not in derivatives and index not in kinematic]
-        for places in _batches(others, _FEW):
+        for places in _batches(others, _WIDTHS[force_coefficients]):
             along = self._slopes_along(force_coefficients, theta, [indices[k] for k in places])
             slopes[:, :, :forces, places] = along
         self._fill(slopes, theta, indices, [k for k, index in enumerate(indices) if index in kinematic])
@@ -172,9 +172,7 @@ class ResidualModel:
 
     def _fill(self, slopes: Complex, theta: Array, indices: list[int], kinematic: list[int]) -> None:
         """Puts into ``slopes`` (W, L, 12, K) those of all channels by the kinematic ones among the indices."""
-        count = len(kinematic)
-        wide = count // _MANY * _MANY if count % _MANY <= _FEW else count
-        for places in (*_batches(kinematic[:wide], _MANY), *_batches(kinematic[wide:], _FEW)):
+        for places in _batches(kinematic, _WIDTHS[all_channels]):
             slopes[..., places] = self._slopes_along(all_channels, theta, [indices[k] for k in places])
 
     def _kinematic_key(self, theta: Array) -> bytes:
@@ -205,11 +203,11 @@ class ResidualModel:
         return self.windows.transform(self.series_by_derivative(theta))
 
     def _slopes_along(self, prediction: Prediction, theta: Array, indices: list[int]) -> Complex:
-        """Derivatives (W, L, channels, K) by at most ``_MANY`` parameters; what is predicted is kept, too."""
+        """Derivatives (W, L, channels, K) by at most ``_WIDTHS`` parameters; what is predicted is kept, too."""
         s, samples, acting = self.simulator, len(self.record), self._acting(theta)
         free = free_parameters(prediction, s.layout)
         acting[indices] = True
-        directions = np.zeros((_FEW if len(indices) <= _FEW else _MANY, len(free)))
+        directions = np.zeros((_WIDTHS[prediction], len(free)))
         directions[np.arange(len(indices)), [free.index(i) for i in indices]] = 1.0
         values, slopes = directional_slopes(
             prediction, s.layout, s.model, theta, acting, directions, self.inputs, self._flow(theta)

@@ -60,16 +60,18 @@ def _unmeasured_air(
     what the air data's noise (N, 12) adds to it.
     """
     dryden, speed = Dryden.at(_HEIGHT, model.simulator.aircraft.geometry.b), float(model.record["V"].mean())
-    gusts = dryden.realisation(course.altitude.size, model.simulator.rate, speed, random)
-    begins = np.asarray(course.begins)
+    samples = len(model.record)  # the flight's own, so that the floor does not depend on how the course is padded
+    gusts = dryden.realisation(samples, model.simulator.rate, speed, random)
+    begins = np.asarray(course.begins)[:samples]
     origin = np.maximum.accumulate(np.where(begins, np.arange(begins.size), 0))
     seen = slice(0, 1) if model.flight.inferred else slice(1, 3)
     usual = _power((gusts - gusts[origin])[:, seen])
     read = noise[:, [OUTPUTS.index(name) for name in ("V", "beta", "alpha")]] * [1.0, speed, speed]
-    moved = max(_power(shown[:, seen]) - _power((read - read[origin[: len(read)]])[:, seen]), 0.0)
+    moved = max(_power(shown[:, seen]) - _power((read - read[origin])[:, seen]), 0.0)
     gusts *= np.sqrt(moved / usual)
     across = [float(name in model.flight.inferred) for name in ("V", "beta", "alpha")]
-    return gusts[:, :3] * across, gusts[:, 3:]
+    padded = np.pad(gusts, ((0, course.altitude.size - samples), (0, 0)), mode="edge")
+    return padded[:, :3] * across, padded[:, 3:]
 
 
 def _flow_angles_of(model: ResidualModel, moving: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_node.gap.residuals.build import residual_model_like, residual_model_of
+from sysid_node.gap.residuals.build import padded_length, residual_model_like, residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.sim import Simulator
 
@@ -38,3 +38,10 @@ def test_the_same_record_seen_alike_is_the_same_model(plain_model) -> None:
 def test_the_seed_makes_the_noise_reproducible(aircraft, plain, plain_model, seed: int) -> None:
     model = residual_model_of(Simulator(aircraft, 50.0), plain, seed)
     assert np.array_equal(model.noise, plain_model.noise) is (seed == 0)
+
+
+@pytest.mark.parametrize(
+    ("samples", "padded"), [(2, 1500), (1500, 1500), (1501, 3000), (3001, 6000), (6001, 12000), (12001, 18000)]
+)
+def test_flights_of_many_lengths_share_few_programs(samples: int, padded: int) -> None:
+    assert padded_length(samples) == padded
