@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import ctypes
 import gc
 import os
 import re
@@ -67,8 +68,19 @@ def browse(tmp_path) -> Callable[[Path], Page]:
     return page
 
 
-#: Memory of a test worker from which compiled programs are let go, MB: each stays loaded until then.
+#: Memory of a test worker from which memory is given back and compiled programs are let go, MB.
 _LARGE = 1000.0
+
+
+@pytest.fixture(autouse=True)
+def returned_memory() -> Iterator[None]:
+    """Gives back, after a test whose worker has grown large, what was freed: the C library keeps it otherwise.
+
+    Compiling leaves more than half of a worker's memory so. Only glibc can be asked for it.
+    """
+    yield
+    if _resident_megabytes() > _LARGE:
+        _trim()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -79,6 +91,14 @@ def bounded_memory() -> Iterator[None]:
     if jax is not None and _resident_megabytes() > _LARGE:
         jax.clear_caches()
         gc.collect()
+        _trim()
+
+
+def _trim() -> None:
+    """Give freed memory back to the system, where the C library can (glibc)."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def _resident_megabytes() -> float:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from sysid_node.cli.main import main
+
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,8 +45,14 @@ def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
         (["--aircraft", "nonesuch"], "nonesuch"),
     ],
 )
-def test_bad_input_is_one_line_and_code_2(arguments: list[str], words: str, tmp_path: Path) -> None:
-    done = loop(*arguments, "--out", str(tmp_path))
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+def test_bad_input_is_one_line_and_code_2(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(ROOT)
+    assert main(["loop", *arguments, "--out", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert words in line

@@ -1,5 +1,6 @@
 """What the tests of the gap share: flights of known effects, flown once."""
 
+import fcntl
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -36,8 +37,11 @@ def plain(aircraft: Aircraft) -> GapFlight:
 
 
 @pytest.fixture(scope="session")
-def plain_model(aircraft: Aircraft, plain: GapFlight) -> ResidualModel:
-    return residual_model_of(Simulator(aircraft, 50.0), plain)
+def plain_model(aircraft: Aircraft, plain: GapFlight, tmp_path_factory: pytest.TempPathFactory) -> ResidualModel:
+    """The residual model of the plain flight. One worker at a time compiles its programs; the next one loads them."""
+    with (tmp_path_factory.getbasetemp().parent / "compiling").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return residual_model_of(Simulator(aircraft, 50.0), plain)
 
 
 @pytest.fixture(scope="session")
@@ -46,8 +50,11 @@ def wrong_derivatives() -> dict[str, float]:
 
 
 @pytest.fixture(scope="session")
-def lagging(aircraft: Aircraft) -> Diagnosis:
-    """The diagnosis of a servo's lag through wrong derivatives, checked on a flight held out."""
+def lagging(aircraft: Aircraft, plain_model: ResidualModel) -> Diagnosis:
+    """The diagnosis of a servo's lag through wrong derivatives, checked on a flight held out.
+
+    It takes the programs that the plain model has compiled.
+    """
     effects = {"actuator_lag": {"time_constant": 0.08}, "derivative_error": WRONG_DERIVATIVES}
     return diagnose(aircraft, [fly(aircraft, effects, seed=5)], [fly(aircraft, effects, seed=6)])
 
