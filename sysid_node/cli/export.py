@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 #: What stands near the beginning of every file that this command writes, by which a later run knows it.
 MARK = "sysid export"
 
+#: Derivatives of the drag that a parabola of the lift holds.
+_OF_PARABOLA = ("CD_0", "CD_k")
+
 FORMATS = ("jsbsim", "gazebo", "rosflight")
 
 
@@ -123,5 +126,7 @@ def _write(form: str, aircraft: Aircraft, specs: list[str]) -> tuple[str, list[s
         left_out.append(f"{len(aircraft.tables)} table{'s' * (len(aircraft.tables) > 1)}")
     if form == "jsbsim" and effects.get("actuator_lag", {}).get("damping"):
         left_out.append("damping of actuator_lag (its actuators are of first order)")
+    if form != "jsbsim" and any(name.startswith("CD_") and name not in _OF_PARABOLA for name in aircraft.derivatives):
+        left_out.append("slopes of CD (its drag is a parabola of the lift, right at the reference)")
     write = {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form]
     return write(aircraft, {name: values for name, values in effects.items() if name not in left_out}), left_out

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
@@ -138,6 +138,13 @@ class _Alternative:
     @cached_property
     def comparison(self) -> Comparison:
         return Comparison(self.position.base, self.position.measured.without, self.fitted)
+
+    @property
+    def fewer(self) -> int:
+        cause, added = self.position.measured.candidate, self.fitted.added
+        if added is None or added.effect != cause.effect or cause.effect not in SHARED:
+            return 0
+        return len(cause.indices) - len(added.indices)
 
     @cached_property
     def lead(self) -> float:

@@ -30,6 +30,10 @@ class AlternativeScores(Protocol):
     def lead(self) -> float:
         """Difference of log predictive scores plus log Bayes factor against the present explanation, nats."""
 
+    @property
+    def fewer(self) -> int:
+        """Parameters that it has fewer than the cause, where both are variants of one effect; else 0."""
+
 
 class PositionScores(Protocol):
     """One cause of the present explanation."""
@@ -54,6 +58,7 @@ class AlternativeTable:
     label: str
     comparison: ComparisonScores
     lead: float
+    fewer: int = 0
 
 
 @dataclass(frozen=True)
@@ -81,8 +86,14 @@ def next_step(
     """The step to a better explanation; none where the present one is kept.
 
     Of several causes that are not needed, that one is dropped without which flight not fitted is best predicted; a
-    single cause is not dropped here. Alternatives whose label is ``barred`` are left out.
+    single cause is not dropped here. Alternatives whose label is ``barred`` are left out. Of the variants of one effect
+    (all controls alike, one, each by itself) the one with fewer parameters takes the place unless the other leads by
+    the penalty of its parameters: predictions are so precise that a trifle would decide otherwise.
     """
+
+    def lead(alternative: AlternativeScores) -> float:
+        return alternative.lead + 0.5 * thresholds.search.penalty * alternative.fewer
+
     needless = [
         i for i, each in enumerate(positions) if len(positions) > 1 and not is_accepted(each.comparison, thresholds)
     ]
@@ -94,5 +105,5 @@ def next_step(
         for k, alternative in enumerate(position.alternatives)
         if alternative.label not in barred and is_accepted(alternative.comparison, thresholds)
     ]
-    best = max(accepted, key=lambda pair: pair[0].lead, default=None)
-    return best[1] if best is not None and best[0].lead > thresholds.search.lead else None
+    best = max(accepted, key=lambda pair: lead(pair[0]), default=None)
+    return best[1] if best is not None and lead(best[0]) > thresholds.search.lead else None

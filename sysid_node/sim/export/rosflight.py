@@ -23,8 +23,12 @@ _HEADER = """\
 # {name}: aerodynamics for rosflight_sim, written by sysid export.
 # Surfaces run from -1 to 1 there: control derivatives hold for full deflection ({limits}).
 # Propeller, motor and servo parameters are not in an aircraft file: keep your own (D_prop, CT_*, CQ_*, KV, ...).
-# The mass and inertia of the vehicle's URDF: {mass:g} kg, Jx {inertia.Ixx:g}, Jy {inertia.Iyy:g}, Jz {inertia.Izz:g}, \
-Jxz {inertia.Ixz:g} kg m^2.
+# The mass (kg) and inertia (kg m^2) of the vehicle's URDF:
+# mass: {mass:.9g}
+# Jx: {inertia.Ixx:.9g}
+# Jy: {inertia.Iyy:.9g}
+# Jz: {inertia.Izz:.9g}
+# Jxz: {inertia.Ixz:.9g}
 """
 
 

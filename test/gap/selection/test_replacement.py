@@ -81,3 +81,16 @@ def test_a_larger_lead_may_be_asked_for() -> None:
     strict = replace(THRESHOLDS, search=replace(THRESHOLDS.search, lead=10.0))
     positions = [cause(alternative("cg_shift", 5.0))]
     assert (next_step(positions), next_step(positions, thresholds=strict)) == (Step(0, 0), None)
+
+
+def test_of_two_variants_of_an_effect_the_simpler_takes_the_place_unless_the_other_leads_clearly():
+    """Penalty: 10 of deviance, 5 nats, a parameter (``thresholds.Search.penalty``); two parameters fewer here."""
+
+    def variant(lead: float, fewer: int) -> AlternativeTable:
+        return AlternativeTable("a variant", ACCEPTED, lead, fewer)
+
+    assert next_step([cause(variant(-8.0, 2))]) == Step(0, 0)
+    assert next_step([cause(variant(-9.5, 2))]) is None  # it lags by more than 10 nats less the lead of 1
+    assert next_step([cause(variant(8.0, -2))]) is None
+    assert next_step([cause(variant(11.5, -2))]) == Step(0, 0)
+    assert next_step([cause(variant(8.0, 0))]) == Step(0, 0)

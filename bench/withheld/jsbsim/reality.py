@@ -22,7 +22,7 @@ from sysid_node.sim.importing.jsbsim.trim import find_trim
 
 #: A withheld effect: by name, its numbers. ``servo``: control, lag (s), delay (s), rate (rad/s), play (rad), bias
 #: (rad), lost (share). ``coefficient``: a name such as Cm_alpha, and what is added. ``mass``: share. ``cg``: m forward.
-Withheld = Mapping[str, Mapping[str, float]]
+Withheld = Mapping[str, Mapping[str, float | str]]
 
 _AXES = {"Cl": ("ROLL", "bw-ft"), "Cm": ("PITCH", "cbarw-ft"), "Cn": ("YAW", "bw-ft")}
 _STATES = {

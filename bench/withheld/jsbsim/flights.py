@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.withheld.jsbsim.reality import Reality, Withheld
 from bench.withheld.plants.instruments import SUITES, Log, readings, record
 from bench.withheld.plants.pilot import RATE as PILOT_RATE
 from bench.withheld.plants.pilot import Pilot
@@ -14,8 +15,6 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.sim.importing.jsbsim.survey import Survey
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
-
-from .reality import Reality, Withheld
 
 RATE, LOOK = 400.0, 2  # Hz, and steps between two looks at the motion
 SECONDS, HEIGHT = 44.0, 300.0

@@ -1,0 +1,98 @@
+"""Exported models read in again. Truth: the aircraft that was exported."""
+
+import numpy as np
+import pytest
+from aircraft_loads import coefficients
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.sim.export.gazebo import gazebo_plugin
+from sysid_node.sim.export.jsbsim import jsbsim_model
+from sysid_node.sim.export.rosflight import rosflight_parameters
+from sysid_node.sim.importing.gazebo.read import read_gazebo
+from sysid_node.sim.importing.jsbsim.read import read_jsbsim
+from sysid_node.sim.importing.rosflight import read_rosflight
+
+
+@pytest.fixture(scope="module")
+def kestrel():
+    return load_aircraft("kestrel")
+
+
+def grid(**values):
+    """Columns of a state about level flight, with some variables changed."""
+    still = dict.fromkeys(("beta", "p", "q", "r", "de", "da", "dr"), 0.0) | {"alpha": 0.04, "V": 16.0}
+    size = len(next(iter(values.values())))
+    return {name: np.broadcast_to(values.get(name, value), size) for name, value in still.items()}
+
+
+def test_jsbsim_holds_every_derivative(kestrel, tmp_path):
+    """Coefficients are linear, so that equal derivatives are equal coefficients in every state."""
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    path = tmp_path / "kestrel.xml"
+    path.write_text(jsbsim_model(kestrel, {"actuator_lag": {"elevator": 0.03}}))
+    found = read_jsbsim(str(path), 16.0, 0.0).aircraft
+    assert not found.tables
+    for name in {*found.derivatives, *kestrel.derivatives}:
+        known = kestrel.derivatives[name].value if name in kestrel.derivatives else 0.0
+        assert found.derivatives[name].value == pytest.approx(known, abs=1e-6), name
+    assert found.effects["actuator_lag"]["elevator"].value == pytest.approx(0.03)
+    assert found.mass == pytest.approx(kestrel.mass, rel=1e-6)
+    assert found.inertia.Iyy == pytest.approx(kestrel.inertia.Iyy, rel=1e-3)  # JSBSim's slugs have four digits
+    assert found.throttle.max_thrust == pytest.approx(kestrel.throttle.max_thrust, rel=1e-6)
+
+
+#: Coefficients of which both formats hold all derivatives: CL, CY, Cl, Cm, Cn.
+HELD = [0, 2, 3, 4, 5]
+
+VARIED = {
+    "alpha": np.linspace(-0.05, 0.12, 18),
+    "beta": np.linspace(-0.1, 0.1, 9),
+    **{rate: np.linspace(-0.01, 0.01, 5) for rate in "pqr"},
+    **{symbol: np.linspace(-0.2, 0.2, 5) for symbol in ("de", "da", "dr")},
+}
+
+
+@pytest.fixture(scope="module")
+def from_rosflight(kestrel, tmp_path_factory):
+    path = tmp_path_factory.mktemp("rosflight") / "kestrel.yaml"
+    path.write_text(rosflight_parameters(kestrel))
+    return read_rosflight(path, 16.0).aircraft
+
+
+@pytest.fixture(scope="module")
+def from_gazebo(kestrel, tmp_path_factory):
+    path = tmp_path_factory.mktemp("gazebo") / "kestrel.sdf"
+    path.write_text(gazebo_plugin(kestrel))
+    return read_gazebo(path, 16.0).aircraft
+
+
+def test_masses_come_back(kestrel, from_rosflight, from_gazebo):
+    for found in (from_rosflight, from_gazebo):
+        assert found.mass == pytest.approx(kestrel.mass)
+        assert vars(found.inertia) == pytest.approx(vars(kestrel.inertia))
+
+
+@pytest.mark.parametrize("variable", VARIED)
+def test_rosflight_holds_all_but_the_drags_form(kestrel, from_rosflight, variable):
+    """Surfaces run from -1 to 1 there, a full deflection; its drag is a parabola of the wing's lift."""
+    states = grid(**{variable: VARIED[variable]})
+    travel = {control.symbol: control.limit for control in kestrel.controls.values()}
+    ours = coefficients(kestrel, states)
+    theirs = coefficients(from_rosflight, {n: x / travel.get(n, 1.0) for n, x in states.items()})
+    assert theirs[:, HELD] == pytest.approx(ours[:, HELD], abs=1e-6)
+
+
+@pytest.mark.parametrize("variable", [name for name in VARIED if name != "beta"])
+def test_gazebo_holds_all_but_the_drags_form(kestrel, from_gazebo, variable):
+    """In sideslip its pressure is that of the speed in the plane of symmetry, which no coefficient can undo."""
+    states = grid(**{variable: VARIED[variable]})
+    ours, theirs = coefficients(kestrel, states), coefficients(from_gazebo, states)
+    assert theirs[:, HELD] == pytest.approx(ours[:, HELD], abs=1e-6)
+
+
+def test_in_sideslip_gazebo_has_the_same_slopes(kestrel, from_gazebo):
+    """The pressure's share, cos(beta)^2, is even: slopes with sideslip at no sideslip are the derivatives."""
+    states = grid(beta=np.array([-1e-4, 1e-4]))
+    slopes = np.diff(coefficients(from_gazebo, states), axis=0)[0] / 2e-4
+    known = [kestrel.derivatives[f"{c}_beta"].value for c in ("CY", "Cl", "Cn")]
+    assert slopes[[2, 3, 5]] == pytest.approx(known, rel=0.03)
