@@ -33,6 +33,18 @@ def test_a_file_without_tolerances_is_said(tmp_path: Path, capsys: pytest.Captur
     assert "tolerance" in said(capsys)
 
 
+@pytest.mark.parametrize(
+    ("simulator", "words"), [("c172p", "expected jsbsim:NAME"), ("jsbsim:nobody", "no aircraft 'nobody'")]
+)
+def test_a_simulator_that_is_none_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], simulator: str, words: str
+) -> None:
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    options = ["--aircraft", "cdrw", "--simulator", simulator, "--out", str(tmp_path / "out"), "--quiet"]
+    assert main(["gap", str(BAG), *options]) == 2
+    assert words in said(capsys)
+
+
 @pytest.mark.skipif(not BAG.is_dir(), reason="the bundled flights are not here")
 def test_the_flight_fitted_cannot_be_held_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["gap", str(BAG), "--holdout", str(BAG), "--aircraft", "cdrw", "--out", str(tmp_path / "out"), "--quiet"]

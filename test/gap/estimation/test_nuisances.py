@@ -7,9 +7,10 @@ import pytest
 
 from sysid_node.aircraft.model import UncertainValue
 from sysid_node.gap.estimation.candidate_fit import linearised, stepped, unfitted
-from sysid_node.gap.estimation.nuisances import HeldOutFlight, believed_effects, nuisances_of
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, believed_effects, derivative_tolerances, nuisances_of
 from sysid_node.gap.estimation.predictive_density import held_out_evidence
 from sysid_node.gap.residuals.air_motion import is_gusty
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
 
 
@@ -28,6 +29,16 @@ def test_flights_without_lateral_instruments_are_judged_beside_others(aircraft, 
     names = [nuisances_of(aircraft, model, (plain_model, alone)).indices for model in (plain_model, alone)]
     assert names[0] == names[1]
     assert len(nuisances_of(aircraft, alone).indices) < len(names[0])
+
+
+def test_a_simulators_file_is_right_within_a_small_share_unless_it_states_tolerances(aircraft) -> None:
+    plain = {name: replace(d, tolerance=None) for name, d in aircraft.derivatives.items()}
+    assert derivative_tolerances(replace(aircraft, derivatives=plain)) == {}
+    found = derivative_tolerances(replace(aircraft, derivatives=plain, ideal=True))
+    share = THRESHOLDS.priors.ideal
+    assert found == {name: share * abs(d.value) for name, d in plain.items() if d.value}
+    stated = {name: d.tolerance for name, d in aircraft.derivatives.items() if d.tolerance}
+    assert derivative_tolerances(replace(aircraft, ideal=True)) == stated
 
 
 def stating(aircraft, **kind):
