@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import signal
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -61,7 +62,7 @@ def local_workers(count: int, memory: str | None = None) -> Iterator[Workers]:
         except ValueError:
             raise InputError(f"--memory {memory!r}: expected a size, e.g. 2GB") from None
     _quiet()
-    with dask.config.set(_SETTINGS):
+    with dask.config.set(_SETTINGS), _silent_tracker():
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -94,6 +95,21 @@ def connected(address: str) -> Iterator[Workers]:
         yield Workers(client, lambda: None)
     finally:
         client.close(timeout=5.0)
+
+
+@contextlib.contextmanager
+def _silent_tracker() -> Iterator[None]:
+    """A context whose processes do not warn of semaphores that Python removes after a command that was ended."""
+    before = os.environ.get("PYTHONWARNINGS")
+    silent = "ignore::UserWarning:multiprocessing.resource_tracker"
+    os.environ["PYTHONWARNINGS"] = silent if before is None else f"{before},{silent}"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 def _quiet() -> None:

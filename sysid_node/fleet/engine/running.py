@@ -22,7 +22,7 @@ R = TypeVar("R")
 #: Jobs that wait at a scheduler of our own for a worker to be free, so that none waits for the command. Another
 #: scheduler may assign a waiting job to a worker that is busy, and blame it where that worker ends.
 _WAITING = 2
-_LOOK = 0.5  # s between looks at the scheduler and at the workers
+_LOOK = 0.5  # s between looks at the scheduler and at the workers, and between counts of these
 
 
 class SchedulerLostError(RuntimeError):
@@ -87,6 +87,7 @@ class _Engine(Generic[T, R]):
         self.attempts: dict[str, _Attempt[T]] = {}
         self._finished: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._numbers = count()
+        self._threads, self._counted = 0, -math.inf  # of all workers, and when they were counted
         self._prefix = f"sysid-flight-{time.time_ns():x}"
 
     @contextlib.contextmanager
@@ -103,8 +104,11 @@ class _Engine(Generic[T, R]):
 
     def room(self) -> int:
         """How many jobs are handed out at a time."""
-        threads = sum(self.client.nthreads().values()) if self._alive() else 0
-        return threads + _WAITING if self.client.cluster is not None else max(threads, 1)
+        now = time.monotonic()
+        if now - self._counted > _LOOK:
+            self._threads = sum(self.client.nthreads().values()) if self._alive() else 0
+            self._counted = now
+        return self._threads + _WAITING if self.client.cluster is not None else max(self._threads, 1)
 
     def start(self, job: Job[T], number: int) -> None:
         """Hand out a job, for the ``number``-th time."""

@@ -94,7 +94,9 @@ class FleetState:
 
     def close(self) -> None:
         """Close the file."""
-        self._connection.close()
+        with self._errors():
+            self._connection.commit()
+            self._connection.close()
 
     def fingerprints(self) -> dict[str, str]:
         """The fingerprint of every flight that is finished, which a lost one is not."""
@@ -110,8 +112,8 @@ class FleetState:
         return None if found is None else str(found[0])
 
     def remember_hash(self, path: str, stamp: str, digest: str) -> None:
-        """Keep the hash of an input for as long as its stamp stays."""
-        with self._errors(), self._connection:
+        """Keep the hash of an input for as long as its stamp stays; it is written with what is next kept."""
+        with self._errors():
             self._connection.execute("REPLACE INTO inputs VALUES (?, ?, ?)", (path, stamp, digest))
 
     def keep(
