@@ -24,13 +24,12 @@ def look_for_changes(state: EstimatorState, lines: Array) -> None:
     if latest is None:
         return
     finding = detection.examine(_change_tests(state), state.changes.excited)
-    unchanged = np.array_equal(finding.outside_model, latest.outside_model) and np.array_equal(
-        finding.contradicted, latest.contradicted
+    tests = replace(latest.tests, outside_model=finding.outside_model, contradicted=finding.contradicted)
+    unchanged = np.array_equal(tests.outside_model, latest.tests.outside_model) and np.array_equal(
+        tests.contradicted, latest.tests.contradicted
     )
     if state.flow.active or not unchanged:
-        state.latest = replace(
-            latest, outside_model=finding.outside_model, contradicted=finding.contradicted, basis=None
-        )
+        state.latest = replace(latest, tests=tests, basis=None)
     if finding.since is not None:
         _begin_anew(state, lines, finding.since)
     if finding.changed:

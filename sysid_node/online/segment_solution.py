@@ -25,7 +25,7 @@ from sysid_node.online.regression.least_squares import InstrumentStrength, Solut
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.selection_bias import selection_bias_factors
 from sysid_node.online.segment_information import finished_information, line_seconds, measure_segment
-from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.state import EstimatorState, FinishedSums, InstrumentChecks, ModelTests, SegmentSolution
 from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import line_model, remapped
@@ -80,7 +80,7 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
     past = finished_information(state)
     total = past + segment
     gram = total.grams.sum(axis=0)
-    instrument_strength, solution, compensation = _solve(state, total, gram)
+    strength, solution, compensation = _solve(state, total, gram)
     equations, table, now = state.equations, state.model.table, state.transform.last
     spread = least_squares.uncertainty(equations, solution, total)
     noise_alone = spread.covariance
@@ -92,29 +92,20 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
     variance = inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
     mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
     none = np.zeros(len(equations.coefficients), dtype=bool)
-    lag_test, timed = _lag_test(state, solution, spread, gram)
+    selection_bias = selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior)
+    bounds = weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts)
     state.latest = SegmentSolution(
         time=now,
         pieces=state.finished.pieces,
-        timed=timed,
         total=total,
         solution=solution,
         uncertainty=spread,
         compensation=compensation,
-        base=past.grams.sum(axis=0),
-        integrals=past.integrals,
+        finished=FinishedSums(past.grams.sum(axis=0), past.integrals),
         trim_noise=spread.bands[:, 0] * total.energy,
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
-        lag_test=lag_test,
-        instrument_strength=instrument_strength,
-        selection_bias_factors=selection_bias_factors(
-            equations, solution, spread, instrument_strength, gram, *state.model.prior
-        ),
-        anderson_rubin=weak_instruments.anderson_rubin_bounds(
-            equations, table, solution, gram, spread, noise_alone, mean, gusts
-        ),
-        outside_model=none,
-        contradicted=none,
+        instruments=InstrumentChecks(strength, selection_bias, bounds),
+        tests=ModelTests(*_lag_test(state, solution, spread, gram), none, none),
         systematic=_systematic(state, total, solution, spread, inflation),
     )
     state.changes.monitor.references.append(Reference(now, equations, solution, spread))
@@ -167,8 +158,8 @@ def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[Inst
 def _lag_test(state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[LagTest, int]:
     """The test for actuator lag, carried out every few pieces, and the number of pieces when it was."""
     latest, pieces = state.latest, state.finished.pieces
-    if latest is not None and pieces - latest.timed < TIMING_EVERY:
-        return latest.lag_test, latest.timed
+    if latest is not None and pieces - latest.tests.lag_tested < TIMING_EVERY:
+        return latest.tests.lag, latest.tests.lag_tested
     return actuator_lag_test.examine(state.equations, state.model.layout, solution, spread, gram), pieces
 
 

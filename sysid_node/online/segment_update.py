@@ -19,7 +19,7 @@ from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.segment_information import fading, measure_noise_moments
 from sysid_node.online.segment_solution import solve_with_servos
-from sysid_node.online.state import EstimatorState, current_lines
+from sysid_node.online.state import EstimatorState, FinishedSums, current_lines
 
 Array = NDArray[np.float64]
 SOON = 20.0  # s of data up to which everything is renewed with every piece, then with every second, third, ...
@@ -89,5 +89,5 @@ def finish_segment(state: EstimatorState) -> None:
         detection.compare(state.model.equations, state.changes.monitor, state.changes.excited, memory(state))
         if state.model.settings.window:
             finished.in_window.append((state.transform.last, present))
-        latest.base, latest.integrals = finished.information.grams.sum(axis=0), finished.information.integrals
+        latest.finished = FinishedSums(finished.information.grams.sum(axis=0), finished.information.integrals)
     state.segment.information = None

@@ -73,26 +73,47 @@ class ValidityBasis:
 
 
 @dataclass
+class FinishedSums:
+    """Sums over the finished segments at a renewal, to which the transform of the present one is added."""
+
+    gram: Array  # (W, W)
+    integrals: Array  # (W,) of the signals
+
+
+@dataclass(frozen=True)
+class InstrumentChecks:
+    """How far estimates by the instruments can be trusted."""
+
+    strength: InstrumentStrength  # of the instruments on the regressors
+    selection_bias_factors: Array  # (P, C) see ``selection_bias``
+    anderson_rubin: AndersonRubinBounds  # of the intervals
+
+
+@dataclass(frozen=True)
+class ModelTests:
+    """Tests of the model by the data."""
+
+    lag: LagTest  # whether measured deflections are late
+    lag_tested: int  # number of pieces finished when ``lag`` was found
+    outside_model: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
+    contradicted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
+
+
+@dataclass
 class SegmentSolution:
     """What ``renew`` last found; the estimates use it until the next renewal."""
 
     time: float  # s, when it was found
     pieces: int  # number of pieces finished by then
-    timed: int  # ... when ``lag_test`` was last carried out
     total: Information
     solution: Solution
     uncertainty: Uncertainty
     compensation: Array | None  # noise's part of the normal equations, see ``least_squares.bias_of``
-    base: Array  # (W, W) Gram matrix of the finished segments
-    integrals: Array  # (W,) of the finished segments' signals
+    finished: FinishedSums
     trim_noise: Array  # (C,) squared error of the coefficients' integrals
     factors: Array  # (C, P) squared standard error over (P_jj residual)
-    lag_test: LagTest  # whether measured deflections are late
-    instrument_strength: InstrumentStrength  # of the instruments on the regressors
-    selection_bias_factors: Array  # (P, C) see ``selection_bias_factors``
-    anderson_rubin: AndersonRubinBounds  # of the intervals
-    outside_model: NDArray[np.bool_]  # (C,) coefficients that the model does not explain at present
-    contradicted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
+    instruments: InstrumentChecks
+    tests: ModelTests
     systematic: SystematicErrors | None = None  # None where all is exact
     basis: ValidityBasis | None = None  # made when first wanted
 

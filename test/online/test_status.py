@@ -1,5 +1,7 @@
 """Statuses as numbers and as words, and what is decided of them at every sample."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plant import exact_flight, fly, made_aircraft, multisteps
@@ -68,7 +70,8 @@ def test_intervals_without_an_end_are_not_valid() -> None:
     assert current is not None and latest is not None
     good = judge(state, latest, current, state.transform.last) == status.OK
     assert good.any()
-    latest.anderson_rubin = latest.anderson_rubin._replace(curve=np.full(good.shape, 1e12))
+    unbounded = latest.instruments.anderson_rubin._replace(curve=np.full(good.shape, 1e12))
+    latest.instruments = replace(latest.instruments, anderson_rubin=unbounded)
     latest.basis = None
     assert not (judge(state, latest, current, state.transform.last) == status.OK).any()
     assert all(np.isinf(d.upper) for d in estimate_of(state, current).derivatives.values())

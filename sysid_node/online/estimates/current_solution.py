@@ -36,10 +36,10 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
     if latest is None:
         return None
     lines, time = current_lines(state), state.transform.last
-    integrals = latest.integrals + lines[-1]
+    integrals = latest.finished.integrals + lines[-1]
     impulses = edges(state.model.spectrum.omega, state.segment.start, time) if state.servos else None
     gram = products(lines, state.line_model, impulses)
-    gram += latest.base
+    gram += latest.finished.gram
     growth, noise = growth_since(latest, time), latest.compensation
     solution = least_squares.solve(equations, gram, None if noise is None else noise * growth)
     size = np.abs(solution.inverse.diagonal())

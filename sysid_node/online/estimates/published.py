@@ -74,7 +74,7 @@ def _budget(state: EstimatorState, latest: SegmentSolution, current: CurrentSolu
 def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:
     """(D, 6) of each derivative: value, standard error, its statistical and systematic part, ends of the interval."""
     values, variances, basis = current.values, current.variances, validity_basis(state, latest)
-    below, above = weak_instruments.interval_arms(basis.squares * variances, latest.anderson_rubin)
+    below, above = weak_instruments.interval_arms(basis.squares * variances, latest.instruments.anderson_rubin)
     statistical = np.sqrt(variances)
     if latest.systematic is None:
         return np.stack([values, statistical, statistical, basis.systematic, values - below, values + above], axis=-1)

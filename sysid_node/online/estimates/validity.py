@@ -42,12 +42,11 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     c = table.coefficient
     start, _, stop = state.model.settings.frequencies
     # an equation with one weak instrument is solved by least squares, which gusts bias
-    strength = np.where(equations.belongs > 0.0, latest.instrument_strength.strength[:, None], np.inf).min(axis=0)
+    strength = np.where(equations.belongs > 0.0, latest.instruments.strength.strength[:, None], np.inf).min(axis=0)
     objections, squares = _objections(state, latest), student_95(freedom)[c] ** 2
-    cautions = np.where(
-        table.offset, latest.selection_bias_factors.max(axis=0)[c], latest.selection_bias_factors[table.unknown, c]
-    )
-    caution, longest = np.maximum(cautions, 1.0), latest.anderson_rubin.longest(squares)
+    factors = latest.instruments.selection_bias_factors
+    cautions = np.where(table.offset, factors.max(axis=0)[c], factors[table.unknown, c])
+    caution, longest = np.maximum(cautions, 1.0), latest.instruments.anderson_rubin.longest(squares)
     systematic = _systematic(state, latest)
     stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
     return ValidityBasis(
@@ -77,8 +76,9 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     table, words = state.model.table, state.model.vocabulary
     c = table.coefficient
     objections = np.zeros(c.size, np.uint8)
-    biased = latest.lag_test.biased[table.unknown, c] & ~table.offset
-    objections[biased] = [words.code(f"{latest.lag_test.blamed_control[i]} not on time") for i in c[biased].tolist()]
+    lag = latest.tests.lag
+    biased = lag.biased[table.unknown, c] & ~table.offset
+    objections[biased] = [words.code(f"{lag.blamed_control[i]} not on time") for i in c[biased].tolist()]
     objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
     if not state.inputs.thrust_known:
         objections[table.needs_thrust] = status.THRUST
@@ -87,8 +87,8 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
         for i, name in enumerate(table.names):
             reason = flow_angle_filter.why_unknown(state.flow, at, name, structure[name.partition("_")[0]])
             objections[i] = words.code(reason) if reason else objections[i]
-    objections[latest.contradicted[c]] = status.CONTRADICTED
-    objections[latest.outside_model[c]] = status.OUTSIDE
+    objections[latest.tests.contradicted[c]] = status.CONTRADICTED
+    objections[latest.tests.outside_model[c]] = status.OUTSIDE
     return objections
 
 
