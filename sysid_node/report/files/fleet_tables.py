@@ -76,7 +76,7 @@ def _population(summary: FleetSummary) -> Table:
 def _tails(summary: FleetSummary) -> Table:
     """Each tail's derivative: its own mean, its estimate with the fleet, and how far it lies from the others."""
     head = (
-        "aircraft", "tail", "derivative", "flights", "own", "own_error", "level", "level_error",
+        "aircraft", "tail", "derivative", "flights", "own", "own_error", "level", "level_error", "systematic_error",
         "shrinkage", "distance", "distance_error", "adjusted_p", "stands_out", "next_value", "next_tolerance",
     )  # fmt: skip
     rows: list[Row] = []
