@@ -14,10 +14,8 @@ from scipy import stats
 
 from sysid_node.flight.record import Array
 
-_DRAWS = (2_000, 100_000)  # the second where the first says that it matters
+_DRAWS = 4_000  # which give a p-value to about 2 % of itself
 _MATTERS = 0.05
-_ENOUGH = 30  # exceedances for which the simulated p-value is within about 20 %
-_BLOCK = 20_000
 
 
 @dataclass(frozen=True)
@@ -35,8 +33,7 @@ def compare_contrasts(value: Array, covariance: Array, courses: Array, freedom: 
 
     Amplitude and error are those of generalised least squares. The variances count as known but for a common factor
     with so many degrees of ``freedom``, so that each statistic has Student's t distribution. The p-value of the
-    largest is simulated; it is Bonferroni's bound where fewer than 30 draws exceed it (it is close there) and
-    where the largest would not be significant alone.
+    largest is simulated; where the largest would not be significant alone, it is Bonferroni's bound.
     """
     inverse = np.linalg.inv(covariance)
     level = inverse.sum(axis=0)
@@ -51,25 +48,21 @@ def compare_contrasts(value: Array, covariance: Array, courses: Array, freedom: 
 
 
 def _p_value(largest: float, whitened: Array, freedom: int, seed: int) -> float:
-    """Probability that the largest of |whitened e| / sqrt(chi2 / freedom) exceeds ``largest``."""
+    """Probability that the largest of |whitened e| / w, with w^2 ~ chi2 / freedom, exceeds ``largest``.
+
+    Importance sampling of Naiman & Priebe (2001, J. Comput. Graph. Stat. 10:296): one contrast is drawn, and the
+    estimates given that it exceeds; the p-value is Bonferroni's bound times the mean of one over the number of
+    contrasts that exceed. It is as exact for one in a million as for one in twenty.
+    """
     alone = float(2.0 * stats.t.sf(largest, freedom))
-    bound = float(min(1.0, whitened.shape[0] * alone))
+    bound = whitened.shape[0] * alone
     if alone > _MATTERS:  # not significant even without the search
-        return bound
+        return min(1.0, bound)
     generator = np.random.default_rng(seed)
-    for draws in _DRAWS:
-        exceeding = _exceedances(generator, draws, largest, whitened, freedom)
-        simulated = (exceeding + 1.0) / (draws + 1.0)
-        if simulated > _MATTERS:
-            break
-    return simulated if exceeding >= _ENOUGH else bound
-
-
-def _exceedances(generator: np.random.Generator, draws: int, largest: float, whitened: Array, freedom: int) -> int:
-    found = 0
-    for start in range(0, draws, _BLOCK):
-        count = min(_BLOCK, draws - start)
-        normal = generator.standard_normal((whitened.shape[1], count))
-        scale = np.sqrt(generator.chisquare(freedom, count) / freedom)
-        found += int((np.abs(whitened @ normal).max(axis=0) > largest * scale).sum())
-    return found
+    chosen = whitened[generator.integers(whitened.shape[0], size=_DRAWS)].T  # (n, draws)
+    t = stats.t.isf(0.5 * alone * generator.random(_DRAWS), freedom)
+    scale = np.sqrt(generator.gamma(0.5 * (freedom + 1), 2.0 / (1.0 + t**2 / freedom)) / freedom)
+    normal = generator.standard_normal(chosen.shape)
+    normal += (t * scale - (chosen * normal).sum(axis=0)) * chosen
+    exceeding = (np.abs(whitened @ normal) > largest * scale).sum(axis=0)
+    return min(1.0, bound * float(np.mean(1.0 / np.maximum(exceeding, 1))))

@@ -93,7 +93,7 @@ def forest(population: Population) -> Figure:
     layout = {
         "shapes": [band],
         "xaxis": axis(population.series.name),
-        "yaxis": axis("", type="category", nticks=len(names), tickfont={"size": 10}),
+        "yaxis": axis("", type="category", dtick=1, tickfont={"size": 10}),
         "hovermode": "closest",
         "margin": {"l": 80, "r": 10, "t": 10, "b": 40},
     }
