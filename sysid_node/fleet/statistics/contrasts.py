@@ -57,7 +57,7 @@ def _p_value(largest: float, whitened: Array, freedom: int, seed: int) -> float:
     alone = float(2.0 * stats.t.sf(largest, freedom))
     bound = whitened.shape[0] * alone
     if alone > _MATTERS:  # not significant even without the search
-        return min(1.0, bound)
+        return float(min(1.0, bound))
     generator = np.random.default_rng(seed)
     chosen = whitened[generator.integers(whitened.shape[0], size=_DRAWS)].T  # (n, draws)
     t = stats.t.isf(0.5 * alone * generator.random(_DRAWS), freedom)
@@ -65,4 +65,4 @@ def _p_value(largest: float, whitened: Array, freedom: int, seed: int) -> float:
     normal = generator.standard_normal(chosen.shape)
     normal += (t * scale - (chosen * normal).sum(axis=0)) * chosen
     exceeding = (np.abs(whitened @ normal) > largest * scale).sum(axis=0)
-    return min(1.0, bound * float(np.mean(1.0 / np.maximum(exceeding, 1))))
+    return float(min(1.0, bound * np.mean(1.0 / np.maximum(exceeding, 1))))
