@@ -34,7 +34,7 @@ SHARE, _LEAST = 0.1, 0.02
 _BAND = 4.0
 
 _READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "V", "alpha", "beta")
-_SIDEWAYS = ("ay", "p", "r", "beta", "phi", "psi", "da", "dr")
+_SIDEWAYS = ("ay", "p", "r", "beta", "da", "dr")
 _SURFACES = {"elevator": "de", "aileron": "da", "rudder": "dr"}
 _IN_PLANE = {"CL": ("0", "alpha", "q"), "CD": ("0", "alpha"), "Cm": ("0", "alpha", "q")}
 _OF_PLANE = dict.fromkeys(("CY", "Cl", "Cn"), ("0", "beta", "p", "r"))
