@@ -27,6 +27,12 @@ Array = NDArray[np.float64]
 #: Largest reading that a flight can reach without having diverged, SI units.
 _LARGEST_READING = 1e4
 
+#: Span of the aircraft for which the effects state how far a place may be off, m: a small UAV's.
+_SPAN = 1.5
+
+#: Effects by which something sits elsewhere than in the file.
+_PLACES = frozenset({"cg_shift", "imu_lever_arm", "vane_lever_arm", "thrust_line_offset", "thrust_yaw"})
+
 _rollout = jax.jit(rollout, static_argnums=0)
 
 
@@ -92,8 +98,18 @@ class Simulator:
 
     @cached_property
     def scales(self) -> Array:
-        """A plausible size (P,) of each entry, 1 sigma; for ``derivative_error`` the aircraft file's tolerances."""
+        """A plausible size (P,) of each entry, 1 sigma; for ``derivative_error`` the aircraft file's tolerances.
+
+        Places of the CG, of sensors and of the thrust line are off in proportion to the aircraft's size: the effects
+        state what is plausible at a span of ``_SPAN``.
+        """
         table = {f"derivative_error.{n}": d.tolerance for n, d in self.aircraft.derivatives.items()}
+        larger = self.aircraft.geometry.b / _SPAN
+        table |= {
+            name: larger * parameter.scale
+            for name, (effect, parameter) in zip(self.names, self.parameters, strict=True)
+            if effect in _PLACES and parameter.unit == "m"
+        }
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([table.get(name) or parameter.scale for name, (_, parameter) in pairs])
 

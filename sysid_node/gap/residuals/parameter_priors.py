@@ -21,6 +21,9 @@ _STAMP_EFFECTS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay
 
 _STRUCTURAL_FREQUENCY = ("structural_mode", "frequency")
 
+#: Farthest that an instrument may be off its place, in spans: a nose boom is shorter than a fuselage.
+_FARTHEST = {"vane_lever_arm": 1.5, "imu_lever_arm": 1.0}
+
 #: Standard deviation of an onset's prior, s: it may lie at any time of the flight.
 _ONSET_SIGMA = 100.0
 
@@ -36,6 +39,10 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
         for effect, parameter in table
     ]  # fmt: skip
     upper = [parameter.upper for _, parameter in table]
+    for place, (effect, _) in enumerate(table):
+        if effect in _FARTHEST:  # of the file's place, in spans
+            room = _FARTHEST[effect] * simulator.aircraft.geometry.b
+            lower[place], upper[place] = max(lower[place], -room), min(upper[place], room)
     for place, (effect, parameter) in enumerate(table):
         shared = EFFECTS[effect].shared
         if shared and parameter.name in (*simulator.layout.controls, THROTTLE):  # the sum with the shared is bounded

@@ -13,7 +13,7 @@ EFFECT = Effect(
     equation="a' = a + dw/dt x arm + w x (w x arm), arm' = arm + (x, y, z)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (position of the accelerometers)",
     parameters=fixed(
-        *(Parameter(n, "m", f"IMU off its stated place along body {n}", 0.1, lower=-5.0, upper=5.0) for n in "xyz")
+        *(Parameter(n, "m", f"IMU off its stated place along body {n}", 0.1, lower=-50.0, upper=50.0) for n in "xyz")
     ),
 )
 

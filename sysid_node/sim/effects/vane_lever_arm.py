@@ -13,7 +13,10 @@ EFFECT = Effect(
     equation="(u, v, w)' = (u, v, w) + w x arm, arm' = arm + (x, y, z)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (position of the vanes)",
     parameters=fixed(
-        *(Parameter(n, "m", f"probe off its stated place along body {n}", 0.1, lower=-10.0, upper=10.0) for n in "xyz")
+        *(
+            Parameter(n, "m", f"probe off its stated place along body {n}", 0.1, lower=-100.0, upper=100.0)
+            for n in "xyz"
+        )
     ),
 )
 

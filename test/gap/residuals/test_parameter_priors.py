@@ -1,5 +1,7 @@
 """Bounds and priors of parameters; truth: the effects' own definitions, and what is said beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,18 @@ def test_most_bounds_are_the_effects_own(simulator) -> None:
 def test_some_lower_bounds_are_narrower(simulator, name: str, lowest: float) -> None:
     low, _ = bounds(simulator, [simulator.names.index(name)])
     assert low[0] == lowest
+
+
+def test_instruments_may_be_off_their_place_in_proportion_to_the_span(aircraft) -> None:
+    """A transport's nose boom reaches 13 m ahead of its CG (docs/results/real_flights.md, ATTAS: span 21.5 m)."""
+    large = Simulator(replace(aircraft, geometry=replace(aircraft.geometry, b=21.5)), 50.0)
+    low, high = bounds(large, [large.names.index("vane_lever_arm.x")])
+    assert low[0] < -13.0 and high[0] > 13.0
+    small, index = Simulator(aircraft, 50.0), large.names.index("imu_lever_arm.x")
+    ratio = 21.5 / aircraft.geometry.b
+    assert large.scales[index] == pytest.approx(ratio * small.scales[index])
+    assert bounds(large, [index])[1][0] == pytest.approx(ratio * bounds(small, [index])[1][0])
+    assert large.scales[large.names.index("mass_error.error")] == small.scales[small.names.index("mass_error.error")]
 
 
 def test_every_neutral_value_but_a_jam_and_a_mode_lies_within_its_bounds(simulator) -> None:
