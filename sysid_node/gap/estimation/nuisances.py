@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import DELAY_EFFECTS, Aircraft
 from sysid_node.aircraft.names import LATERAL
+from sysid_node.aircraft.reading.body import default_noise_bias
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.air_motion import is_gusty
@@ -37,7 +38,7 @@ CLOCKS = {
     "air_data_delay": ("air_data_delay", "imu_delay"),
 }
 
-#: Biases, and the sensor whose noise in the aircraft file is the bias's standard deviation.
+#: Biases, and the sensor of each.
 _BIASES = {
     **{f"imu_bias.{n}": "accel" for n in ("ax", "ay", "az")},
     **{f"imu_bias.{n}": "gyro" for n in "pqr"},
@@ -129,7 +130,7 @@ def nuisances_of(
     sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
     believed = believed_effects(model.simulator)
     sigma |= believed
-    sigma |= {n: aircraft.noise[s] for n, s in _BIASES.items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
+    sigma |= {n: s for n, s in _biases(aircraft).items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
     sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
     if any(is_gusty(m) for m in models):
         sigma |= _turning_air(aircraft)
@@ -145,6 +146,13 @@ def nuisances_of(
     wider = [max(given[n] / s, 1.0) if n in given else 1.0 for n, s in sigma.items()]
     factors = THRESHOLDS.priors.widening * np.array(wider)
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared, factors=factors)
+
+
+def _biases(aircraft: Aircraft) -> dict[str, float]:
+    """1 sigma of every bias by name: the file's ``noise.bias``, or the noise of a sample where the file states none."""
+    stated = dict(aircraft.noise_bias) != default_noise_bias(ideal=aircraft.ideal)
+    sigma = {sensor: aircraft.noise_bias[sensor] if stated else 0.0 for sensor in _BIASES.values()}
+    return {name: sigma[sensor] or aircraft.noise[sensor] for name, sensor in _BIASES.items()}
 
 
 #: Effects of the file that are no nuisance: what differs from flight to flight, and the beginning of a failure.

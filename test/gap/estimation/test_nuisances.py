@@ -85,3 +85,17 @@ def test_all_start_at_the_files_values(aircraft, plain_model) -> None:
     moved = stepped(fit, np.full(now.size, 1e3)).flights[0].point
     indices = list(fit.nuisances.indices)
     np.testing.assert_allclose(moved[indices], simulator.neutral()[indices] + limit[fit.nuisances.places(0)])
+
+
+def test_a_bias_is_allowed_for_within_the_stated_bias_and_not_the_noise(aircraft, plain_model) -> None:
+    stated = {"accel": 0.2, "gyro": 0.001, "airspeed": 0.3, "alpha": 0.02, "beta": 0.01}
+    names = plain_model.simulator.names
+
+    def sigma(known) -> dict[str, float]:
+        found = nuisances_of(known, plain_model)
+        return dict(zip([names[i] for i in found.indices], found.sigma.tolist(), strict=True))
+
+    biases = sigma(replace(aircraft, noise_bias=stated))
+    assert (biases["imu_bias.az"], biases["imu_bias.q"], biases["vane_bias.alpha"]) == (0.2, 0.001, 0.02)
+    usual = sigma(aircraft)  # its file states none
+    assert (usual["imu_bias.az"], usual["imu_bias.q"]) == (aircraft.noise["accel"], aircraft.noise["gyro"])
