@@ -11,6 +11,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.instruments.liml import liml_estimate
+from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import Cause
@@ -37,6 +38,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "held_out": found.held_out,
             "forces_and_kinematics": {**gap_content(found.gap), "window_s": found.models[0].windows.length},
         },
+        "not_excited": quiet_motions(found.models),
         "air_motion": found.air_motion if found.models[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],

@@ -36,6 +36,10 @@ class Admission:
     excitation: float = _threshold(
         6.0, "1", "power over the power of the sensors' noise below which a flight supports no verdict"
     )
+    share_of_command: float = _threshold(
+        0.05, "1", "angular acceleration that is commanded, as a share of the largest, from which a motion is excited"
+    )
+    thrust: float = _threshold(0.3, "m/s^2", "acceleration by the thrust (rms) from which it excites the motion")
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,15 @@ class Acceptance:
         0.2, "1", "error (rms), as a share of the motion, whose removal counts however much weather is left"
     )
 
+    plausible: float = _threshold(
+        20.0, "1", "size in multiples of what real parts show, beyond its error, from which no cause is that large"
+    )
+    joint: float = _threshold(
+        4.5,
+        "1 sigma",
+        "deviation of all derivatives together from the file from which their tolerances cannot excuse it",
+    )
+
     def log_bayes_factor(self, searched: int) -> float:
         """Nats above which a candidate is accepted that was picked from so many effects (Bonferroni)."""
         return log(self.probability / (1.0 - self.probability)) + log(searched)
@@ -191,6 +204,19 @@ class Validation:
     motion: float = _threshold(4.0, "1", "power over that of the sensors' noise from which a channel or reading counts")
     chance: float = _threshold(
         1.5, "1", "ratio of an error to the noise floor that chance allows: half a minute of turbulence scatters by 1/4"
+    )
+    beyond_weather: float = _threshold(
+        0.25, "1", "share of a reading's error power that causes must take away where weather could account for it"
+    )
+    large_improvement: float = _threshold(
+        0.7, "1", "ratio of the error with causes to the file's, by one measure, from which a tie by another is no veto"
+    )
+    tie: float = _threshold(1.05, "1", "ratio of the error with causes to the file's up to which it is a tie")
+    unexcused: float = _threshold(
+        1.1, "1", "largest ratio of the error with a cause to that of derivatives that no tolerances together excuse"
+    )
+    instruments: float = _threshold(
+        0.5, "1", "share of the air's apparent power that is left from which errors of the instruments account for it"
     )
     discrepancy: float = _threshold(
         0.03, "1", "1 sigma by which a size is off beyond chance, as a share of itself", "bench/gap/size_errors.py"

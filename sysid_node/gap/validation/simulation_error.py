@@ -18,6 +18,7 @@ from sysid_node.aircraft.names import LONGITUDINAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.flightdata import thrust
+from sysid_node.gap.residuals.excited_axes import excited_motions, of_motions
 from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -89,6 +90,7 @@ def gap_of_errors(models: Sequence[ResidualModel], tables: Sequence[Array]) -> G
     unread = {angle for flight in flights for angle in flight.inferred}
     unread |= thrust.THRUST_READINGS if any(not flight.metered for flight in flights) else set()
     counted = np.array([(lateral or name in LONGITUDINAL_SIGNALS) and name not in unread for name in READINGS])
+    counted &= of_motions(READINGS, excited_motions([evidence.model for evidence in final.flights]))
     counted &= motion.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
     if not counted.any():
         return None
@@ -103,7 +105,8 @@ def weather_suffices(models: Sequence[ResidualModel]) -> bool:
     tables = [_table(v, *[[v.simulator.neutral()] * len(window_groups(v))] * 2) for v in models if can_be_simulated(v)]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
-    _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)
+    excited = of_motions(READINGS, excited_motions(models))
+    _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)[:, excited]
     return weather_accounts_for(before, np.array(floors))
 
 

@@ -1,8 +1,8 @@
 """The gap by frequency: errors of forces, moments and kinematics on flight not fitted, beside their noise floor.
 
 The error of a channel is the root of its residual's power, up to 4 Hz, over the power of its motion about the mean, in
-the windows of ``residuals.windowed_spectra``. All channels that moved count alike. Intervals are by a bootstrap over
-groups of windows.
+the windows of ``residuals.windowed_spectra``. All channels count alike that moved and that commands excite.
+Intervals are by a bootstrap over groups of windows.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
 from sysid_node.gap.instruments.overidentification import OveridentificationTest
+from sysid_node.gap.residuals.excited_axes import excited_channels
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex, power_of
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -50,7 +51,7 @@ class _Powers:
     measured: Array
     noise: Array
     errors: Array  # by the file, by the fitted derivatives, with the causes
-    counted: NDArray[np.bool_]  # (12,) channels that moved
+    counted: NDArray[np.bool_]  # (12,) channels that moved, of a motion that the commands excite
 
     def table(self, structure: Array) -> Array:
         """Powers (4, G, 12) of the errors and of the noise floor, where a share (12,) of what is left is structure."""
@@ -89,7 +90,7 @@ def _powers_of(base: Evidence, after: Evidence) -> _Powers:
     fitted = ([flight.residual for flight in evidence.flights] for evidence in (base, after))
     errors = np.array([_powers(residuals, models) for residuals in (before, *fitted)])
     moved = measured.sum(axis=0) > THRESHOLDS.validation.motion * noise.sum(axis=0)
-    return _Powers(measured, noise, errors, models[0].axes & moved)
+    return _Powers(measured, noise, errors, models[0].axes & moved & excited_channels(models))
 
 
 def gap_from(overall: Array, draws: Array, channels: dict[str, dict[str, float]]) -> Gap:

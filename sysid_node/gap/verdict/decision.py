@@ -16,7 +16,7 @@ gives the verdict:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,7 @@ class VerdictScores:
     sampling: Array  # power that stamps leave that are off by chance within a sample, as a share of the motion, and
     # that a surrogate leaves of the simulator that it stands for
     simulation: SimulationScores | None  # none where no short flight can be simulated
+    excited: Array = field(default_factory=lambda: np.ones(12))  # one where the commands excite the motion, else zero
 
 
 @dataclass(frozen=True)
@@ -139,9 +140,9 @@ def structured_channels(scores: VerdictScores, thresholds: Thresholds = THRESHOL
 
 
 def structure_left(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> Array:
-    """Power (12,) of what is left and is structure beyond chance, as a share of the motion."""
+    """Power (12,) of what is left and is structure beyond chance, as a share of the motion, where this is excited."""
     beyond_chance = scores.structure_deviations > thresholds.instruments.chance
-    share = np.where(beyond_chance, scores.structure_share, 0.0)
+    share = np.where(beyond_chance, scores.structure_share, 0.0) * scores.excited
     return np.asarray(share * scores.power_after / scores.motion)
 
 
@@ -177,7 +178,7 @@ def structure_exceeds_causes(scores: VerdictScores, thresholds: Thresholds = THR
 
 def explained_share(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> float:
     """Share that the causes remove of what derivatives leave and is not noise, all channels together; 1 of nothing."""
-    removed = max(float(((scores.power_before - scores.power_after) / scores.motion).sum()), 0.0)
+    removed = max(float(((scores.power_before - scores.power_after) / scores.motion * scores.excited).sum()), 0.0)
     whole = removed + float(structure_left(scores, thresholds).sum())
     return removed / whole if whole > 0.0 else 1.0
 

@@ -12,6 +12,7 @@ from sysid_node.gap.estimation.nuisances import CLOCKS
 from sysid_node.gap.estimation.predictive_density import Evidence
 from sysid_node.gap.instruments.excitation import externally_excited
 from sysid_node.gap.residuals.admissibility import signal_to_noise
+from sysid_node.gap.residuals.excited_axes import excited_channels
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.calibration import is_supported_but_misspecified
@@ -46,6 +47,7 @@ def measure(models: Sequence[ResidualModel], attribution: Attribution, check: Ch
         structure_share=structure.share,
         sampling=sampling_power(attribution.chosen.fit) + surrogate_error(models) ** 2,
         simulation=_simulation_scores(check.simulation_gap),
+        excited=excited_channels(check.models).astype(float),
     )
 
 

@@ -66,6 +66,7 @@ STRUCTURED = {
         ({"externally_excited": False}, "unsupported", "autopilot"),
         ({"externally_excited": False, "causes": (LAG,)}, "unsupported", "autopilot"),
         (STRUCTURED, "unknown_effect", "no effect explains it"),
+        ({**STRUCTURED, "excited": np.array([0.0, *[1.0] * 11])}, "no_gap", "nothing that matters"),
         ({"doubted": (MISSPECIFIED,)}, "unknown_effect", "misspecified"),
         ({"doubted": (replace(MISSPECIFIED, replaced=True),)}, "no_gap", "nothing that matters"),
         ({"doubted": (replace(MISSPECIFIED, supported_but_misspecified=False),)}, "no_gap", "nothing that matters"),

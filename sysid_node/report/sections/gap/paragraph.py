@@ -9,6 +9,7 @@ import numpy as np
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
+from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.validation.simulation_error import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.report.sections.gap.names import (
@@ -132,6 +133,12 @@ def _air_motion(found: Diagnosis) -> str:
     )
 
 
+def _quiet(found: Diagnosis) -> str:
+    """Which motion the commands hardly excite, of which nothing is said."""
+    quiet = quiet_motions(found.models)
+    return f"The commands hardly excite the {quiet[0]} motion: nothing here is said about it." if quiet else ""
+
+
 def _unmeasured(found: Diagnosis) -> str:
     """Which signals were not measured, and what the diagnosis cannot say without them."""
     angles = dict.fromkeys(angle for model in found.models for angle in model.flight.inferred)
@@ -191,4 +198,4 @@ def _parameter(name: str, value: float, error: float, unit: str) -> str:
     return f"{parameter_words(name)} {with_interval(value, 1.96 * error)} {unit}".strip()
 
 
-_SENTENCES = (_size, _findings, _surrogate, _air_motion, _unmeasured, _left_out)
+_SENTENCES = (_size, _findings, _surrogate, _quiet, _air_motion, _unmeasured, _left_out)
