@@ -3,9 +3,11 @@
 A significant effect is not enough: a delay of a millisecond may be beyond doubt and of no interest. An effect is
 accepted where all of these hold:
 
-1. it is not a time within one sample of the slowest topic, which is a matter of sampling;
+1. it is not a time within one sample of the slowest topic, which is a matter of sampling, and not larger than real
+   parts show;
 2. with it the explanation predicts flight that was not fitted better, beyond doubt;
 3. on some channel it removes a share of the remainder that matters, and a share of the whole gap comes back without it;
+   or without it the derivatives would have to be off as no tolerances together excuse, and with it they need not;
 4. its log Bayes factor, from what the commands predict, makes up for its having been picked from many effects. Gusts
    can imitate the first three, and a model that is not exact repeats its error with every manoeuvre.
 
@@ -97,6 +99,14 @@ class ComparisonScores(Protocol):
     def simulator_error(self) -> Array:
         """Error (12,) of the simulator's model, as a share of the motion; zero where the simulator itself is known."""
 
+    @property
+    def size(self) -> float:
+        """Largest of its sizes beyond its standard error, in multiples of what real parts show."""
+
+    @property
+    def excuse(self) -> tuple[float, float]:
+        """Deviation of all derivatives together from the file, standard deviations from chance: without and with it."""
+
 
 @dataclass(frozen=True)
 class ComparisonTable:
@@ -114,6 +124,8 @@ class ComparisonTable:
     log_bayes_factor: float
     searched: int
     simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    size: float = 0.0
+    excuse: tuple[float, float] = (0.0, 0.0)
 
 
 def is_accepted(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -129,9 +141,12 @@ def rejection(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> 
     limits = thresholds.acceptance
     if scores.time is not None and abs(scores.time) < scores.sample_period:
         return "its time is within one sample"
+    if scores.size > limits.plausible:
+        return "no real part is off so far"
     if not predicts_better(scores.probability, thresholds):
         return "it does not predict better beyond doubt"
-    if not np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap)):
+    matters = np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap))
+    if not (matters or relieves(scores.excuse, limits)):
         return "it removes too little"
     if not scores.log_bayes_factor > limits.log_bayes_factor(scores.searched):
         return "what the commands predict does not support it"
@@ -141,6 +156,15 @@ def rejection(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> 
 def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> bool:
     """Whether a probability that one explanation predicts better than another is beyond doubt."""
     return probability > thresholds.acceptance.probability
+
+
+def relieves(excuse: tuple[float, float], limits: Acceptance = THRESHOLDS.acceptance) -> bool:
+    """Whether the derivatives would be off together as their tolerances cannot excuse, and are not with the candidate.
+
+    A mass that is a fifth off shifts every coefficient by two tolerances. Each alone is excused; that all are is not.
+    """
+    without, with_it = excuse
+    return without > limits.joint and with_it < min(0.5 * without, limits.joint)
 
 
 def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:

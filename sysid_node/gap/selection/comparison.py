@@ -19,7 +19,8 @@ from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.instruments.overidentification import overidentification_of
 from sysid_node.gap.residuals.air_motion import is_gusty
-from sysid_node.gap.residuals.residual_model import CHANNELS
+from sysid_node.gap.residuals.excited_axes import excited_channels
+from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
 from sysid_node.gap.selection.fitted_set import FittedSet
@@ -65,9 +66,14 @@ class Comparison:
 
     @cached_property
     def motion(self) -> Array:
-        """Power (12,) of what was measured, about the windows' means."""
+        """Power (12,) of what was measured, about the windows' means.
+
+        Infinite for the coefficients of a motion that no command excites, so that nothing there matters.
+        """
         flights = self.fitted.evidence.flights
-        return np.asarray(sum((np.abs(flight.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for flight in flights))
+        power = sum((np.abs(flight.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for flight in flights)
+        quiet = ~excited_channels([flight.model for flight in flights]) & (np.arange(len(CHANNELS)) < len(COEFFICIENTS))
+        return np.where(quiet, np.inf, power)
 
     @cached_property
     def power(self) -> RemainingPower:
@@ -118,9 +124,44 @@ class Comparison:
         """Error (12,) of the simulator's model, as a share of the motion."""
         return np.asarray(np.max([model.simulator_error for model in self.fitted.fit.models], axis=0))
 
+    @property
+    def size(self) -> float:
+        """Largest size of what was added beyond its standard error, in multiples of what real parts show."""
+        fit, added = self.fitted.fit, self.fitted.added
+        if added is None or fit.information is None:
+            return 0.0
+        sizes = [i for i in added.indices if fit.simulator.parameters[i][1].switch]
+        errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))[[fit.indices.index(i) for i in sizes]]
+        changes = np.abs(fit.flights[0].point[sizes] - fit.simulator.neutral()[sizes])
+        return float(np.max((changes - 2.0 * errors) / fit.simulator.scales[sizes], initial=0.0))
+
+    @cached_property
+    def excuse(self) -> tuple[float, float]:
+        """Deviations of all derivatives together from the file without and with what was added."""
+        return joint_deviation(self.without.fit), joint_deviation(self.fitted.fit)
+
     def table(self) -> ComparisonTable:
         """All scores as plain values."""
         return ComparisonTable(**{entry.name: getattr(self, entry.name) for entry in fields(ComparisonTable)})
+
+
+def joint_deviation(fit: CandidateFit) -> float:
+    """Standard deviations by which the derivatives' squared distance from the file exceeds what tolerances give.
+
+    The distance is in tolerances. Of a derivative that the flights determine its expectation is one, of another the
+    share of its prior's variance that they take away (the prior predictive check of Box (1980), J. R. Stat. Soc. A
+    143(4), for the parameters).
+    """
+    assert fit.information is not None
+    now, spread, _ = fit.stacked
+    shared = int(fit.nuisances.shared.sum())
+    names = [fit.simulator.names[i] for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    places = [k for k, name in enumerate(names[:shared]) if name.startswith("derivative_error")]
+    variance = np.diag(fit.covariance)[len(fit.indices) :]
+    known = np.clip(1.0 - variance[places] / spread[places] ** 2, 0.0, 1.0)
+    expected = float(known.sum())
+    distance = float(np.sum((now[places] / spread[places]) ** 2))
+    return (distance - expected) / float(np.sqrt(2.0 * max(expected, 1.0)))
 
 
 def probability_against(fitted: FittedSet, other: FittedSet) -> float:

@@ -56,6 +56,12 @@ def table(**changes: object) -> ComparisonTable:
         ({"contribution": np.zeros(12)}, "too little"),
         ({"contribution": channels(0.5, channel=1)}, "too little"),  # not on the channel that it improves
         ({"contribution": np.full(12, np.inf)}, None),  # without it nothing finite is predicted
+        ({"size": LIMITS.plausible + 1e-9}, "so far"),
+        ({"size": LIMITS.plausible}, None),
+        ({"power": removed(0.1, 0.09), "excuse": (20.0, 1.0)}, None),  # all derivatives together were not plausible
+        ({"power": removed(0.1, 0.09), "excuse": (20.0, 9.0)}, "too little"),  # nor are they with it
+        ({"power": removed(0.1, 0.09), "excuse": (6.0, 4.0)}, "too little"),  # by less than half
+        ({"power": removed(0.1, 0.09), "excuse": (LIMITS.joint, 0.0)}, "too little"),
         ({"log_bayes_factor": 0.0}, "commands"),
         ({"log_bayes_factor": np.nan}, "commands"),
     ],
