@@ -66,13 +66,13 @@ def residual_model_of(simulator: Simulator, flight: GapFlight, seed: int = 0) ->
             pool.submit(program)
         calm = _with_measured_noise(silent, seed)
     instruments = best_instrument_parameters(calm)
-    calm = replace(calm, gusts=gust_speed(calm, instruments))
+    calm = replace(calm, gusts=gust_speed(calm, instruments), instruments=instruments)
     memory = observer_memory(calm, instruments)
     if memory == LONGEST_MEMORY:
         return calm
     followed = ObserverMemory(memory, 0.0 if is_gusty(calm) else LONGEST_MEMORY)
     shorter = noiseless_model(simulator, flight, record, windows, axes, followed)
-    return _with_measured_noise(replace(shorter, gusts=calm.gusts), seed)
+    return _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), seed)
 
 
 def residual_model_like(model: ResidualModel, record: FlightRecord) -> ResidualModel:

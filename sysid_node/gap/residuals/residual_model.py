@@ -71,6 +71,7 @@ class ResidualModel:
     gusts: float = 0.0  # rms of the air's motion across the flight path, m/s, by the aircraft file
     simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))  # (12,) see ``SimulatorError``
     reading_errors: Mapping[str, float] = field(default_factory=dict)  # the same of short flights' readings
+    instruments: Array | None = None  # (P,) parameters at which the air seems to move least; none: the file's
 
     @property
     def record(self) -> FlightRecord:

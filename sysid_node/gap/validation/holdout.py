@@ -17,12 +17,20 @@ from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidenc
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import OveridentificationTest
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.selection.acceptance import relieves
+from sysid_node.gap.selection.comparison import joint_deviation
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation import spectral_error
 from sysid_node.gap.validation.kfold import kfold_evidence
 from sysid_node.gap.validation.simulation_error import simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
-from sysid_node.gap.validation.standing import causes_stand, file_derivatives_suit_causes, file_predicts_better
+from sysid_node.gap.validation.standing import (
+    causes_exceed_weather,
+    causes_stand,
+    file_derivatives_suit_causes,
+    file_predicts_better,
+    shares_taken_away,
+)
 
 #: The validation of one explanation. Raises numpy.linalg.LinAlgError where its predictions are not finite.
 Validator = Callable[[Attribution], "Check"]
@@ -77,14 +85,16 @@ def validate(
 ) -> tuple[Attribution, Check]:
     """What of an explanation stands on flight not fitted, and its validation there.
 
-    No cause stands where weather and the sensors' noise account for the whole gap. Without causes the file's own
-    derivatives are kept where the fitted ones predict worse. ``models`` are the flights that were fitted.
+    No cause stands where weather and the sensors' noise account for the whole gap, unless it takes away what weather
+    cannot have caused. Without causes the file's own derivatives are kept where the fitted ones predict worse.
+    ``models`` are the flights that were fitted.
     """
     validator = partial(check, held_out=held_out)
     with ThreadPoolExecutor(1) as pool:
         weather = pool.submit(weather_suffices, [*models, *(flight.model for flight in held_out)])
         attribution, checked = standing_explanation(attribution, validator)
-    if weather.result():
+    taken = shares_taken_away(checked.simulation_gap.per_channel) if checked.simulation_gap else ()
+    if weather.result() and not (attribution.causes and causes_exceed_weather(taken)):
         attribution = attribution.without_causes().as_in_file()
         of_file = validator(attribution).as_in_file(attribution.structure_left)
         return attribution, replace(of_file, weather_suffices=True)
@@ -108,10 +118,15 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
             continue
         if file_predicts_better(found[1].gaps):
             found = _with_better_derivatives(*found, validator)
-        if causes_stand(found[1].gaps):
+        if causes_stand(found[1].gaps, excused=not _relieved(found[0])):
             return found
     bare = attribution.without_causes()
     return bare, validator(bare)
+
+
+def _relieved(explanation: Attribution) -> bool:
+    """Whether the derivatives are plausible together with the causes, and are not without them."""
+    return relieves((joint_deviation(explanation.base.fit), joint_deviation(explanation.chosen.fit)))
 
 
 def _explanations(attribution: Attribution) -> Iterator[Attribution]:

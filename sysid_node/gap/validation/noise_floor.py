@@ -17,8 +17,10 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.flightdata.gap_flight import resampled
 from sysid_node.gap.residuals.flight_path_reconstruction import Motion
+from sysid_node.gap.residuals.predictions import kinematic_parameters
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.residuals.sensor_noise import with_added_noise
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.validation.multiple_shooting import Course, simulate_beside, simulation_error
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import Dryden
@@ -39,7 +41,7 @@ def noise_floor_errors(
     """For each of a few simulated flights of parameters (P,): its errors (N, 12), and the noise (N, 12) added to it."""
     random, prompt = np.random.default_rng(seed), theta.copy()
     prompt[[model.simulator.names.index(name) for name in _CLOCKS]] = 0.0
-    _, _, shown = simulate_beside(model, theta, course)
+    shown = _air_shown(model, theta, course)
     for _ in range(_REALISATIONS):
         again = resampled(with_added_noise(model.simulator.aircraft, model.flight, random), model.simulator.rate)
         added = {n: values - model.record[n] for n, values in again.columns.items()}
@@ -49,6 +51,21 @@ def noise_floor_errors(
         readings, _, _ = simulate_beside(model, prompt, air)
         readings = readings - _flow_angles_of(model, moving) + noise
         yield simulation_error(model, prompt, _recorded(model, course, readings, added)), noise
+
+
+def _air_shown(model: ResidualModel, theta: Array, course: Course) -> Array:
+    """Velocity (N, 3) of the air, m/s, within the short flights, as the air data show it at parameters (P,).
+
+    A vane off its place or a gyro's bias looks like moving air. Where most of the motion goes away with other
+    parameters of the instruments, it is theirs and no weather, whatever the explanation holds.
+    """
+    _, _, shown = simulate_beside(model, theta, course)
+    if model.instruments is None:
+        return shown
+    corrected, kinematic = theta.copy(), kinematic_parameters(model.simulator.layout)
+    corrected[kinematic] = model.instruments[kinematic]
+    _, _, calmer = simulate_beside(model, corrected, course)
+    return calmer if _power(calmer) < THRESHOLDS.validation.instruments * _power(shown) else shown
 
 
 def _unmeasured_air(

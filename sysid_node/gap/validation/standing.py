@@ -7,7 +7,7 @@ frequency, then short simulated flights where these can be simulated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -40,9 +40,20 @@ class ErrorTable(NamedTuple):
     after: float
 
 
-def causes_stand(errors: Sequence[Errors]) -> bool:
-    """Whether causes predict better than the derivatives by at least one measure, and than the file by every one."""
-    return any(e.after < e.tolerances for e in errors) and all(e.after < e.before for e in errors)
+def causes_stand(errors: Sequence[Errors], *, excused: bool = True, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether causes predict better than the derivatives by at least one measure, and than the file by every one.
+
+    Where they take away a large share of the error by one measure, they may tie with the file by another: one that
+    does not see what they change.
+
+    Derivatives that no tolerances together have ``excused`` may predict a little better than a cause that makes them
+    plausible again.
+    """
+    most = 1.0 if excused else thresholds.validation.unexcused
+    limits = thresholds.validation
+    large = any(e.after < limits.large_improvement * e.before for e in errors)
+    worst = limits.tie if large else 1.0
+    return any(e.after < most * e.tolerances for e in errors) and all(e.after < worst * e.before for e in errors)
 
 
 def file_predicts_better(errors: Sequence[Errors]) -> bool:
@@ -56,6 +67,24 @@ def file_predicts_better(errors: Sequence[Errors]) -> bool:
 def file_derivatives_suit_causes(with_file: Sequence[Errors], with_fitted: Sequence[Errors]) -> bool:
     """Whether causes predict better with the file's derivatives than with the fitted ones, by the last measure."""
     return with_file[-1].after < with_fitted[-1].after
+
+
+def shares_taken_away(readings: Mapping[str, Mapping[str, float]]) -> tuple[float, ...]:
+    """Share of the error's power that the causes take away, by reading that moved, on flight not fitted.
+
+    ``readings`` holds the errors of each (rms): ``before``, ``tolerances`` and ``after``.
+    """
+    pairs = ((min(e["before"], e["tolerances"]), e["after"]) for e in readings.values())
+    return tuple(1.0 - (after / error) ** 2 if error > 0.0 else 0.0 for error, after in pairs)
+
+
+def causes_exceed_weather(taken: Sequence[float], thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether causes take away so much of some reading's error, on flight not fitted, that this was no weather.
+
+    The noise floor is simulated in air that moves as the air data show. An instrument that is off moves them, too, and
+    raises the floor by what it does. But what was fitted to one flight predicts no weather of another.
+    """
+    return max(taken, default=0.0) > thresholds.validation.beyond_weather
 
 
 def weather_accounts_for(before: Array, floors: Array, thresholds: Thresholds = THRESHOLDS) -> bool:

@@ -8,9 +8,11 @@ import pytest
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.validation.standing import (
     ErrorTable,
+    causes_exceed_weather,
     causes_stand,
     file_derivatives_suit_causes,
     file_predicts_better,
+    shares_taken_away,
     weather_accounts_for,
 )
 
@@ -27,13 +29,36 @@ GOOD = ErrorTable(before=1.0, tolerances=0.5, after=0.1)
         ([GOOD, GOOD._replace(after=1.1)], False),  # worse than the file by one measure is not
         ([GOOD._replace(after=0.6), GOOD._replace(after=0.6)], False),
         ([GOOD._replace(after=0.5)], False),  # a tie with the derivatives
-        ([GOOD, GOOD._replace(tolerances=2.0, after=1.0)], False),  # a tie with the file
+        ([GOOD, GOOD._replace(tolerances=2.0, after=1.0)], True),  # a tie with the file beside a large improvement
+        ([GOOD._replace(after=0.75, tolerances=0.8), GOOD._replace(after=1.0)], False),  # beside a small one
+        ([GOOD, GOOD._replace(after=1.06)], False),
         ([GOOD._replace(tolerances=2.0, after=0.9)], True),
         ([GOOD._replace(after=float("nan"))], False),
     ],
 )
 def test_causes_predict_better_than_derivatives_and_file(errors: list[ErrorTable], stand: bool) -> None:
     assert causes_stand(errors) is stand
+
+
+def test_derivatives_that_nothing_excuses_may_predict_a_little_better() -> None:
+    close = GOOD._replace(after=0.52)
+    assert causes_stand([close], excused=False)
+    assert not causes_stand([close])
+    assert not causes_stand([GOOD._replace(after=0.5 * THRESHOLDS.validation.unexcused)], excused=False)
+    assert not causes_stand([close._replace(before=0.5)], excused=False)
+
+
+def test_what_causes_take_away_of_a_reading_on_other_flight_is_no_weather() -> None:
+    """A gyro that reads a quarter too little doubles the error of q; weather is alike with it and without it."""
+    readings = {
+        "q": {"before": 1.0, "tolerances": 1.2, "after": 0.5},
+        "alpha": {"before": 0.6, "tolerances": 0.5, "after": 0.5},
+    }
+    assert shares_taken_away(readings) == pytest.approx((0.75, 0.0))
+    assert causes_exceed_weather(shares_taken_away(readings))
+    limit = THRESHOLDS.validation.beyond_weather
+    assert not causes_exceed_weather((limit,)) and causes_exceed_weather((limit + 1e-9,))
+    assert not causes_exceed_weather(())
 
 
 @pytest.mark.parametrize(("tolerances", "better"), [(0.9, False), (1.0, False), (1.0 + 1e-12, True)])
