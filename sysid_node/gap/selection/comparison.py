@@ -24,6 +24,7 @@ from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
 from sysid_node.gap.selection.fitted_set import FittedSet
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
 
 
@@ -77,7 +78,13 @@ class Comparison:
 
     @cached_property
     def power(self) -> RemainingPower:
-        """Power left on flight not fitted."""
+        """Power left on flight not fitted; of a flight too short to be divided, what the fits leave.
+
+        Half a manoeuvre does not determine what predicts the other half. That is seen by the predictive density, which
+        knows how uncertain it is, but not by the power of the prediction's error.
+        """
+        if self.fitted.evidence.scores.size < THRESHOLDS.evidence.fewest:
+            return RemainingPower(_powers(self.without.fit)[0], _powers(self.fitted.fit)[0])
         return RemainingPower(power_left(self.without.evidence), power_left(self.fitted.evidence))
 
     @cached_property

@@ -90,7 +90,7 @@ def gap_of_errors(models: Sequence[ResidualModel], tables: Sequence[Array]) -> G
     unread = {angle for flight in flights for angle in flight.inferred}
     unread |= thrust.THRUST_READINGS if any(not flight.metered for flight in flights) else set()
     counted = np.array([(lateral or name in LONGITUDINAL_SIGNALS) and name not in unread for name in READINGS])
-    counted &= of_motions(READINGS, excited_motions([evidence.model for evidence in final.flights]))
+    counted &= of_motions(READINGS, excited_motions(models))
     counted &= motion.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
     if not counted.any():
         return None

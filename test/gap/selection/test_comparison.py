@@ -49,7 +49,11 @@ def test_powers_are_those_of_the_residuals(lag) -> None:
     residual = lag.without.evidence.flights[0].residual
     power = np.abs(residual) ** 2
     np.testing.assert_allclose(power_left(lag.without.evidence), (power[:, 1:].sum(axis=1) + 0.5 * power[:, 0]).sum(0))
-    np.testing.assert_allclose(lag.power.without, power_left(lag.without.evidence))
+    whole = replace(lag.fitted.evidence, scores=np.zeros(8))
+    divided = replace(lag, fitted=replace(lag.fitted, evidence=whole))
+    np.testing.assert_allclose(divided.power.without, power_left(lag.without.evidence))
+    left = np.abs(lag.without.fit.flights[0].residual) ** 2  # two groups: too short to be divided
+    np.testing.assert_allclose(lag.power.without, (left[:, 1:].sum(axis=1) + 0.5 * left[:, 0]).sum(0))
     means = 0.5 * len(residual) * np.abs(residual[:, 0].mean(axis=0)) ** 2
     np.testing.assert_allclose(lag.mean_power.without, means)
     measured = lag.fitted.fit.models[0].measured

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sysid_node.aircraft.model import Geometry, Inertia
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.validation.spectral_error import gap_of, interval, shrinkage
 
@@ -29,6 +30,12 @@ class Windows:
     count = 4
 
 
+#: An aircraft whose surfaces command nothing, so that all of its motions count.
+GLIDER = SimpleNamespace(
+    geometry=Geometry(1.0, 1.0, 1.0), inertia=Inertia(1.0, 1.0, 1.0), derivatives={}, control_symbols=(), throttle=None
+)
+
+
 def flight(error: float) -> Any:
     """Of a motion with a power of 12 a window (three lines), and an error as a share of it, on the channels CL and V.
 
@@ -42,7 +49,8 @@ def flight(error: float) -> Any:
     axes[channels] = True
     model = SimpleNamespace(
         measured=measured, noise=np.full((4, 12), 0.01) * [[0.0], [1.0], [1.0], [1.0]], axes=axes, windows=Windows,
-        residual=lambda theta: before, simulator=SimpleNamespace(neutral=lambda: np.zeros(1)),
+        residual=lambda theta: before, simulator=SimpleNamespace(neutral=lambda: np.zeros(1), aircraft=GLIDER),
+        record={"rho": np.ones(4), "V": np.ones(4)}, commands=np.zeros((4, 1)),
     )  # fmt: skip
     return SimpleNamespace(model=model, residual=residual)
 
