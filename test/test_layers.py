@@ -21,7 +21,7 @@ BELOW = {
     "sim": {"aircraft", "dynamics", "flight"},
     "online": {"aircraft", "dynamics", "flight"},
     "control": {"aircraft", "dynamics", "flight", "online"},
-    "batch": {"aircraft", "dynamics", "flight", "sim"},
+    "batch": {"aircraft", "dynamics", "flight", "sim", "online"},
     "excite": {"aircraft", "dynamics", "flight", "sim", "online"},
     "faults": {"aircraft", "dynamics", "flight", "online"},
     "gap": {"aircraft", "dynamics", "flight", "sim", "online", "batch", "control", "excite"},
@@ -36,7 +36,8 @@ BELOW["cli"] = {*BELOW["api"], "api", "view"}
 #: The rooms of a layer (sub-packages and modules), lowest first: a room may import itself and those before it.
 ROOMS = {
     "batch": (
-        "settings", "results", "regression", "models", "likelihood", "methods", "data_compatibility", "identify",
+        "settings", "results", "regression", "models", "likelihood", "methods", "systematic", "data_compatibility",
+        "identify",
     ),
     "gap": (
         "thresholds", "flightdata", "residuals", "estimation", "instruments", "selection", "validation", "verdict",

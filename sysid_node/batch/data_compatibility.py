@@ -9,7 +9,7 @@ errors are common to all.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def corrected(record: FlightRecord, errors: dict[str, float]) -> FlightRecord:
     for name in set(columns) & {*_IMU, *STATES}:
         bias, scale = errors.get(f"bias_{name}", 0.0), errors.get(f"scale_{name}", 0.0)
         columns[name] = (columns[name] - bias) / (1.0 + scale)
-    return FlightRecord(record.time, columns, record.name, record.start_ns, record.rejected)
+    return replace(record, columns=columns)
 
 
 def _pieces(aircraft: Aircraft, record: FlightRecord, segment: float) -> list[FlightRecord]:

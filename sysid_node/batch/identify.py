@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.data_compatibility import check_sensors, corrected
-from sysid_node.batch.methods.constrained_least_squares import constrained_least_squares
+from sysid_node.batch.methods.constrained_least_squares import FORGETTING, WINDOW, constrained_least_squares
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.frequency_equation_error import frequency_equation_error
@@ -25,6 +26,9 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.batch.systematic.flight_posterior import flight_posterior
+from sysid_node.batch.systematic.sensitivities import LikelihoodResponse, RegressionResponse, Response
+from sysid_node.batch.systematic.systematic_errors import on_time, with_systematic_errors
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -38,11 +42,22 @@ _REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], BatchSetting
     "neural_gauss_newton": lambda a, records, s: neural_gauss_newton(a, records, s.low_pass),
 }
 #: Methods that integrate a model.
-_ESTIMATIONS: dict[str, type[MaximumLikelihoodEstimation] | type[JointEstimation]] = {
-    **dict.fromkeys(("output_error", "filter_error"), MaximumLikelihoodEstimation),
-    **dict.fromkeys(KALMAN_FILTERS, JointEstimation),
+_SEARCHES = ("output_error", "filter_error")
+METHODS = (*_REGRESSIONS, *_SEARCHES, *KALMAN_FILTERS)
+
+#: Of regressions that do not weigh all of the signals alike: low-pass (Hz), and the share of its weight that a sample
+#: keeps in a second.
+_FILTERS: dict[str, Callable[[BatchSettings], tuple[float, float]]] = {
+    "equation_error": lambda s: (s.low_pass, 1.0),
+    "neural_gauss_newton": lambda s: (s.low_pass, 1.0),
+    "frequency_equation_error": lambda s: (s.frequencies[2], 1.0),
+    "constrained_least_squares": lambda _: (0.0, FORGETTING ** (1.0 / WINDOW)),
 }
-METHODS = (*_REGRESSIONS, *_ESTIMATIONS)
+
+_NOT_CONSIDERED = (
+    "intervals hold noise alone: what the tolerances of aircraft and instruments add could not be computed, because "
+    "the online estimator finds no solution in these flights"
+)
 
 #: Flight -> output or coefficient -> figure of merit -> value.
 FiguresByFlight = dict[str, dict[str, dict[str, float]]]
@@ -71,7 +86,9 @@ def identify(
 ) -> Identification:
     """The derivatives of the aircraft file estimated from ``records``, and checked on ``holdout``.
 
-    Raises InputError for an unknown method or no flight, and as the method does.
+    Servos and clocks that the flights show to be late are corrected in them first. What the tolerances of the aircraft
+    file leave open goes into the intervals. Raises InputError for an unknown method or no flight, and as the method
+    does.
     """
     if method not in METHODS:
         raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
@@ -89,8 +106,16 @@ def identify(
         aircraft, selections = supported_model(aircraft, records, settings.low_pass)
         left_out = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(left_out) or 'nothing'}")
+    posterior = flight_posterior(aircraft, records, settings)
+    recorded = records
+    if posterior is not None:
+        records, holdout = on_time(aircraft, records, posterior), on_time(aircraft, holdout, posterior)
+    elif _uncertain(aircraft):
+        remarks.append(_NOT_CONSIDERED)
     try:
-        fit, predict = _fitted(method, aircraft, records, settings)
+        fit, predict, response = _fitted(method, aircraft, records, settings)
+        if posterior is not None:
+            fit = with_systematic_errors(aircraft, recorded, fit, posterior, response())
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         names = ", ".join(record.name for record in records)
         raise InputError(
@@ -116,8 +141,7 @@ def refuse_unused(method: str, settings: Mapping[str, object]) -> None:
         unused += ["rate", "states", "biases", "use_prior"]
     if method not in KALMAN_FILTERS:
         unused.append("process_noise")
-    cut = _ESTIMATIONS.get(method) is MaximumLikelihoodEstimation
-    if not cut and not BatchSettings.from_mapping(settings).correct_sensors:
+    if method not in _SEARCHES and not BatchSettings.from_mapping(settings).correct_sensors:
         unused.append("segment")
     given = [key for key in settings if key in unused]
     if given and method in METHODS:
@@ -126,13 +150,32 @@ def refuse_unused(method: str, settings: Mapping[str, object]) -> None:
 
 def _fitted(
     method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
-) -> tuple[BatchFit, Callable[[FlightRecord], Sequence[ModelResponse]]]:
-    """The fit, and a function from a flight to the fitted model's outputs; regressions model no outputs."""
+) -> tuple[BatchFit, Callable[[FlightRecord], Sequence[ModelResponse]], Callable[[], Response]]:
+    """The fit, a function from a flight to the fitted model's outputs, and what makes its response to other records.
+
+    Regressions model no outputs.
+    """
     if method in _REGRESSIONS:
-        return _REGRESSIONS[method](aircraft, records, settings), lambda _: ()
-    estimation = _ESTIMATIONS[method].of(method, aircraft, records, settings)
-    fit = estimation.fit()
-    return fit, lambda record: estimation.responses(fit, record)
+        fit = _REGRESSIONS[method](aircraft, records, settings)
+        low_pass, kept = _FILTERS[method](settings) if method in _FILTERS else (0.0, 1.0)
+        return fit, lambda _: (), lambda: RegressionResponse(aircraft, records, fit.values, low_pass, kept)
+    if method in KALMAN_FILTERS:
+        joint = JointEstimation.of(method, aircraft, records, settings)
+        fit = joint.fit()
+        return fit, lambda record: joint.responses(fit, record), lambda: partial(joint.changed, fit)
+    search = MaximumLikelihoodEstimation.of(method, aircraft, records, settings)
+    fit = search.fit()
+
+    def response() -> Response:
+        residuals, jacobian = search.linearised(fit)
+        return LikelihoodResponse(residuals, records, jacobian, len(fit.estimates))
+
+    return fit, lambda record: search.responses(fit, record), response
+
+
+def _uncertain(aircraft: Aircraft) -> bool:
+    """Whether the aircraft file has any tolerance."""
+    return any(sigma > 0.0 for sigma in aircraft.tolerances.values())
 
 
 def _named(records: Sequence[FlightRecord]) -> list[FlightRecord]:

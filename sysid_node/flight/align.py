@@ -292,12 +292,13 @@ def flight_record(
         first = len(names) - len(aircraft.controls)
         samples = np.hstack([samples[:, :first], with_excess(aligned.stamps, samples[:, first:])])
     columns = dict(zip(names, np.ascontiguousarray(samples.T), strict=True))
-    del columns[AIR_INTERVAL]
+    interval = float(np.mean(columns.pop(AIR_INTERVAL)))
     attitude = streams.imu.attitude[aligned.imu.kept[aligned.used]]
     columns |= dict(zip(("phi", "theta", "psi"), np.ascontiguousarray(attitude.T), strict=True))
     start = int(aligned.imu.stamps[0])
     commanded = aligned.commands_from < aligned.used.size
-    return FlightRecord(aligned.time, columns, streams.name, start, counts_by_reason(aligned.rejected), commanded)
+    rejected = counts_by_reason(aligned.rejected)
+    return FlightRecord(aligned.time, columns, streams.name, start, rejected, commanded, interval)
 
 
 def sample_columns(aircraft: Aircraft) -> tuple[str, ...]:

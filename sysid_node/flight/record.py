@@ -47,6 +47,7 @@ class FlightRecord:
     start_ns: int = 0
     rejected: Mapping[str, int] = field(default_factory=dict)
     commanded: bool = False  # whether the controls follow from commands by the aircraft file's servos
+    air_interval: float = 0.0  # s between the messages of air data, on average; 0 = not known
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.size < 2:

@@ -60,7 +60,11 @@ def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
     assert before is not None
     state.servos = servos
     if state.servo_states is not None:
-        state.servo_states.lateness = servos.lateness.tolist()
+        state.servo_states = state.servo_states.moved(servos.lateness.tolist())
+    first = state.segment.first_servos
+    if first is not None:
+        state.segment.first_servos = first.moved(servos.lateness.tolist())
+        state.segment.first_impulses = state.segment.first_servos.impulses(model.spectrum.omega, first.time)
     state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied)
 
     def moved(info: Information) -> Information:

@@ -60,7 +60,8 @@ def begin_segment(state: EstimatorState) -> None:
     time, segment = state.transform.last, state.segment
     sampled_transform.restart(state.transform)
     if state.servo_states is not None:
-        segment.first_impulses = state.servo_states.impulses(state.model.spectrum.omega, time)
+        segment.first_servos = state.servo_states.copy()
+        segment.first_impulses = segment.first_servos.impulses(state.model.spectrum.omega, time)
     segment.start, segment.samples, segment.intervals = time, 0, 0.0
     segment.noise_moments, segment.noise_measured_until = NoiseMoments(), time
     _begin_piece(state)

@@ -131,6 +131,7 @@ class PresentSegment:
     noise_moments: NoiseMoments = field(default_factory=NoiseMoments)
     noise_measured_until: float = math.nan  # time up to which ``noise_moments`` are measured
     first_impulses: Array = field(default_factory=lambda: np.empty((0, 0)))  # of the servos, at the segment's start
+    first_servos: ServoStates | None = None  # then; None where they are not to be looked at again
     information: Information | None = None  # at the last renewal; None = none since the segment's start
 
 

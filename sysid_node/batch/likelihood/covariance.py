@@ -53,6 +53,7 @@ def assessed_fit(
         remarks=(*at_bounds, *identifiability_remarks(covariance, unknowns.names, groups)),
         nuisance=unknowns.nuisance(z),
         extras=extras or {},
+        unknowns=z,
     )
 
 

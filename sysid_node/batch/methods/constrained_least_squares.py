@@ -40,7 +40,7 @@ def constrained_least_squares(
         windows = max(1, round(len(y) * step / window))
         return _windowed(np.array_split(y, windows), np.array_split(X, windows), prior, weight, forgetting)
 
-    return sequential_fit("constrained_least_squares", aircraft, records, estimator)
+    return sequential_fit("constrained_least_squares", aircraft, records, estimator, forgetting ** (1.0 / window))
 
 
 def _windowed(

@@ -16,7 +16,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.regression.combined_fit import combined_fit
 from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom
 from sysid_node.batch.regression.errors_in_variables import ErrorsInVariables
-from sysid_node.batch.regression.filtering import lowpass
+from sysid_node.batch.regression.filtering import lowpass, noise_gain
 from sysid_node.batch.regression.linear_regression import Regression, regress
 from sysid_node.batch.regression.measured_coefficients import (
     MeasuredCoefficients,
@@ -59,7 +59,7 @@ def _regression(
     sensor_errors = [
         ErrorsInVariables(
             lowpass(flight.time, X, low_pass),
-            _noise_gain(flight.time, low_pass),
+            noise_gain(flight.time, low_pass),
             sensor_noises(flight.time, sensitivities, coefficient, regressors, low_pass),
         )
         for flight, X, sensitivities in zip(flights, filtered, sensors, strict=True)
@@ -68,10 +68,3 @@ def _regression(
     regression = regress(names, ys, filtered, None, freedom, sensor_errors)
     values = np.array([estimate.value for estimate in regression.estimates.values()])
     return replace(regression, modelled=[X @ values for X in Xs])
-
-
-def _noise_gain(time: Array, low_pass: float) -> float:
-    """The share of white noise's variance that the low-pass filter lets through."""
-    impulse = np.zeros((time.size, 1))
-    impulse[time.size // 2] = 1.0
-    return float(np.sum(lowpass(time, impulse, low_pass) ** 2))

@@ -29,7 +29,7 @@ from sysid_node.batch.results.parameter_track import ParameterTrack
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
-from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.record import Array, FlightRecord
 
 KALMAN_FILTERS: dict[str, FilterSteps] = {
     "extended_kalman_filter": EXTENDED,
@@ -115,6 +115,13 @@ class JointEstimation:
             extras=self._noise_levels(),
             track=track,
         )
+
+    def changed(self, fit: BatchFit, records: Sequence[FlightRecord]) -> Array:
+        """(P,) by how much the estimates differ from those of ``fit`` where other records are filtered."""
+        assert fit.track is not None
+        others = [_manoeuvre(self.model, self.aircraft, record, self.settings) for record in records]
+        found = filter_along(self.model, others, self.noise, KALMAN_FILTERS[self.method])
+        return np.asarray(found.values[-1] - fit.track.values[-1])
 
     def responses(self, fit: BatchFit, record: FlightRecord) -> list[ModelResponse]:
         """One-step predictions of another flight with the parameters of ``fit``; raises InputError as ``fit`` does."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.likelihood.filter_error_problem import FilterErrorProblem
+from sysid_node.batch.likelihood.problem import LikelihoodProblem
+from sysid_node.batch.likelihood.unknowns import Unknowns
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.filter_error import filter_error, predict_filter_error
-from sysid_node.batch.methods.output_error import output_error, predict_output_error
+from sysid_node.batch.methods.output_error import OutputErrorProblem, output_error, predict_output_error
 from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.manoeuvres import cut_into_segments, manoeuvre_data, record_for_model
 from sysid_node.batch.models.model import StateSpaceModel
@@ -20,7 +23,7 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
-from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.record import Array, FlightRecord
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,27 @@ class MaximumLikelihoodEstimation:
         else:
             fit = output_error(self.model, self.pieces, initial_states=states, biases=biases)
         return replace(fit, responses=_joined(fit.responses), remarks=(*self.remarks, *fit.remarks))
+
+    def linearised(self, fit: BatchFit) -> tuple[Callable[[Sequence[FlightRecord]], Array], Array]:
+        """All residuals (N,) in units of the noise, as a function of the flights, and their Jacobian (N, n).
+
+        Both with the unknowns (n,) that the search of ``fit`` ended with; the Jacobian is with respect to these.
+        """
+        assert fit.unknowns is not None
+        z, base = fit.unknowns, self._problem(self.pieces)
+        noise = base.noise(z)
+
+        def residuals(records: Sequence[FlightRecord]) -> Array:
+            pieces = [_pieces(self.method, self.model, self.aircraft, record, self.settings) for record in records]
+            return self._problem([piece for several in pieces for piece in several]).residuals(z, noise)
+
+        return residuals, base.jacobian(z, noise)
+
+    def _problem(self, pieces: Sequence[ManoeuvreData]) -> LikelihoodProblem:
+        unknowns = Unknowns.of(self.model, pieces, self.model.states, self.settings.biases)
+        if self.method == "filter_error":
+            return FilterErrorProblem(unknowns, correlated=True)
+        return OutputErrorProblem(unknowns)
 
     def responses(self, fit: BatchFit, record: FlightRecord) -> list[ModelResponse]:
         """The fitted model's response to another flight; of filter error, its one-step predictions."""

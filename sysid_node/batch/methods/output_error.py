@@ -46,7 +46,7 @@ def output_error(
     model diverges from its start values. A search that does not converge is returned, and its message says so.
     """
     check_manoeuvres(model, manoeuvres)
-    problem = _OutputError(Unknowns.of(model, manoeuvres, initial_states, biases))
+    problem = OutputErrorProblem(Unknowns.of(model, manoeuvres, initial_states, biases))
     z, iterations, complaint = maximise_likelihood(problem, search)
     return assessed_fit("output_error", problem, z, iterations, complaint)
 
@@ -65,11 +65,11 @@ def predict_output_error(
     """
     fitted = model.started_at(values)
     check_manoeuvres(fitted, manoeuvres)
-    problem = _OutputError(Unknowns.of(fitted, manoeuvres, initial_states, biases))
+    problem = OutputErrorProblem(Unknowns.of(fitted, manoeuvres, initial_states, biases))
     return responses_with_nuisances_estimated(problem, problem.start())
 
 
-class _OutputError(LikelihoodProblem):
+class OutputErrorProblem(LikelihoodProblem):
     """The problem whose responses are the model's trajectories, integrated from the initial states alone."""
 
     def __init__(self, unknowns: Unknowns) -> None:
@@ -77,12 +77,15 @@ class _OutputError(LikelihoodProblem):
         self._measured = [np.isfinite(m.outputs) for m in unknowns.manoeuvres]
 
     def start(self) -> Array:
+        """The start values of the unknowns."""
         return self.unknowns.start()
 
     def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the unknowns."""
         return self.unknowns.bounds()
 
     def responses(self, z: Array) -> list[ModelResponse]:
+        """The trajectories of each manoeuvre."""
         u = self.unknowns
         theta = u.theta(z)
         return [
@@ -97,6 +100,7 @@ class _OutputError(LikelihoodProblem):
         ]
 
     def sensitivities(self, z: Array) -> list[Array]:
+        """The derivatives of the trajectories with respect to z."""
         u = self.unknowns
         theta, free = u.theta(z), len(u.free)
         blocks = []

@@ -2,8 +2,8 @@
 
 Ljung & Soederstrom, "Theory and Practice of Recursive Identification" (1983), sec. 2.2; Klein & Morelli (2006), ch. 8.
 After the last sample the estimates are those of least squares on all samples, so that noise on the regressors biases
-them. The standard errors are the recursion's own and hold where the residual is white, which it hardly ever is. The
-method is here for comparison.
+them. The recursion's own covariance holds where the residual is white, which it hardly ever is; the standard errors are
+those of ``sequential_fit`` instead. The method is here for comparison.
 """
 
 from __future__ import annotations

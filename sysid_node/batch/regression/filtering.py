@@ -43,6 +43,13 @@ def lowpass(time: Array, X: Array, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(sections, X, axis=0, padlen=min(len(X) - 1, int(3 * rate / cutoff))))
 
 
+def noise_gain(time: Array, cutoff: float) -> float:
+    """The share of white noise's variance that ``lowpass`` lets through."""
+    impulse = np.zeros((time.size, 1))
+    impulse[time.size // 2] = 1.0
+    return float(np.sum(lowpass(time, impulse, cutoff) ** 2))
+
+
 def averaging_factor(record: FlightRecord, rate: float) -> int:
     """The number of samples averaged into one for ``rate`` Hz or a little more; 1 where ``rate`` is 0 or not lower."""
     step = float(np.median(np.diff(record.time)))

@@ -36,6 +36,9 @@ class BatchFit:
     remarks: tuple[str, ...] = ()
     nuisance: Sequence[Mapping[str, float]] = ()
     extras: Mapping[str, float] = field(default_factory=dict)  # e.g. process noise
+    unknowns: Array | None = None  # (n,) with which a search for the maximum likelihood ended
+    servos: Mapping[str, ParameterEstimate] = field(default_factory=dict)  # by control: how late it follows, s
+    budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # shares of each variance by source
     track: ParameterTrack | None = None  # estimates over time, of a filter that passes once along the flights
 
     @property

@@ -8,6 +8,7 @@ over a stretch that ends at t is X + g R (see ``servo_model``), where R is the t
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 
 _ONE = np.ones(1)
 LONGEST = 0.5  # s
+REMEMBERED = 1.0  # s: after which it no longer matters where a servo was; several times the latest servos' lateness
 SHORTEST = 1e-3  # s: a lateness under which a servo is where it is told to be
 
 
@@ -29,12 +31,29 @@ class ServoStates:
     positions: list[float] = field(default_factory=list)
     controls: Sequence[float] = ()
     time: float = -math.inf  # s, of the last sample
+    #: Time, controls and excess of the last ``REMEMBERED`` s, oldest first.
+    recent: deque[tuple[float, Sequence[float], Sequence[float]]] = field(default_factory=deque)
+
+    def copy(self) -> ServoStates:
+        """The same, which stays as it is."""
+        return ServoStates(list(self.lateness), list(self.positions), self.controls, self.time, deque(self.recent))
+
+    def moved(self, lateness: list[float]) -> ServoStates:
+        """Where servos with another ``lateness`` (m,) s would be, having followed the same controls."""
+        other = ServoStates(lateness)
+        for time, controls, excess in self.recent:
+            other.follow(time, controls, excess)
+        return other
 
     def follow(self, time: float, controls: Sequence[float], excess: Sequence[float] = ()) -> None:
         """Follow the controls, which go in straight lines to these values at ``time`` (s), but for an ``excess`` (m,)
         in the mean. At first, and after a gap of more than ``LONGEST`` s, servos are at rest there.
         """
         step, self.time = time - self.time, time
+        recent = self.recent
+        recent.append((time, controls, excess))
+        while recent[0][0] < time - REMEMBERED:
+            recent.popleft()
         if not 0.0 < step <= LONGEST:
             self.positions, self.controls = list(controls), controls
             return

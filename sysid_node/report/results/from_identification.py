@@ -19,6 +19,7 @@ from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
+from sysid_node.report.results.servo_remarks import servo_remarks
 from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
 #: Frequencies of the drawn spectra, Hz.
@@ -40,7 +41,8 @@ def identification_result(
     derivatives = {
         name: _derivative(name, fit.estimates.get(name), trusted, fit.remarks) for name in aircraft.derivatives
     }
-    estimates = Estimates(sum(record.duration for record in records), derivatives, _fits(found))
+    servos = {name: _derivative(name, estimate, "ok", ()) for name, estimate in fit.servos.items()}
+    estimates = Estimates(sum(record.duration for record in records), derivatives, _fits(found), servos, fit.budget)
     return RunResult(
         aircraft=aircraft.name,
         method=fit.method,
@@ -54,7 +56,10 @@ def identification_result(
             first, _spectra(aircraft, first, found.coefficients), _responses(found), _note(records, settings)
         ),
         holdout=found.holdout,
-        remarks=[_sentence(remark) for remark in (fit.message, *fit.remarks, carried) if remark],
+        remarks=[
+            *(_sentence(remark) for remark in (fit.message, *fit.remarks, carried) if remark),
+            *servo_remarks(aircraft, estimates),
+        ],
     )
 
 
@@ -77,7 +82,8 @@ def _derivative(
         estimate.upper,
         valid,
         status,
-        estimate.standard_error,
+        estimate.statistical_error,
+        estimate.systematic_error,
     )
 
 
@@ -90,7 +96,10 @@ def _history(fit: BatchFit) -> list[Estimates]:
     return [
         Estimates(
             float(track.time[k]),
-            {name: _derivative(name, estimate, "ok", ()) for name, estimate in track.at(int(k)).items()},
+            {
+                name: _derivative(name, e.with_systematic(fit.estimates[name].systematic_error), "ok", ())
+                for name, e in track.at(int(k)).items()
+            },
             {},
         )
         for k in ends_of_seconds

@@ -15,14 +15,13 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.flight.servos import servos_of
 from sysid_node.online.frequency.regression_signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.systematic.servo_model import of_servo
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
-from sysid_node.report.results.comparison import changes, half_width
+from sysid_node.report.results.comparison import changes
 from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
+from sysid_node.report.results.servo_remarks import servo_remarks
 from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
 THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
@@ -84,21 +83,13 @@ def replay_result(
             RESPONSE_NOTE,
         ),
         faults=faults,
-        remarks=[*remarks, *_servo_remarks(aircraft, history), *_change_remark(noticed), *_fault_remarks(faults)],
+        remarks=[
+            *remarks,
+            *(servo_remarks(aircraft, history[-1]) if history else []),
+            *_change_remark(noticed),
+            *_fault_remarks(faults),
+        ],
     )
-
-
-def _servo_remarks(aircraft: Aircraft, history: Sequence[Estimates]) -> list[str]:
-    """How late each control follows, beside what the aircraft file says."""
-    known = {name: d for name, d in history[-1].servos.items() if d.valid} if history else {}
-    late = {name: of_servo(servo)[0] for name, servo in zip(aircraft.controls, servos_of(aircraft)[1:], strict=True)}
-    stated = aircraft.effects.get("actuator_lag", {}).keys() | aircraft.effects.get("command_delay", {}).keys()
-    delays = [
-        f"{name} {1e3 * d.value:.0f} \u00b1 {1e3 * half_width(d):.0f} ms "
-        f"(the file says {f'{1e3 * late[name]:.0f} ms' if name in stated else 'nothing'})"
-        for name, d in known.items()
-    ]
-    return [f"Controls follow what is recorded of them later by: {', '.join(delays)}."] if delays else []
 
 
 def _change_remark(noticed: Sequence[float]) -> list[str]:

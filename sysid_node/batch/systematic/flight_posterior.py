@@ -1,0 +1,155 @@
+"""What the flights tell of the imperfections that an aircraft may have within its tolerances.
+
+The online estimator passes along each flight and estimates the imperfections along with the derivatives
+(``online.systematic``). Its result is a normal distribution. Those of several flights of the same aircraft are
+multiplied, and the tolerances, which each of them holds, count once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.settings import BatchSettings
+from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.online import estimator
+from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.state import EstimatorState
+from sysid_node.online.systematic.estimation import SystematicErrors
+from sysid_node.online.systematic.imperfections import Imperfections, prior
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+
+class Imperfection(NamedTuple):
+    """One number that is taken as known: the key of its tolerance, and of a servo which of its two parameters.
+
+    ``role``: "source", "lateness" (s) or "curvature" (s^2). ``commanded``: whether a servo follows commands; what
+    comes after measured positions is something else.
+    """
+
+    key: str
+    role: str = "source"
+    commanded: bool = False
+
+    @property
+    def control(self) -> str:
+        """The control whose servo it belongs to."""
+        return self.key.rpartition(".")[2] if self.role != "source" else ""
+
+
+@dataclass(frozen=True)
+class FlightPosterior:
+    """K imperfections after the flights, those of servos from zero on, all others from what was taken as known.
+
+    ``jacobian`` (K, D): by how much one unit of each moves the D derivatives ``names`` of the online estimator.
+    """
+
+    imperfections: tuple[Imperfection, ...]
+    mean: Array  # (K,)
+    covariance: Array  # (K, K)
+    names: tuple[str, ...]
+    jacobian: Array
+
+    @property
+    def errors(self) -> Array:
+        """(K,) standard errors."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+class _OneFlight(NamedTuple):
+    """What one flight tells in units of the tolerances: information (K, K) without the prior's, and score (K,)."""
+
+    imperfections: tuple[Imperfection, ...]
+    sigmas: Array  # (K,)
+    expected: Array  # (K,)
+    information: Array
+    score: Array
+    names: tuple[str, ...]
+    jacobian: Array  # (K, D) per unit
+    seconds: float
+
+
+def flight_posterior(
+    aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
+) -> FlightPosterior | None:
+    """The posterior of all ``records`` together; None where the file states that all is exact, or none can be used."""
+    online = OnlineSettings(actuators=settings.actuators, max_gap=min(settings.max_gap, 5.0), detect_changes=False)
+    told = [one for record in records if (one := _told(_passed(aircraft, record, online))) is not None]
+    return _combined(told) if told else None
+
+
+def _passed(aircraft: Aircraft, record: FlightRecord, settings: OnlineSettings) -> EstimatorState:
+    """The online estimator after a flight."""
+    state = estimator.init(aircraft, settings, commanded=record.commanded)
+    interval = record.air_interval or float(np.median(np.diff(record.time)))
+    density = np.where(np.isfinite(record["rho"]), record["rho"], aircraft.reference.air_density)
+    made = {"air_interval": np.full(len(record), interval), "rho": density}
+    names = (*SAMPLE_COLUMNS, *aircraft.control_symbols)
+    samples = np.column_stack([made[name] if name in made else record[name] for name in names])
+    for time, sample in zip(record.time.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, time, sample)
+    return state
+
+
+def _told(state: EstimatorState) -> _OneFlight | None:
+    imperfect, latest = state.model.imperfections, state.latest
+    if imperfect is None or latest is None or latest.systematic is None:
+        return None
+    found, table = latest.systematic, state.model.table
+    sigmas, centre = prior(imperfect, found.lines)
+    base = _servos_of_lines(imperfect, found)
+    inverse = np.linalg.inv(found.considered.covariance / sigmas / sigmas[:, None])
+    jacobian = found.considered.jacobian
+    return _OneFlight(
+        _named(imperfect, commanded=state.model.commanded),
+        sigmas,
+        base + centre,
+        inverse - np.eye(sigmas.size),
+        inverse @ ((found.considered.estimate - centre) / sigmas),
+        table.names,
+        jacobian.reshape(sigmas.size, -1)[:, table.place],
+        latest.total.energy,
+    )
+
+
+def _servos_of_lines(imperfect: Imperfections, found: SystematicErrors) -> Array:
+    """(K,) from where the estimates count: where the estimator had the servos; zero for all else."""
+    at = imperfect.timed
+    return np.concatenate([np.zeros(len(imperfect.sources)), found.lines.lateness[at], found.lines.curvature[at]])
+
+
+def _named(imperfect: Imperfections, *, commanded: bool) -> tuple[Imperfection, ...]:
+    count, keys = len(imperfect.controls), imperfect.keys
+    roles = ["source"] * len(imperfect.sources) + ["lateness"] * count + ["curvature"] * count
+    return tuple(Imperfection(key, role, commanded and role != "source") for key, role in zip(keys, roles, strict=True))
+
+
+def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
+    """The product of what all flights tell, with the tolerances of those that name an imperfection first."""
+    every = tuple(dict.fromkeys(one for flight in told for one in flight.imperfections))
+    K, D = len(every), len(told[0].names)
+    sigmas, expected = np.zeros(K), np.zeros(K)
+    information, score, jacobian, weight = np.eye(K), np.zeros(K), np.zeros((K, D)), np.zeros(K)
+    for flight in told:
+        at = np.array([every.index(one) for one in flight.imperfections], np.intp)
+        new = sigmas[at] == 0.0
+        sigmas[at[new]], expected[at[new]] = flight.sigmas[new], flight.expected[new]
+        ratio = sigmas[at] / flight.sigmas
+        information[np.ix_(at, at)] += flight.information * ratio[:, None] * ratio
+        # scores count from each flight's own expectation
+        moved = (flight.expected - expected[at]) / flight.sigmas
+        score[at] += ratio * (flight.score + flight.information @ moved)
+        jacobian[at] += flight.seconds * flight.jacobian
+        weight[at] += flight.seconds
+    covariance = np.linalg.inv(information)
+    return FlightPosterior(
+        every,
+        expected + sigmas * (covariance @ score),
+        sigmas[:, None] * covariance * sigmas,
+        told[0].names,
+        jacobian / np.maximum(weight, 1e-9)[:, None],
+    )

@@ -1,0 +1,120 @@
+"""A batch method's estimates with their systematic errors, the servos, and the error budget.
+
+The imperfections kappa are normal with mean m and covariance P after the flights (``flight_posterior``). A method's
+estimates theta(kappa) move by G = d theta / d kappa. They are evaluated at m, and their covariance is
+
+    cov theta = (noise's part) + G P G'                                      (GUM: JCGM 100:2008, eq. 16)
+
+For lateness of servos and instruments G is the method's own (``sensitivities``), because fast signals weigh differently
+in every method. All other imperfections the derivatives can absorb: a mass that is off, say, scales the derivatives of
+all forces. They move every consistent estimator by the same amount, which the online estimator knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
+from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
+from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
+from sysid_node.batch.systematic.sensitivities import Response
+from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.online.estimates.published import SERVO_KNOWN
+from sysid_node.online.systematic.budget import Budget
+
+SMALLEST = 1e-6  # s, or s^2: of a step
+
+
+def on_time(aircraft: Aircraft, records: Sequence[FlightRecord], posterior: FlightPosterior) -> list[FlightRecord]:
+    """The records with the estimated lateness of servos and instruments taken out."""
+    return _records(aircraft, records, _timing(posterior))
+
+
+def with_systematic_errors(
+    aircraft: Aircraft, records: Sequence[FlightRecord], fit: BatchFit, posterior: FlightPosterior, response: Response
+) -> BatchFit:
+    """The ``fit`` to the records ``on_time``, moved by all other imperfections, with intervals that hold them all.
+
+    ``records`` are those before any correction; ``response`` says how the method's estimates move.
+    """
+    names = tuple(fit.estimates)
+    G = _jacobian(aircraft, records, names, posterior, response)
+    others = np.array([not is_timing(one) for one in posterior.imperfections])
+    moved = (posterior.mean * others) @ G
+    systematic = G.T @ posterior.covariance @ G
+    errors = np.sqrt(np.maximum(np.diag(systematic), 0.0))
+    estimates = {
+        name: estimate.with_systematic(float(error), float(by))
+        for (name, estimate), error, by in zip(fit.estimates.items(), errors, moved, strict=True)
+    }
+    keys = tuple(one.key for one in posterior.imperfections)
+    statistical = np.array([estimate.standard_error**2 for estimate in fit.estimates.values()])
+    derivatives = np.array([name in aircraft.derivatives for name in names])
+    budget = Budget(
+        tuple(name for name in names if name in aircraft.derivatives),
+        keys,
+        G[:, derivatives],
+        posterior.covariance,
+        statistical[derivatives],
+    )
+    return replace(
+        fit,
+        estimates=estimates,
+        covariance=fit.covariance + systematic,
+        servos=servos(posterior),
+        budget=budget,
+    )
+
+
+def servos(posterior: FlightPosterior) -> dict[str, ParameterEstimate]:
+    """How late each control follows what is recorded of it, s; of commands where some flights have them."""
+    rows: dict[str, ParameterEstimate] = {}
+    found = zip(posterior.imperfections, posterior.mean.tolist(), posterior.errors.tolist(), strict=True)
+    for one, value, error in sorted(found, key=lambda item: item[0].commanded):
+        if one.role == "lateness":
+            lower, upper = confidence_interval(value, error, np.inf)
+            valid = error <= SERVO_KNOWN
+            status = "ok" if valid else "converging"
+            rows[one.control] = ParameterEstimate(one.control, value, error, lower, upper, valid, status, error)
+    return rows
+
+
+def _timing(posterior: FlightPosterior) -> dict[Imperfection, float]:
+    pairs = zip(posterior.imperfections, posterior.mean.tolist(), strict=True)
+    return {one: value for one, value in pairs if is_timing(one)}
+
+
+def _records(
+    aircraft: Aircraft, records: Sequence[FlightRecord], values: Mapping[Imperfection, float]
+) -> list[FlightRecord]:
+    return [corrected(aircraft, record, values) for record in records]
+
+
+def _jacobian(
+    aircraft: Aircraft,
+    records: Sequence[FlightRecord],
+    names: Sequence[str],
+    posterior: FlightPosterior,
+    response: Response,
+) -> Array:
+    """(K, P) by how much one unit of each imperfection moves the estimates."""
+    G = np.zeros((len(posterior.imperfections), len(names)))
+    for p, name in enumerate(names):
+        if name in posterior.names:
+            G[:, p] = posterior.jacobian[:, posterior.names.index(name)]
+    timing, known = _timing(posterior), {}
+    for k, (one, error) in enumerate(zip(posterior.imperfections, posterior.errors.tolist(), strict=True)):
+        if not is_timing(one):
+            continue
+        # a lag and a delay of the same columns do the same to them
+        same = LATE_COLUMNS.get(one.key, one)
+        if same not in known:
+            step = max(error, SMALLEST)
+            known[same] = response(_records(aircraft, records, timing | {one: timing[one] + step})) / step
+        G[k] = known[same]
+    return G

@@ -1,0 +1,62 @@
+"""Estimates of whole methods with an aircraft that is not as its file says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from late_flight import LATE, UNCERTAIN, behind_servos
+from made_flight import KESTREL, TRUTH, flight
+
+from sysid_node.batch.identify import identify
+from sysid_node.batch.methods.equation_error import equation_error
+from sysid_node.batch.settings import BatchSettings
+
+
+@pytest.fixture(scope="module")
+def found():
+    return identify("equation_error", UNCERTAIN, [behind_servos(1), behind_servos(2)], BatchSettings()).fit
+
+
+def test_servos_that_the_file_does_not_know(found):
+    for name, servo in found.servos.items():
+        assert servo.valid, name
+        assert abs(servo.value - LATE) < 3.0 * servo.standard_error, name
+
+
+def test_intervals_hold_the_truth(found):
+    off = {name: (e.value - TRUTH[name]) / e.standard_error for name, e in found.estimates.items() if name in TRUTH}
+    assert max(map(abs, off.values())) < 3.0, off
+    held = [e.lower <= TRUTH[name] <= e.upper for name, e in found.estimates.items()]
+    assert np.mean(held) > 0.9
+
+
+def test_without_servos_they_do_not():
+    fit = equation_error(UNCERTAIN, [behind_servos(1), behind_servos(2)])
+    off = [abs(e.value - TRUTH[name]) / e.standard_error for name, e in fit.estimates.items()]
+    assert max(off) > 10.0
+
+
+def test_parts_of_the_standard_error_and_the_budget(found):
+    for name, e in found.estimates.items():
+        assert e.standard_error == pytest.approx(np.hypot(e.statistical_error, e.systematic_error)), name
+        shares = found.budget[name]
+        assert list(shares.values()) == sorted(shares.values(), reverse=True)
+        assert shares.get("statistical", 0.0) == pytest.approx((e.statistical_error / e.standard_error) ** 2, abs=0.006)
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx([e.standard_error for e in found.estimates.values()])
+
+
+def test_a_mass_that_is_uncertain_is_a_share_of_the_lift():
+    file = replace(KESTREL, stated_tolerances={"mass": 0.02 * KESTREL.mass})
+    fit = identify("equation_error", file, [flight(1)], BatchSettings(actuators="positions")).fit
+    lift = fit.estimates["CL_alpha"]
+    # of the aerodynamic force alone: the thrust's part of the measured one does not grow with the mass
+    assert lift.systematic_error == pytest.approx(0.02 * abs(lift.value), rel=0.1)
+    assert fit.estimates["Cm_q"].systematic_error < 1e-6
+
+
+def test_an_exact_file_gives_the_method_alone():
+    fit = identify("equation_error", KESTREL, [flight(1)], BatchSettings()).fit
+    alone = equation_error(KESTREL, [flight(1)])
+    assert fit.values == alone.values
+    assert not fit.servos
+    assert not fit.budget
