@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +31,25 @@ RATE = 1000.0  # Hz
 NORMAL_95 = 1.96
 
 
+@cache
+def simulated() -> Simulator:
+    """The simulator of all flights."""
+    return Simulator(load_aircraft("cdrw"), RATE)
+
+
 @lru_cache(maxsize=2)
-def flown(simulator: Simulator, name: str, seed: int) -> tuple[FlightRecord, dict[str, float]]:
+def flown(name: str, seed: int) -> tuple[FlightRecord, dict[str, float]]:
     """A flight as aligned columns, and the true derivatives."""
+    simulator = simulated()
     sortie = fly(simulator, FLIGHTS[name], "none", seed)
     return flight_record(simulator.aircraft, Recorder().record(sortie), 0.2, "auto"), sortie.derivatives
 
 
-def estimated(method: str, simulator: Simulator, name: str, seed: int) -> dict[str, Any]:
+def estimated(method: str, name: str, seed: int) -> dict[str, Any]:
     """One line of the results."""
-    record, true = flown(simulator, name, seed)
+    record, true = flown(name, seed)
     begin = time.process_time()
-    fit = identify(method, simulator.aircraft, [record], BatchSettings(segment=10.0)).fit
+    fit = identify(method, simulated().aircraft, [record], BatchSettings(segment=10.0)).fit
     rows = {
         key: [e.value, e.standard_error, e.statistical_error, e.lower, e.upper, float(e.valid and fit.converged), truth]
         for key, truth in true.items()
@@ -83,13 +90,12 @@ def main() -> None:
     args = parser.parse_args()
     text = args.results.read_text(encoding="utf-8") if args.results.exists() else ""
     lines = [json.loads(line) for line in text.splitlines()]
-    simulator = Simulator(load_aircraft("cdrw"), RATE)
     for seed in range(1, args.seeds + 1):
         for name in FLIGHTS:
             for method in args.only or METHODS:
                 if any((line["method"], line["flight"], line["seed"]) == (method, name, seed) for line in lines):
                     continue
-                lines.append(estimated(method, simulator, name, seed))
+                lines.append(estimated(method, name, seed))
                 with args.results.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(lines[-1]) + "\n")
     counts = ("flights", "valid", "hold", "> 4 s.e.", "hold by the statistical part alone")
