@@ -9,20 +9,23 @@ import pytest
 from sysid_node.batch.identify import METHODS
 from sysid_node.cli.main import main
 
-BAGS = Path(__file__).resolve().parents[2] / "bags"
+ROOT = Path(__file__).resolve().parents[2]
+BAGS = ROOT / "bags"
 KEYS = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
 
 
-def arguments(out, *more, bag="cdrw_multistep", method="equation_error"):
-    return ["identify", str(BAGS / bag), "--aircraft", "cdrw", "--method", method, "--out", str(out), *more]
+def arguments(out, *more, bag="cdrw_multistep", method="equation_error", aircraft="cdrw"):
+    return ["identify", str(BAGS / bag), "--aircraft", str(aircraft), "--method", method, "--out", str(out), *more]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Of a quiet identification with a flight held out."""
+    """Of a quiet identification with a flight held out; the flights are exact but for noise, and the file says so."""
     out = tmp_path_factory.mktemp("identify") / "out"
+    file = out.parent / "cdrw.yaml"
+    file.write_text("ideal: true\n" + (ROOT / "config" / "aircraft" / "cdrw.yaml").read_text())
     holdout = ["--holdout", str(BAGS / "cdrw_random"), "--set", "stepwise=true", "--quiet"]
-    assert main(arguments(out, *holdout)) == 0
+    assert main(arguments(out, *holdout, aircraft=file)) == 0
     return out
 
 
@@ -54,6 +57,21 @@ def test_the_bundled_flights_truth_is_found(summary):
     for name in ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr"):
         assert found[name]["valid"]
         assert found[name]["value"] == pytest.approx(truth[name], rel=0.03), name
+
+
+def test_tolerances_servos_and_the_budget_are_those_of_the_contract(tmp_path):
+    assert main(arguments(tmp_path / "out", "--quiet")) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    truth = json.loads((BAGS / "cdrw_multistep.truth.json").read_text())["derivatives"]
+    for name, found in summary["derivatives"].items():
+        parts = found["statistical_error"] ** 2 + found["systematic_error"] ** 2
+        assert found["standard_error"] ** 2 == pytest.approx(parts), name
+        assert found["systematic_error"] > 0.0, name
+        assert found["lower"] <= truth[name] <= found["upper"], name
+        assert summary["budget"][name], name
+    assert set(summary["servos"]) == {"elevator", "aileron", "rudder"}
+    assert {"value", "standard_error", "lower", "upper", "valid", "status"} <= set(summary["servos"]["rudder"])
+    assert "Error budget" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_the_tables_and_the_report_are_there(folder, summary):
@@ -149,7 +167,7 @@ def test_a_kalman_filter_leaves_the_history_of_its_estimates(tmp_path):
     assert summary["settings"]["process_noise"] == 0.5
     history = [row for row in rows(out / "estimates.csv") if row["name"] == "Cm_de"]
     assert len(history) > 50
-    errors = [float(row["standard_error"]) for row in history]
+    errors = [float(row["statistical_error"]) for row in history]
     assert errors[-1] < 0.2 * errors[0]
     assert float(history[-1]["value"]) == pytest.approx(summary["derivatives"]["Cm_de"]["value"])
     noise = {row["name"] for row in rows(out / "noise.csv")}
