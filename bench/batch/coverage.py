@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.estimation.judging import Verdict, judge
+from bench.estimation.judging import Verdict, exact, judge
 from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.batch.identify import identify
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 RATE = 100.0  # Hz, of the instruments, unless a trial says otherwise
 SECONDS = 20.0
-AIRCRAFT = load_aircraft("cdrw")
+AIRCRAFT = exact(load_aircraft("cdrw"))
 TRUTH = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
 MANOEUVRES = (
     "3211:elevator:amplitude=0.06:width=0.3:start=1:every=8:repeat=3",

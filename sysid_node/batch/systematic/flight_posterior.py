@@ -7,7 +7,7 @@ multiplied, and the tolerances, which each of them holds, count once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online import estimator
+from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState
 from sysid_node.online.systematic.estimation import SystematicErrors
@@ -53,6 +54,7 @@ class FlightPosterior:
     covariance: Array  # (K, K)
     names: tuple[str, ...]
     jacobian: Array
+    online: Mapping[str, tuple[float, float]]  # valid estimates of the online estimator: value, standard error
 
     @property
     def errors(self) -> Array:
@@ -71,6 +73,7 @@ class _OneFlight(NamedTuple):
     names: tuple[str, ...]
     jacobian: Array  # (K, D) per unit
     seconds: float
+    online: Mapping[str, tuple[float, float]]
 
 
 def flight_posterior(
@@ -113,6 +116,7 @@ def _told(state: EstimatorState) -> _OneFlight | None:
         table.names,
         jacobian.reshape(sigmas.size, -1)[:, table.place],
         latest.total.energy,
+        {name: (d.value, d.standard_error) for name, d in estimate(state).derivatives.items() if d.valid},
     )
 
 
@@ -152,4 +156,11 @@ def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
         sigmas[:, None] * covariance * sigmas,
         told[0].names,
         jacobian / np.maximum(weight, 1e-9)[:, None],
+        {n: _together(found) for n in told[0].names if (found := [one.online[n] for one in told if n in one.online])},
     )
+
+
+def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The mean of values by their standard errors, and the smallest of these: tolerances are common to all flights."""
+    weights = np.array([1.0 / max(error, 1e-300) ** 2 for _, error in found])
+    return float(np.average([value for value, _ in found], weights=weights)), min(error for _, error in found)

@@ -19,7 +19,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.results.batch_fit import BatchFit
-from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
+from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
 from sysid_node.batch.systematic.sensitivities import Response
@@ -28,6 +28,7 @@ from sysid_node.online.estimates.published import SERVO_KNOWN
 from sysid_node.online.systematic.budget import Budget
 
 SMALLEST = 1e-6  # s, or s^2: of a step
+CONTRADICTION = 2.0  # standard errors of both estimates together by which they differ at most
 
 
 def on_time(aircraft: Aircraft, records: Sequence[FlightRecord], posterior: FlightPosterior) -> list[FlightRecord]:
@@ -49,7 +50,7 @@ def with_systematic_errors(
     systematic = G.T @ posterior.covariance @ G
     errors = np.sqrt(np.maximum(np.diag(systematic), 0.0))
     estimates = {
-        name: estimate.with_systematic(float(error), float(by))
+        name: _compared(estimate.with_systematic(float(error), float(by)), posterior.online.get(name))
         for (name, estimate), error, by in zip(fit.estimates.items(), errors, moved, strict=True)
     }
     keys = tuple(one.key for one in posterior.imperfections)
@@ -69,6 +70,20 @@ def with_systematic_errors(
         servos=servos(posterior),
         budget=budget,
     )
+
+
+def _compared(estimate: ParameterEstimate, online: tuple[float, float] | None) -> ParameterEstimate:
+    """The estimate, not valid where the online estimator contradicts it.
+
+    Both have the same flights and tolerances. Gusts, and times that are off by more than a linear correction can
+    mend, bias most methods; the online estimator's instruments and iterated servos stand more of both.
+    """
+    if online is None or not estimate.valid:
+        return estimate
+    value, error = online
+    if abs(estimate.value - value) <= CONTRADICTION * float(np.hypot(estimate.standard_error, error)):
+        return estimate
+    return estimate.invalid(f"contradicted: the online estimator finds {value:.3g} +- {NORMAL_95 * error:.2g}")
 
 
 def servos(posterior: FlightPosterior) -> dict[str, ParameterEstimate]:

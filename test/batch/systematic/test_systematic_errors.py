@@ -10,6 +10,8 @@ from made_flight import KESTREL, TRUTH, flight
 from sysid_node.batch.identify import identify
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.batch.systematic.flight_posterior import flight_posterior
+from sysid_node.batch.systematic.systematic_errors import with_systematic_errors
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +54,21 @@ def test_a_mass_that_is_uncertain_is_a_share_of_the_lift():
     # of the aerodynamic force alone: the thrust's part of the measured one does not grow with the mass
     assert lift.systematic_error == pytest.approx(0.02 * abs(lift.value), rel=0.1)
     assert fit.estimates["Cm_q"].systematic_error < 1e-6
+
+
+@pytest.mark.parametrize(("off", "valid"), [(1.9, True), (2.1, False)])
+def test_what_the_online_estimator_contradicts_is_not_valid(off, valid):
+    posterior = flight_posterior(UNCERTAIN, [behind_servos(1)], BatchSettings())
+    assert posterior is not None
+    fit = equation_error(KESTREL, [flight(1)])
+    own = fit.estimates["Cm_de"]
+    online = own.value + off * np.hypot(own.standard_error, 0.01), 0.01
+    still = replace(
+        posterior, mean=0.0 * posterior.mean, covariance=0.0 * posterior.covariance, online={"Cm_de": online}
+    )
+    found = with_systematic_errors(UNCERTAIN, [flight(1)], fit, still, lambda _: np.zeros(len(fit.estimates)))
+    assert found.estimates["Cm_de"].valid == valid
+    assert found.estimates["Cm_de"].status.startswith("contradicted") != valid
 
 
 def test_an_exact_file_gives_the_method_alone():

@@ -1,4 +1,6 @@
-"""Whether intervals of `sysid identify` hold with a user's flights. `python bench/identify_commands.py RESULTS.jsonl`
+"""Coverage of the intervals of `sysid identify` with a user's flights, from commands alone.
+
+    python -m bench.batch.commands RESULTS.jsonl [--seeds 6] [--only METHOD] [--page docs/results/batch_commands.md]
 
 Flights of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3` from the commands of the autopilot, plain ones and
 those of servos of 30 ms that the aircraft file does not know. Counted are, among 27 derivatives, those that are valid,
@@ -15,9 +17,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from drawn import fly
-from evaluation.pages import publish, table
-
+from bench.estimation.all_imperfections import fly
+from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.batch.identify import METHODS, identify
 from sysid_node.batch.settings import BatchSettings
@@ -100,7 +101,7 @@ def main() -> None:
                     file.write(json.dumps(lines[-1]) + "\n")
     counts = ("flights", "valid", "hold", "> 4 s.e.", "hold by the statistical part alone")
     heads = ("method", *(f"{name}: {one}" for name in FLIGHTS for one in counts), "processor, s")
-    publish("bench/identify_commands.py", table(heads, (row(method, lines) for method in METHODS)), args.page)
+    publish("bench/batch/commands.py", table(heads, (row(method, lines) for method in METHODS)), args.page)
 
 
 if __name__ == "__main__":

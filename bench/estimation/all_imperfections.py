@@ -1,4 +1,6 @@
-"""Whether intervals hold where everything is a little off at once. `python bench/drawn.py RESULTS.jsonl --flights 60`
+"""Coverage of the intervals where everything is a little off at once.
+
+    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--page docs/results/all_imperfections.md]
 
 Each flight is that of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3`, with imperfections drawn as aircraft
 have them: servos of first order (20 to 120 ms) or second (3 to 12 Hz), rate limits of 2 to 6 rad/s, delays up to 40 ms,
@@ -18,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from evaluation.pages import publish, table
 
+from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, UncertainValue
 from sysid_node.batch.identify import identify
@@ -211,7 +213,7 @@ def main() -> None:
             lines.append(flown(simulator, aircraft, number))
             with args.results.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(lines[-1]) + "\n")
-    publish("bench/drawn.py", tables(lines), args.page)
+    publish("bench/estimation/all_imperfections.py", tables(lines), args.page)
 
 
 if __name__ == "__main__":
