@@ -28,6 +28,9 @@ from sysid_node.sim.signals.dryden import Dryden
 #: Flights that are simulated.
 _REALISATIONS = 6
 
+#: Turbulence is drawn for a multiple of so many samples: its realisation does not depend on how a course is padded.
+_BLOCK = 500
+
 #: Height above ground of the turbulence model, m. The result depends little on it.
 _HEIGHT = 100.0
 
@@ -77,17 +80,17 @@ def _unmeasured_air(
     what the air data's noise (N, 12) adds to it.
     """
     dryden, speed = Dryden.at(_HEIGHT, model.simulator.aircraft.geometry.b), float(model.record["V"].mean())
-    samples = len(model.record)  # the flight's own, so that the floor does not depend on how the course is padded
-    gusts = dryden.realisation(samples, model.simulator.rate, speed, random)
-    begins = np.asarray(course.begins)[:samples]
+    drawn = -(-len(model.record) // _BLOCK) * _BLOCK
+    gusts = dryden.realisation(drawn, model.simulator.rate, speed, random)
+    begins = np.asarray(course.begins)[:drawn]
     origin = np.maximum.accumulate(np.where(begins, np.arange(begins.size), 0))
     seen = slice(0, 1) if model.flight.inferred else slice(1, 3)
     usual = _power((gusts - gusts[origin])[:, seen])
     read = noise[:, [OUTPUTS.index(name) for name in ("V", "beta", "alpha")]] * [1.0, speed, speed]
-    moved = max(_power(shown[:, seen]) - _power((read - read[origin])[:, seen]), 0.0)
+    moved = max(_power(shown[:, seen]) - _power((read - read[origin[: len(read)]])[:, seen]), 0.0)
     gusts *= np.sqrt(moved / usual)
     across = [float(name in model.flight.inferred) for name in ("V", "beta", "alpha")]
-    padded = np.pad(gusts, ((0, course.altitude.size - samples), (0, 0)), mode="edge")
+    padded = np.pad(gusts, ((0, course.altitude.size - drawn), (0, 0)), mode="edge")
     return padded[:, :3] * across, padded[:, 3:]
 
 
