@@ -52,6 +52,13 @@ def test_the_flight_fitted_cannot_be_held_out(tmp_path: Path, capsys: pytest.Cap
     assert "same flight" in said(capsys)
 
 
+@pytest.mark.skipif(not BAG.is_dir(), reason="the bundled flights are not here")
+def test_a_real_flight_given_as_a_simulated_one_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["gap", str(BAG), "--aircraft", "cdrw", "--out", str(tmp_path / "out"), "--quiet", "--simulated", str(BAG)]
+    assert main(words) == 2
+    assert "same recording" in said(capsys)
+
+
 STEPS = [
     "3211:elevator:amplitude=0.06:width=0.3:start=1:every=8:repeat=3",
     "3211:aileron:amplitude=0.06:width=0.25:start=4:every=8:repeat=3",
