@@ -87,7 +87,8 @@ def _findings(found: Diagnosis) -> str:
             "Noise and tolerances do not explain this difference, and none of the known effects predicts it. "
             f"{_correction(found, 'With the derivatives fitted within their tolerances,')}"
         )
-    causes = " and ".join(_cause(cause) for cause in document(found)["causes"])
+    known = "the simulator has" if found.surrogate else "the aircraft file says"
+    causes = " and ".join(_cause(cause, known) for cause in document(found)["causes"])
     return " ".join([f"{_share(found)} {causes}.", _correction(found, "With this correction,"), *_doubts(found)])
 
 
@@ -172,8 +173,8 @@ def _left_out(found: Diagnosis) -> str:
     )
 
 
-def _cause(cause: Mapping[str, Any]) -> str:
-    """``actuator lag (time constant 0.110 ± 0.006 s; probability 0.98)``."""
+def _cause(cause: Mapping[str, Any], known: str) -> str:
+    """``actuator lag (time constant 0.110 ± 0.006 s; probability 0.98)``; ``known`` goes before what was believed."""
     units = units_of(cause["effect"])
     shown = [
         _parameter(name, *in_pilots_units(value, error, units.get(name, "")))
@@ -186,7 +187,7 @@ def _cause(cause: Mapping[str, Any]) -> str:
     }
     filed = [f"{parameter_words(n)} {number(v, 3)} {unit}".strip() for n, (v, _, unit) in believed.items()]
     if filed:
-        shown = [*shown[:4], f"the aircraft file says {', '.join(filed[:4])}"]
+        shown = [*shown[:4], f"{known} {', '.join(filed[:4])}"]
     rivals = cause["indistinguishable_from"]
     alternatives = f"; or {', '.join(label_words(r) for r in rivals)}" if rivals else ""
     probability = f"probability {likely(cause['probability'])}"
