@@ -43,7 +43,7 @@ def judge(row: Mapping[str, Any], holds: Sequence[str], unspiked: float | None) 
     others = [c for c in row["causes"] if not _among(c, holds) or _among(c, (effect,))]
     named = bool(others) and _among(others[0], (effect,))
     own = next((c for c in row["causes"] if c["effect"] == effect), None)
-    sized = all(_close(own["parameters"].get(n), v) for n, v in _sizes(effect, values)) if named and own else None
+    sized = all(_sized(own["parameters"], n, v) for n, v in _sizes(effect, values)) if named and own else None
     closed = None if unspiked is None or row["gap"] is None else row["gap"]["after"] <= (1.0 + _GAP) * unspiked
     return Judged(named, sized, closed, wrong, stated)
 
@@ -62,9 +62,13 @@ def _sizes(effect: str, values: Mapping[str, float]) -> list[tuple[str, float]]:
     return [] if effect == "stuck_surface" else [(n, v) for n, v in values.items() if n not in _SHAPES]
 
 
-def _close(found: Sequence[float] | None, true: float) -> bool:
+def _sized(found: Mapping[str, Sequence[float]], name: str, true: float) -> bool:
+    """Whether a parameter's size is right; what acts on controls is stated for each of them, named after it."""
+    stated = [found[name]] if name in found else list(found.values())
+    return bool(stated) and all(_close(each, true) for each in stated)
+
+
+def _close(found: Sequence[float], true: float) -> bool:
     """Whether a value with its standard error is within a fifth of the true one, or its 95 % interval holds this."""
-    if found is None:
-        return False
     value, error = found
     return abs(value - true) <= max(_SIZE * abs(true), 1.96 * error)

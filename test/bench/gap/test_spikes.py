@@ -101,6 +101,10 @@ def test_an_effect_is_named_first_or_beside_what_the_record_holds() -> None:
     assert (judged.named, judged.closed, judged.blamed) == (False, False, True)
     judged = judge(_row("imu_bias", {"p": 0.06}, bias, after=0.12), (), 0.1)
     assert (judged.named, judged.sized) == (True, False)
+    lag = _cause("actuator_lag", elevator=0.11, rudder=0.4)  # stated for each control
+    assert judge(_row("actuator_lag", {"time_constant": 0.1}, lag), (), None).sized is False
+    lag = _cause("actuator_lag", elevator=0.11)
+    assert judge(_row("actuator_lag", {"time_constant": 0.1}, lag), (), None).sized
     rivals = _cause("vane_scale", 0.5, ("imu_bias",), alpha=0.2)
     assert judge(_row("imu_bias", {"p": 0.06}, rivals), (), None).named
 
