@@ -30,6 +30,9 @@ from sysid_node.sim.model.parameters import stated_parameters
 #: The effect whose parameters are all nuisances; as a candidate, those of one coefficient have a wider prior.
 DERIVATIVE_ERROR = "derivative_error"
 
+#: A derivative up to this size is an import's rounding of zero.
+_ROUNDING = 1e-9
+
 #: Clock offsets that are known to one sample of their topic, and the effects that replace each. Only relative delays
 #: can be observed: a delay of the IMU replaces the offset of the air data, whereas that of the commands stays a
 #: nuisance, so that a servo's lag does not pass for a delay of the IMU.
@@ -103,7 +106,8 @@ def derivative_tolerances(aircraft: Aircraft) -> dict[str, float]:
     stated = {name: d.tolerance for name, d in aircraft.derivatives.items() if d.tolerance}
     if stated or not aircraft.ideal:
         return stated
-    return {name: THRESHOLDS.priors.ideal * abs(d.value) for name, d in aircraft.derivatives.items() if d.value}
+    known = ((name, abs(d.value)) for name, d in aircraft.derivatives.items())
+    return {name: THRESHOLDS.priors.ideal * size for name, size in known if size > _ROUNDING}
 
 
 def nuisances_of(
