@@ -95,7 +95,7 @@ def planned(catalogue: Catalogue, out: str | Path, settings: FleetSettings) -> I
     """What ``run_fleet`` would do, flight by flight, beside what the folder ``out`` holds; nothing is written."""
     check_settings(settings)
     path = Path(out) / STATE
-    state = FleetState(path) if path.is_file() else None
+    state = FleetState(path, read_only=True) if path.is_file() else None
     try:
         yield Plan(catalogue, settings, state).flights()
     finally:

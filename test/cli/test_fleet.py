@@ -100,10 +100,11 @@ def test_started_again_it_does_nothing_twice(fleet: Path, capsys: pytest.Capture
     assert finished(fleet) == before
     assert main(arguments(fleet, "--dry-run")) == 0
     assert "0 to do, 3 done, 0 with a fault" in capsys.readouterr().out
-    log = next((fleet / "b").glob("*.mcap"))
+    log, state = next((fleet / "b").glob("*.mcap")), (fleet / "out" / "fleet.sqlite").read_bytes()
     os.utime(log)  # the content is the same
     assert main(arguments(fleet, "--dry-run", "--set", "window=8")) == 0
     assert "3 to do, 0 done" in capsys.readouterr().out
+    assert (fleet / "out" / "fleet.sqlite").read_bytes() == state  # a dry run writes nothing
 
 
 def test_a_dry_run_says_what_is_wrong_with_which_flight(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -60,7 +60,7 @@ class StoredDocument(Mapping[str, Any]):
         self._path, self._flight = path, flight
 
     def _content(self) -> dict[str, Any]:
-        connection = sqlite3.connect(f"file:{self._path}?mode=ro", uri=True)
+        connection = _opened_to_read(self._path)
         try:
             row = connection.execute("SELECT gap FROM flights WHERE flight = ?", (self._flight,)).fetchone()
         finally:
@@ -78,16 +78,21 @@ class StoredDocument(Mapping[str, Any]):
 
 
 class FleetState:
-    """The state file of a fleet's folder. Every call raises InputError where the file cannot be read or written."""
+    """The state file of a fleet's folder. Every call raises InputError where the file cannot be read or written.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    ``read_only``: nothing is written; hashes that are to be remembered are not.
+    """
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        self.path, self._read_only = path, read_only
         with self._errors():
-            self._connection = sqlite3.connect(path)
+            self._connection = _opened_to_read(path) if read_only else sqlite3.connect(path)
             self._connection.execute("PRAGMA synchronous = FULL")
             version = self._connection.execute("PRAGMA user_version").fetchone()[0]
             if version not in (0, _VERSION):
                 raise InputError(f"{path}: of another version of the program; give another folder as --out")
+            if read_only:
+                return
             with self._connection:
                 self._connection.executescript(_SCHEMA)
                 self._connection.execute(f"PRAGMA user_version = {_VERSION}")
@@ -113,6 +118,8 @@ class FleetState:
 
     def remember_hash(self, path: str, stamp: str, digest: str) -> None:
         """Keep the hash of an input for as long as its stamp stays; it is written with what is next kept."""
+        if self._read_only:
+            return
         with self._errors():
             self._connection.execute("REPLACE INTO inputs VALUES (?, ?, ?)", (path, stamp, digest))
 
@@ -184,6 +191,10 @@ class FleetState:
             full = "full" in str(error) or "disk I/O" in str(error)
             remedy = "make room and start again; what was finished is kept" if full else "move it away and start again"
             raise InputError(f"{self.path}: cannot be read or written: {error}; {remedy}") from error
+
+
+def _opened_to_read(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
 
 
 def _packed(matrix: np.typing.NDArray[np.float64]) -> bytes:
