@@ -24,7 +24,10 @@ _SETTINGS: dict[str, Any] = {
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
     "distributed.worker.daemon": True,
+    # what Dask remembers of tasks that are over is kept short: it would grow with the number of flights
     "distributed.admin.system-monitor.log-length": 60,
+    "distributed.admin.low-level-log-length": 200,
+    "distributed.admin.log-length": 200,
     "distributed.nanny.pre-spawn-environ.OMP_NUM_THREADS": 1,
     "distributed.nanny.pre-spawn-environ.MKL_NUM_THREADS": 1,
     "distributed.nanny.pre-spawn-environ.OPENBLAS_NUM_THREADS": 1,
