@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 
 _SYSTEMS = ("flight_control", "autopilot", "system")
 
+#: Folders in a model's own that hold parts of it.
+_OWN_FOLDERS = ("systems", "engines", "engine")
+
 _MASSES = ("mass_error", "inertia_error", "cg_shift")
 
 
@@ -114,10 +117,13 @@ class _Parts:
 def _copy(files: ModelFiles, folder: Path) -> ModelFiles:
     """The model's own folder, and the engines and systems that it refers to."""
     place = folder / "aircraft" / files.name
-    pictures = shutil.ignore_patterns("*.png", "*.jpg", "*.jpeg", "*.ac", "*.rgb", "*.pdf", "*.wav", "*.gif")
-    shutil.copytree(files.folder, place, ignore=pictures)
-    for path in [place, *place.rglob("*")]:
-        path.chmod(0o755 if path.is_dir() else 0o644)
+    # the folder may hold anything else, the results that are being written among it
+    parts = [part for part in files.folder.iterdir() if part.is_dir() and part.name.lower() in _OWN_FOLDERS]
+    for source in (files.folder, *parts):
+        target = place / source.relative_to(files.folder)
+        target.mkdir(parents=True)
+        for path in source.glob("*.xml"):
+            shutil.copyfile(path, target / path.name)
     for kind, source in (("engine", files.engines), ("systems", files.systems)):
         target = folder / kind
         target.mkdir()

@@ -183,3 +183,14 @@ def test_a_simulator_that_is_not_the_aircrafts_is_one_line(file, text, said):
     with pytest.raises(InputError, match=said) as error:
         user_simulator(text, known)
     assert "\n" not in str(error.value)
+
+
+def test_a_copy_may_lie_in_the_models_own_folder(survey, file, tmp_path):
+    """A model that lies among results: nothing but the model's XML is copied."""
+    own = write_corrected(survey, file, file, tmp_path / "own").files.folder
+    (own / "results").mkdir()
+    (own / "results" / "bag.mcap").write_text("")
+    found = replace(survey, files=replace(survey.files, folder=own))
+    copied = write_corrected(found, file, having(file, mass_error={"error": 0.1}), own / "results" / "corrected")
+    assert {path.suffix for path in copied.files.folder.rglob("*") if path.is_file()} == {".xml"}
+    assert not (copied.files.folder / "results").exists()
