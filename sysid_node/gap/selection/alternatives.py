@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
@@ -17,6 +19,7 @@ from sysid_node.gap.selection.comparison import Comparison
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.replacement import next_step
 from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.sim.model.parameters import stated_parameters
 
 
 @dataclass(frozen=True)
@@ -146,8 +149,23 @@ class _Alternative:
             return 0
         return len(cause.indices) - len(added.indices)
 
+    @property
+    def alike(self) -> bool:
+        larger = self.position.chosen if self.fewer > 0 else self.fitted
+        candidate = self.position.measured.candidate if self.fewer > 0 else self.fitted.added
+        return bool(self.fewer) and candidate is not None and _are_alike(larger, candidate)
+
     @cached_property
     def lead(self) -> float:
         chosen = self.position.chosen
         predictive = self.fitted.evidence.total - chosen.evidence.total
         return predictive + log_bayes_factor(self.fitted.fit, chosen.fit)
+
+
+def _are_alike(fitted: FittedSet, candidate: Candidate) -> bool:
+    """Whether a candidate's sizes of several controls are the same within 1.96 sigma of the simulator's own errors."""
+    point = fitted.fit.flights[0].point
+    every = stated_parameters(fitted.fit.simulator.layout, candidate.effect).values()
+    sizes = np.array([each.value(point) for each in every if not set(each.entries).isdisjoint(candidate.indices)])
+    spread = 1.96 * THRESHOLDS.validation.discrepancy * np.abs(sizes.mean())
+    return len(sizes) > 1 and bool(np.abs(sizes - sizes.mean()).max() < spread)

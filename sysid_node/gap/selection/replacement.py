@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import copysign, inf
 from typing import Protocol
 
 from sysid_node.gap.selection.acceptance import ComparisonScores, is_accepted
@@ -33,6 +34,10 @@ class AlternativeScores(Protocol):
     @property
     def fewer(self) -> int:
         """Parameters that it has fewer than the cause, where both are variants of one effect; else 0."""
+
+    @property
+    def alike(self) -> bool:
+        """Whether the sizes of the variant with more parameters are the same within what sizes are known to."""
 
 
 class PositionScores(Protocol):
@@ -59,6 +64,7 @@ class AlternativeTable:
     comparison: ComparisonScores
     lead: float
     fewer: int = 0
+    alike: bool = False
 
 
 @dataclass(frozen=True)
@@ -88,10 +94,13 @@ def next_step(
     Of several causes that are not needed, that one is dropped without which flight not fitted is best predicted; a
     single cause is not dropped here. Alternatives whose label is ``barred`` are left out. Of the variants of one effect
     (all controls alike, one, each by itself) the one with fewer parameters takes the place unless the other leads by
-    the penalty of its parameters: predictions are so precise that a trifle would decide otherwise.
+    the penalty of its parameters, and in any case where the sizes of the other are alike: predictions are so precise
+    that a difference of a hundredth, which is the simulator's own error, would decide otherwise.
     """
 
     def lead(alternative: AlternativeScores) -> float:
+        if alternative.fewer and alternative.alike:
+            return copysign(inf, alternative.fewer)
         return alternative.lead + 0.5 * thresholds.search.penalty * alternative.fewer
 
     needless = [

@@ -94,3 +94,9 @@ def test_of_two_variants_of_an_effect_the_simpler_takes_the_place_unless_the_oth
     assert next_step([cause(variant(8.0, -2))]) is None
     assert next_step([cause(variant(11.5, -2))]) == Step(0, 0)
     assert next_step([cause(variant(8.0, 0))]) == Step(0, 0)
+
+
+def test_a_variant_whose_sizes_are_alike_gives_way_to_the_simpler_one_and_does_not_come_back():
+    assert next_step([cause(AlternativeTable("all alike", ACCEPTED, -15.0, 2, True))]) == Step(0, 0)
+    assert next_step([cause(AlternativeTable("each by itself", ACCEPTED, 15.0, -2, True))]) is None
+    assert next_step([cause(AlternativeTable("another effect", ACCEPTED, -15.0, 0, True))]) is None
