@@ -106,7 +106,7 @@ class PredictiveEvidence:
     """Predictive scores, and the probabilities of explanations that follow."""
 
     groups: int = _threshold(8, "1", "groups of neighbouring windows that a flight is divided into, at most")
-    fewest: int = _threshold(3, "1", "groups below which the power of what is left is that of the fits")
+    fewest: int = _threshold(3, "1", "groups below which the power that the fits leave counts, too")
     draws: int = _threshold(2000, "1", "draws of the Bayesian bootstrap over the groups")
 
 

@@ -17,7 +17,10 @@ from sysid_node.cli.main import build_parser, main
 
 PAGES = pages()
 #: Programs that are not ours, or that change the machine: a page may show them, with the reason why they are not run.
-FOREIGN = ("cd", "git", "rosdep", "colcon", ".", "pip", "ros2", "apt", "sudo", "MicroXRCEAgent")
+FOREIGN = (
+    *("cd", "mkdir", "cp", "printf", ".", "sudo", "apt", "git"),
+    *("pip", "dask", "rosdep", "colcon", "ros2", "MicroXRCEAgent"),
+)
 
 
 def name_of(page: Path) -> str:

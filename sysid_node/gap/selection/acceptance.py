@@ -39,6 +39,11 @@ class RemainingPower:
         """Power (12,) that the candidate removes."""
         return self.without - self.with_it
 
+    @property
+    def share_removed(self) -> Array:
+        """Share (12,) of the power that the candidate removes; zero where there is none."""
+        return np.divide(self.removed, self.without, out=np.zeros_like(self.without), where=self.without > 0.0)
+
 
 @dataclass(frozen=True)
 class RemainingStructure:

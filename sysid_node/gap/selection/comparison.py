@@ -78,14 +78,19 @@ class Comparison:
 
     @cached_property
     def power(self) -> RemainingPower:
-        """Power left on flight not fitted; of a flight too short to be divided, what the fits leave.
+        """Power left on flight not fitted; of a flight too short to be divided, by channel, what more is removed of.
 
-        Half a manoeuvre does not determine what predicts the other half. That is seen by the predictive density, which
-        knows how uncertain it is, but not by the power of the prediction's error.
+        Half a manoeuvre may not determine what predicts the other half. That is seen by the predictive density, which
+        knows how uncertain it is, but not by the power of the prediction's error. What the fits leave counts as well.
         """
-        if self.fitted.evidence.scores.size < THRESHOLDS.evidence.fewest:
-            return RemainingPower(_powers(self.without.fit)[0], _powers(self.fitted.fit)[0])
-        return RemainingPower(power_left(self.without.evidence), power_left(self.fitted.evidence))
+        predicted = RemainingPower(power_left(self.without.evidence), power_left(self.fitted.evidence))
+        if self.fitted.evidence.scores.size >= THRESHOLDS.evidence.fewest:
+            return predicted
+        fits = RemainingPower(_powers(self.without.fit)[0], _powers(self.fitted.fit)[0])
+        more = fits.share_removed > predicted.share_removed
+        return RemainingPower(
+            np.where(more, fits.without, predicted.without), np.where(more, fits.with_it, predicted.with_it)
+        )
 
     @cached_property
     def structure(self) -> RemainingStructure:

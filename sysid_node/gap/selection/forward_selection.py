@@ -21,10 +21,10 @@ from sysid_node.gap.instruments.overidentification import (
     pooled_overidentification,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import is_accepted, predicts_better
+from sysid_node.gap.selection.acceptance import is_accepted, predicts_better, relieves
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
-from sysid_node.gap.selection.comparison import Comparison, probability_against
+from sysid_node.gap.selection.comparison import Comparison, joint_deviation, probability_against
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.screening import best_screened, with_found_onsets
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -55,6 +55,11 @@ class Attribution:
     def size_fit(self) -> CandidateFit:
         """The fit that the sizes of causes and their standard errors are from."""
         return self.size_source or self.corrected
+
+    @property
+    def relieves_derivatives(self) -> bool:
+        """Whether the derivatives are plausible together beside the causes, and are not without them."""
+        return relieves((joint_deviation(self.base.fit), joint_deviation(self.chosen.fit)))
 
     def as_in_file(self) -> Attribution:
         """The same with the aircraft file as the corrected fit: where fitted derivatives predict worse."""

@@ -17,8 +17,6 @@ from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidenc
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import OveridentificationTest
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import relieves
-from sysid_node.gap.selection.comparison import joint_deviation
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation import spectral_error
 from sysid_node.gap.validation.kfold import kfold_evidence
@@ -118,15 +116,10 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
             continue
         if file_predicts_better(found[1].gaps):
             found = _with_better_derivatives(*found, validator)
-        if causes_stand(found[1].gaps, excused=not _relieved(found[0])):
+        if causes_stand(found[1].gaps, excused=not found[0].relieves_derivatives):
             return found
     bare = attribution.without_causes()
     return bare, validator(bare)
-
-
-def _relieved(explanation: Attribution) -> bool:
-    """Whether the derivatives are plausible together with the causes, and are not without them."""
-    return relieves((joint_deviation(explanation.base.fit), joint_deviation(explanation.chosen.fit)))
 
 
 def _explanations(attribution: Attribution) -> Iterator[Attribution]:

@@ -52,8 +52,12 @@ def test_powers_are_those_of_the_residuals(lag) -> None:
     whole = replace(lag.fitted.evidence, scores=np.zeros(8))
     divided = replace(lag, fitted=replace(lag.fitted, evidence=whole))
     np.testing.assert_allclose(divided.power.without, power_left(lag.without.evidence))
-    left = np.abs(lag.without.fit.flights[0].residual) ** 2  # two groups: too short to be divided
-    np.testing.assert_allclose(lag.power.without, (left[:, 1:].sum(axis=1) + 0.5 * left[:, 0]).sum(0))
+    without, with_it = (
+        (power[:, 1:].sum(axis=1) + 0.5 * power[:, 0]).sum(0)
+        for power in (np.abs(each.fit.flights[0].residual) ** 2 for each in (lag.without, lag.fitted))
+    )
+    of_fits = 1.0 - with_it / without  # two groups: too short to be divided
+    np.testing.assert_allclose(lag.power.share_removed, np.maximum(of_fits, divided.power.share_removed))
     means = 0.5 * len(residual) * np.abs(residual[:, 0].mean(axis=0)) ** 2
     np.testing.assert_allclose(lag.mean_power.without, means)
     measured = lag.fitted.fit.models[0].measured

@@ -20,6 +20,7 @@ class Explanation:
     chosen: Any = None
     causes: tuple[str, ...] = ("a cause",)
     smaller: float = 2.0  # without the least probable cause
+    relieves_derivatives: bool = False
 
     def by_least_squares(self) -> "Explanation":
         return Explanation(self.chosen.fit)
