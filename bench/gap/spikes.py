@@ -80,13 +80,17 @@ def diagnosed(folder: Path, case: Case) -> dict[str, Any]:
     """The line of a case: put into the flights and the belief, then diagnosed."""
     flight = FLIGHTS[case.flight]
     aircraft = misbelieved(belief(folder, flight), case.effect, case.values)
-    parts = [part(folder, flight, span) for span in (flight.fitted, flight.held) if span]
-    named = zip(("fitted", "held"), parts, strict=False)
-    records = {name: edited(record, case.effect, case.values) for name, record in named}
+    records = [
+        [edited(part(folder, flight, span), case.effect, case.values) for span in spans]
+        for spans in (flight.fitted, flight.held)
+    ]
     begin, said, refusal = time.process_time(), None, ""
     try:
-        fitted, *held = (gap_flight(aircraft, record, name) for name, record in records.items())
-        said = document(diagnose(aircraft, [fitted], held))
+        fitted, held = (
+            [gap_flight(aircraft, record, f"{name} {number}") for number, record in enumerate(group)]
+            for name, group in zip(("fitted", "held"), records, strict=True)
+        )
+        said = document(diagnose(aircraft, fitted, held))
     except InputError as error:
         refusal = str(error)
     return ledger.row(case, said, refusal, time.process_time() - begin, version())

@@ -41,7 +41,8 @@ def draw(folder: Path, which: str, seed: int) -> Case:
     weights = np.array([_WEIGHTS[name] for name in names], float)
     name = str(random.choice(names, p=weights / weights.sum()))
     flight = FLIGHTS[name]
-    effects = dict(_effects(folder, flight, belief(folder, flight)))
+    found = _effects(folder, flight, belief(folder, flight))
+    effects = {effect: size for effect, size in found if effect not in flight.cancelled}
     effect = str(random.choice(list(effects)))
     return Case(seed, name, effect, _sized(effects[effect], random))
 
@@ -65,7 +66,7 @@ def _sized(size: _Size, random: np.random.Generator) -> dict[str, float]:
 
 def _effects(folder: Path, flight: Flight, aircraft: Aircraft) -> Iterator[tuple[str, _Size]]:
     """What can be put into a flight, with sizes in the aircraft's own measure."""
-    rate, chord = rate_of(part(folder, flight, flight.fitted)), aircraft.geometry.cbar
+    rate, chord = rate_of(part(folder, flight, flight.fitted[0])), aircraft.geometry.cbar
     lateral = set(flight.moved) & {"aileron", "rudder"}
     turning = [axis for axis, there in (("q", "elevator" in flight.moved), ("p", lateral), ("r", lateral)) if there]
     time = (max(0.04, 1.5 / rate), max(0.12, 3.5 / rate))
@@ -78,7 +79,7 @@ def _effects(folder: Path, flight: Flight, aircraft: Aircraft) -> Iterator[tuple
         _Size(dict.fromkeys(turning, (6.0 * gyro, 15.0 * gyro)) | {"az": (6.0 * accel, 15.0 * accel)}, True),
     )
     yield "imu_scale", _Size(dict.fromkeys(turning, (0.15, 0.3)), True)
-    yield "airspeed_scale", _Size({"error": (0.08, 0.2)}, True)
+    yield "airspeed_scale", _Size({"error": (0.12, 0.25)}, True)
     angles = [*(["alpha"] if "elevator" in flight.moved else []), *(["beta"] if lateral else [])]
     vane = flight.bias["alpha"]
     yield "vane_bias", _Size(dict.fromkeys(angles, (6.0 * vane, 10.0 * vane)), True)

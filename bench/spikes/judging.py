@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 #: Probability above which a cause that is not there counts as blamed in a record as it is.
@@ -33,8 +34,16 @@ class Judged:
     stated: tuple[tuple[float, bool], ...]
 
 
-def judge(row: Mapping[str, Any], holds: Sequence[str], unspiked: float | None) -> Judged:
-    """A case by its line of the ledger; ``unspiked`` is what the gap of the record as it is falls to."""
+def judge(
+    row: Mapping[str, Any],
+    holds: Sequence[str],
+    unspiked: float | None,
+    own: Mapping[str, float] = MappingProxyType({}),
+) -> Judged:
+    """A case by its line of the ledger; ``unspiked`` is what the gap of the record as it is falls to.
+
+    ``own`` are sizes of effects that the record itself holds: what is put in adds to them.
+    """
     effect, values = row["effect"], row["values"]
     stated = tuple((c["probability"], _there(c, effect, holds)) for c in row["causes"])
     wrong = any(p > BLAMED and not there for p, there in stated)
@@ -42,8 +51,11 @@ def judge(row: Mapping[str, Any], holds: Sequence[str], unspiked: float | None) 
         return Judged(None, None, None, wrong, stated)
     others = [c for c in row["causes"] if not _among(c, holds) or _among(c, (effect,))]
     named = bool(others) and _among(others[0], (effect,))
-    own = next((c for c in row["causes"] if c["effect"] == effect), None)
-    sized = all(_sized(own["parameters"], n, v) for n, v in _sizes(effect, values)) if named and own else None
+    found = next((c for c in row["causes"] if c["effect"] == effect), None)
+    more = own.get(effect, 0.0)
+    sized = (
+        all(_sized(found["parameters"], n, v + more) for n, v in _sizes(effect, values)) if named and found else None
+    )
     closed = None if unspiked is None or row["gap"] is None else row["gap"]["after"] <= (1.0 + _GAP) * unspiked
     return Judged(named, sized, closed, wrong, stated)
 

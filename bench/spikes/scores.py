@@ -17,7 +17,7 @@ _Pairs = Sequence[tuple[Mapping[str, Any], Judged]]
 def page(rows: Sequence[Mapping[str, Any]]) -> str:
     """The section of the documentation."""
     bare = {row["flight"]: row["gap"]["after"] for row in rows if not row["effect"] and row["gap"]}
-    pairs = [(row, judge(row, FLIGHTS[row["flight"]].holds, bare.get(row["flight"]))) for row in rows]
+    pairs = [(row, _judged(row, bare.get(row["flight"]))) for row in rows]
     spiked = [pair for pair in pairs if pair[0]["effect"]]
     unspiked = [pair for pair in pairs if not pair[0]["effect"]]
     stated = [each for _, judged in pairs for each in judged.stated]
@@ -36,6 +36,11 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
     if stated:
         parts += ["Probabilities as stated, and the share of them that is right:", calibration(stated)]
     return "\n\n".join(parts)
+
+
+def _judged(row: Mapping[str, Any], unspiked: float | None) -> Judged:
+    flight = FLIGHTS[row["flight"]]
+    return judge(row, flight.holds, unspiked, flight.own)
 
 
 def share(flags: Iterable[bool | None]) -> str:

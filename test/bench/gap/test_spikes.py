@@ -109,6 +109,13 @@ def test_an_effect_is_named_first_or_beside_what_the_record_holds() -> None:
     assert judge(_row("imu_bias", {"p": 0.06}, rivals), (), None).named
 
 
+def test_what_is_put_in_adds_to_what_the_record_holds_of_the_same_effect() -> None:
+    late = _cause("command_delay", delay=0.16)
+    row = _row("command_delay", {"delay": 0.1}, late)
+    assert judge(row, ("command_delay",), None, {"command_delay": 0.06}).sized
+    assert not judge(row, ("command_delay",), None).sized
+
+
 def test_nothing_may_be_blamed_in_a_record_as_it_is() -> None:
     assert judge(_row("", {}, _cause("imu_scale", 0.9, q=0.2)), (), None).blamed
     assert not judge(_row("", {}, _cause("imu_scale", 0.7, q=0.2)), (), None).blamed
@@ -130,6 +137,7 @@ def test_cases_are_drawn_alike_again_and_sets_apart() -> None:
     assert [case.flight for case in cases[:8]] == list(FLIGHTS)
     assert not any(case.effect for case in cases[:8])
     assert {case.effect for case in cases[8:]} <= set(EFFECTS)
+    assert not any(case.effect in FLIGHTS[case.flight].cancelled for case in cases)
     assert set(SETS) == {"development", "final"}
     assert [draw(RECORDS, "final", seed) for seed in range(8, 30)] != cases[8:]
 
@@ -142,3 +150,9 @@ def test_the_belief_has_the_derivatives_that_the_field_finds() -> None:
     assert found["Cm_alpha"] == pytest.approx(-1.476, rel=0.03)
     assert found["Cm_q"] == pytest.approx(-36.4, rel=0.05)
     assert found["Cm_de"] == pytest.approx(-1.87, rel=0.05)
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_the_belief_states_the_noise_that_the_record_shows() -> None:
+    """Of the HFB-320's pitch rate the upper third of the spectrum (3.5 to 5 Hz) has the power of 0.0003 to 0.0005."""
+    assert 3e-4 < belief(RECORDS, FLIGHTS["hfb320"]).noise["gyro"] < 5e-4
