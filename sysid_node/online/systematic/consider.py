@@ -7,15 +7,16 @@ inverse (mixed estimation of Theil & Goldberger, JASA 56, 1961; consider paramet
 tell of: Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, ch. VIII):
 
     J_c   = (V'X)^-1 V'Z_c                                  what kappa moves theta_c by, per unit
-    D_c   = P (Z_c - X_c J_c)
-    N     = diag(tolerance)^-2 + sum_c w_c D_c'D_c
-    kappa = - N^-1 sum_c w_c D_c'r_c,    cov kappa = N^-1
-    theta = theta(0) + J kappa,          cov theta = cov theta(0) + J N^-1 J'
+    D_c   = Z_c - X_c J_c
+    A     = diag(tolerance)^-2 + sum_c w_c D_c'P D_c
+    kappa = - A^-1 sum_c w_c D_c'P r_c,  cov kappa = A^-1
+    theta = theta(0) + J kappa,          cov theta = cov theta(0) + J A^-1 J'
 
 V are the instruments of X. P projects on all that is exogenous: the controls, the instruments, and the rates of both
-(two-stage least squares), so that neither sensor noise nor gusts are taken for an imperfection. Where X are their own
-instruments, they count as exogenous. w_c is one over the noise's energy per unit of the Gram matrix. All of it follows
-from the Gram matrix of the signals and their rates (``cross_spectra.moments``).
+(two-stage least squares), so that neither sensor noise nor gusts are taken for an imperfection. What the projection
+keeps of them nevertheless is taken out of both sums (``many_instruments``). Where X are their own instruments, they
+count as exogenous. w_c is one over the noise's energy per unit of the Gram matrix. All of it follows from the Gram
+matrix of the signals and their rates (``cross_spectra.moments``).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from scipy.linalg import solve_triangular
 from sysid_node.online.regression.least_squares import RIDGE, TINY, Solution, misfits
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic.column_changes import ColumnChanges
+from sysid_node.online.systematic.many_instruments import Scores
 
 Array = NDArray[np.float64]
 
@@ -70,11 +72,12 @@ def consider(
     sigmas: Array,
     centre: Array,
     means: Array,
+    freedom: Array,
 ) -> Considered:
     """From the ``gram`` (2N, 2N) of all signals and their rates, ``noise`` (C,) per unit of the Gram matrix.
 
     ``sigmas`` (K,) are the tolerances of what ``changes`` describes, ``centre`` (K,) its expected values before the
-    flight, and ``means`` (W,) the signals' means.
+    flight, ``means`` (W,) the signals' means, and ``freedom`` (C,) the noise's degrees of freedom.
     """
     columns, place = changes.columns, np.array([changes.columns.place(i) for i in range(equations.width)])
     N, v = columns.width, np.zeros((columns.width, len(equations.coefficients)))
@@ -88,7 +91,7 @@ def consider(
     J *= equations.belongs.T[:, :, None]
     # what the instruments find in the residuals is the noise's part, or rounding
     left = inverse @ ((gram[V, :N] @ v) * equations.belongs) * equations.belongs  # (P, C)
-    score, information = np.zeros(sigmas.size), np.zeros((sigmas.size, sigmas.size))
+    scores = Scores.none(sigmas.size)
     for block in range(int(equations.block.max()) + 1):
         project = _projection(equations, changes, place, gram, block)
         for c in np.flatnonzero((equations.block == block) & (noise > 0.0)).tolist():
@@ -96,10 +99,11 @@ def consider(
             np.add.at(D.T, X, -J[c])
             r[:N] = v[:, c]
             np.add.at(r, X, -left[:, c])
-            q = project @ np.column_stack([D.T, r])
-            information += q[:, :-1].T @ q[:, :-1] / noise[c]
-            score += q[:, :-1].T @ q[:, -1] / noise[c]
-    estimate, covariance = _posterior(information, score, centre / sigmas)
+            both = np.column_stack([D.T, r])
+            q = project @ both
+            further = project.shape[0] - int(equations.belongs[:, c].sum())  # than the unknowns take
+            scores.add(q[:, :-1].T @ q, D @ (gram @ both), further / max(float(freedom[c]), 1.0), float(noise[c]))
+    estimate, covariance = _posterior(*scores.weighed(), centre / sigmas)
     jacobian = _jacobian(equations, changes, v, J, sigmas, means)
     return Considered(sigmas * estimate, sigmas[:, None] * covariance * sigmas, jacobian / sigmas[:, None, None])
 

@@ -83,7 +83,7 @@ def systematic_errors(
     _, changes, means = known
     sigmas, centre = prior(imperfect, servos)
     noise = inflation * noise_per_gram(equations, spread, total)
-    found = consider(equations, solution, noise, gram, changes, sigmas, centre, means)
+    found = consider(equations, solution, noise, gram, changes, sigmas, centre, means, spread.freedom)
     at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
     late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
     late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m :]

@@ -1,0 +1,64 @@
+"""Scores without the bias of many instruments. Truth: Monte Carlo, with the imperfection that made the residuals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sysid_node.online.systematic.many_instruments import Scores
+
+ROWS, INSTRUMENTS, RUNS = 200, 20, 300
+TRUE = 0.7
+
+
+def drawn(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Instruments (ROWS, INSTRUMENTS), a sensitivity and a residual (ROWS,) whose noise is correlated with it."""
+    instruments = random.standard_normal((ROWS, INSTRUMENTS))
+    noise = random.standard_normal((ROWS, 2))
+    residual_noise = 0.8 * noise[:, 0] + 0.6 * noise[:, 1]
+    sensitivity = instruments @ np.full(INSTRUMENTS, 0.15) + noise[:, 0]
+    return instruments, sensitivity, residual_noise - sensitivity * TRUE
+
+
+def scores_of(random: np.random.Generator) -> Scores:
+    """The sums over one equation."""
+    instruments, sensitivity, residual = drawn(random)
+    D, both = sensitivity[None], np.column_stack([sensitivity, residual])
+    q = np.linalg.qr(instruments)[0].T @ both
+    scores = Scores.none(1)
+    scores.add(q[:, :1].T @ q, D @ both, INSTRUMENTS / ROWS, 1.0)
+    return scores
+
+
+def test_estimate_is_without_the_bias_of_two_stage_least_squares_and_its_error_is_the_scatter():
+    random = np.random.default_rng(3)
+    found, errors, two_stage = [], [], []
+    for _ in range(RUNS):
+        scores = scores_of(random)
+        information, score = scores.weighed()
+        found.append(-score[0] / information[0, 0])
+        errors.append(information[0, 0] ** -0.5)
+        # Nagar's score without what he subtracts
+        instruments, sensitivity, residual = drawn(random)
+        projected = np.linalg.qr(instruments)[0].T @ np.column_stack([sensitivity, residual])
+        two_stage.append(-(projected[:, 0] @ projected[:, 1]) / (projected[:, 0] @ projected[:, 0]))
+    scatter = np.std(found)
+    assert abs(np.mean(found) - TRUE) < 0.25 * scatter
+    assert abs(np.mean(two_stage) - TRUE) > 1.0 * np.std(two_stage)
+    np.testing.assert_allclose(np.median(errors), scatter, rtol=0.2)
+
+
+def test_what_the_flight_tells_less_of_than_the_tolerance_does_is_left_to_the_tolerance():
+    scores = Scores.none(2)
+    projected = np.array([[4.0, 0.0, -2.0], [0.0, 0.5, -0.4]])
+    scores.add(projected, projected, 0.0, 1.0)
+    information, score = scores.weighed()
+    np.testing.assert_allclose(information, [[4.0, 0.0], [0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(score, [-2.0, 0.0], atol=1e-12)
+
+
+def test_an_equation_whose_noise_is_taken_up_entirely_tells_nothing():
+    scores = Scores.none(1)
+    scores.add(np.array([[4.0, -2.0]]), np.array([[5.0, -3.0]]), 1.0, 1.0)
+    information, score = scores.weighed()
+    assert not information.any()
+    assert not score.any()
