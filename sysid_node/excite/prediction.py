@@ -22,6 +22,7 @@ from sysid_node.excite.segment import Segment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Inputs, SimulatedFlight, Simulator
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
+from sysid_node.sim.flying.lengths import padded
 from sysid_node.sim.flying.rollout import rollout
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model import parameters
@@ -35,9 +36,6 @@ MEASURED = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta
 #: States of the simulator whose initial values count as unknown: all but position and one part of the attitude, which
 #: a heading that is not measured leaves open.
 _INITIAL = (3, 4, 5, 7, 8, 10, 11, 12)
-
-#: Flights are computed in multiples of this number of samples.
-_BLOCK = 1000
 
 #: Smallest effect on an output, in its sigmas for a unit change, that is not taken for a rounding error.
 _ROUNDING = 1e-6
@@ -115,25 +113,20 @@ class Predictor:
         return commands
 
     def _fly(self, commands: Array) -> SimulatedFlight:
-        simulator, inputs, theta = self.simulator, self.simulator.inputs(_padded(commands)), self.simulator.neutral()
+        simulator, inputs, theta = self.simulator, self.simulator.inputs(commands), self.simulator.neutral()
         if self.autopilot is None:
             flight = simulator.rollout(theta, self.trim.initial, inputs)
         else:
             flight = fly_held(simulator, theta, self.trim, inputs, self.autopilot)
-        return simulator.check(SimulatedFlight(*(series[: len(commands)] for series in flight)))
+        return simulator.check(flight)
 
     def _slopes(self, commands: Array) -> Array:
         """Sensitivities (N, m, derivatives + initial states) of the measured outputs; rounding errors become zero."""
         simulator, unknowns = self.simulator, np.zeros(len(self.names) + len(_INITIAL))
-        arguments = (simulator.layout, simulator.model, unknowns, self.trim.initial, _padded(commands), simulator.step)
+        arguments = (simulator.layout, simulator.model, unknowns, self.trim.initial, padded(commands), simulator.step)
         slopes = np.asarray(slopes_of(*arguments, simulator.neutral()))[: len(commands), self._columns]
         largest = np.abs(slopes / self._sigma[:, None]).max(axis=(0, 1))
         return np.where(largest > _ROUNDING, slopes, 0.0)
-
-
-def _padded(commands: Array) -> Array:
-    """The commands, the last one repeated up to a multiple of ``_BLOCK``, so that few programs are compiled."""
-    return np.pad(commands, ((0, -len(commands) % _BLOCK), (0, 0)), mode="edge")
 
 
 def outputs_of(

@@ -139,5 +139,5 @@ def _diagnosis(
 
 def _model_of(simulator: Simulator, flight: GapFlight, surrogate: Surrogate | None) -> ResidualModel:
     """The residual model of a flight, with what the surrogate leaves of the simulator that it stands for."""
-    model = require_admissible(residual_model_of(simulator, flight))
+    model = require_admissible(residual_model_of(simulator, flight, will_be_fitted=True))
     return with_simulator_error(model, surrogate.error) if surrogate else model

@@ -17,6 +17,7 @@ from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.dynamics.attitude import quaternion
 from sysid_node.errors import InputError
 from sysid_node.sim.effects import Parameter
+from sysid_node.sim.flying.lengths import cut, padded
 from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight, rollout
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar, layout_of, model_of
@@ -184,8 +185,13 @@ class Simulator:
 
         ``jax.vmap`` and ``jax.jacfwd`` may transform it. A flight that diverges is not finite; ``check`` raises then.
         """
-        flight: SimulatedFlight = _rollout(self.layout, self.model, theta, initial, inputs, self.step)
-        return flight
+        fixed, samples = (self.layout, self.model, theta, initial), len(inputs.commands)
+        flight: SimulatedFlight
+        if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((theta, initial, inputs))):
+            flight = _rollout(*fixed, inputs, self.step)
+            return flight
+        flight = _rollout(*fixed, padded(inputs), self.step, samples)
+        return cut(flight, samples)
 
     def jacobian(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> Scalar:
         """d outputs / d theta, (N, 12, P), exact (forward mode)."""

@@ -10,6 +10,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.prediction import MEASURED, Predictor, outputs_of, slopes_of
 from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.sim.flying.lengths import padded, padded_length
 
 CDRW = load_aircraft("cdrw")
 SPEC = (
@@ -41,8 +42,8 @@ def outputs_and_commands(prediction):
 def fly(predictor, commands, unknowns):
     """Arguments of ``outputs_of`` and ``slopes_of``, padded to the length that is compiled already."""
     simulator = predictor.simulator
-    commands = np.pad(commands, ((0, 1000 - len(commands)), (0, 0)), mode="edge")
-    return simulator.layout, simulator.model, unknowns, predictor.trim.initial, commands, simulator.step
+    fixed = simulator.layout, simulator.model
+    return *fixed, unknowns, predictor.trim.initial, padded(commands), simulator.step, simulator.neutral()
 
 
 def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
@@ -96,9 +97,10 @@ def test_less_noise_tells_more_in_proportion(prediction):
 def test_the_length_computed_does_not_show(predictor, prediction):
     """Flights are padded to a round length; a flight of exactly that length has the same beginning."""
     plan = prediction.manoeuvre
-    longer = predictor.predict(parse_manoeuvre(plan.spec, CDRW, RATE, 999 / RATE))
     n = plan.time.size
-    assert len(longer.flight) == 1000
+    length = padded_length(n)
+    longer = predictor.predict(parse_manoeuvre(plan.spec, CDRW, RATE, (length - 1) / RATE))
+    assert len(longer.flight) == length
     assert np.array_equal(longer.flight["alpha"][:n], prediction.flight["alpha"])
     assert np.all(longer.information.standard_errors <= prediction.information.standard_errors * (1 + 1e-6))
 

@@ -52,17 +52,20 @@ _ACCELERATIONS = (("ax", "ay", "az"), ("p_rate", "q_rate", "r_rate"))
 _measured_coefficients = jax.jit(coefficients)
 
 
-def residual_model_of(simulator: Simulator, flight: GapFlight, seed: int = 0) -> ResidualModel:
+def residual_model_of(
+    simulator: Simulator, flight: GapFlight, seed: int = 0, *, will_be_fitted: bool = False
+) -> ResidualModel:
     """The flight's residual model, with the power of its sensors' noise and the motion of the air.
 
-    Raises InputError where a signal is missing. ``seed`` is that of the noise's realisations.
+    Raises InputError where a signal is missing. ``seed`` is that of the noise's realisations. For a model that
+    ``will_be_fitted`` all programs of slopes are compiled meanwhile; otherwise each is when it is first needed.
     """
     record = resampled(flight, simulator.rate)
     windows = Windows.over(len(record), simulator.rate)
     axes = _measured_channels(flight, record)
     silent = noiseless_model(simulator, flight, record, windows, axes, ObserverMemory(LONGEST_MEMORY, LONGEST_MEMORY))
     with ThreadPoolExecutor(1) as pool:  # compiling needs the processor more than Python's lock
-        for program in silent.programs():
+        for program in silent.programs() if will_be_fitted else ():
             pool.submit(program)
         calm = _with_measured_noise(silent, seed)
     instruments = best_instrument_parameters(calm)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.attitude import euler_angles
+from sysid_node.sim.flying.lengths import cut, padded
 from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight, fly
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.chain import Chain
@@ -94,19 +95,20 @@ def fly_held(
 
     ``given`` (N,): at which samples the autopilot gives a new command, which is held until the next; None: at all.
     """
-    history = round(_LONGEST_DELAY * simulator.rate) + 2
+    history, samples = round(_LONGEST_DELAY * simulator.rate) + 2, len(inputs.commands)
     flight: SimulatedFlight = _fly_held(
         simulator.layout,
         history,
         simulator.model,
         theta,
         trim.initial,
-        inputs,
+        padded(inputs),
         simulator.step,
         autopilot,
-        None if given is None or given.all() else jnp.asarray(given),
+        padded(jnp.ones(samples, bool) if given is None else jnp.asarray(given)),
+        samples,
     )
-    return flight
+    return cut(flight, samples)
 
 
 @partial(jax.jit, static_argnums=(0, 1))
@@ -119,7 +121,8 @@ def _fly_held(
     inputs: Inputs,
     step: Scalar,
     autopilot: Autopilot,
-    given: Scalar | None,
+    given: Scalar,
+    samples: Scalar | int,
 ) -> SimulatedFlight:
     chain = Chain.of(layout, model, theta, step, -initial[2])
     columns = jnp.array([OUTPUTS.index(name) for name in _SEEN])
@@ -131,15 +134,14 @@ def _fly_held(
         correction = jnp.clip(wanted, -autopilot.limit, autopilot.limit)
         saturated = jnp.any(jnp.abs(wanted) > autopilot.limit)  # the integral stops while the correction is limited
         commanded = jnp.clip(planned + correction, autopilot.lowest, autopilot.highest)
-        if given is not None:
-            commanded = jnp.where(given[state.sample], commanded, state.history[-1])
+        commanded = jnp.where(given[state.sample], commanded, state.history[-1])
         past = jnp.concatenate([state.history[1:], commanded[None]])
         arriving = command.arrive_from_history(layout, chain.effects, past, step)
         integral = state.integral + jnp.where(saturated, 0.0, error * step)
         return commanded, arriving, _AutopilotState(integral, state.sample + 1, past)
 
     start = _AutopilotState(jnp.zeros(len(_SEEN)), jnp.ones((), int), jnp.tile(inputs.commands[0], (history, 1)))
-    return fly(chain, initial, inputs, pilot, start)
+    return fly(chain, initial, inputs, pilot, start, samples)
 
 
 def _loops(aircraft: Aircraft) -> dict[str, dict[str, float]]:

@@ -62,24 +62,45 @@ class StepState(NamedTuple):
 
 
 def rollout(
-    layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs: Inputs, step: Scalar
+    layout: Layout,
+    model: Model,
+    theta: Scalar,
+    initial: Scalar,
+    inputs: Inputs,
+    step: Scalar,
+    samples: Scalar | int | None = None,
 ) -> SimulatedFlight:
-    """The open-loop flight of parameters (P,) from the body's state (13,); pure. ``step`` is 1 / rate, s."""
+    """The open-loop flight of parameters (P,) from the body's state (13,); pure. ``step`` is 1 / rate, s.
+
+    Only the first ``samples`` count where the inputs are padded (see ``fly``).
+    """
     chain = Chain.of(layout, model, theta, step, -initial[2])
     arriving = command.arrive(layout, chain.effects, inputs.commands, step)
     follow: Pilot = lambda state, outputs, planned: (planned, planned, state)  # noqa: E731
-    flight = fly(chain, initial, inputs._replace(commands=arriving), follow, ())
+    flight = fly(chain, initial, inputs._replace(commands=arriving), follow, (), samples)
     return flight._replace(commands=inputs.commands)
 
 
-def fly(chain: Chain, initial: Scalar, inputs: Inputs, pilot: Pilot, pilot_state: Any) -> SimulatedFlight:
-    """The flight that a pilot controls; ``inputs.commands`` are planned, ``pilot_state`` is the pilot's first."""
+def fly(
+    chain: Chain,
+    initial: Scalar,
+    inputs: Inputs,
+    pilot: Pilot,
+    pilot_state: Any,
+    samples: Scalar | int | None = None,
+) -> SimulatedFlight:
+    """The flight that a pilot controls; ``inputs.commands`` are planned, ``pilot_state`` is the pilot's first.
+
+    Where the inputs are padded, only the first ``samples`` count: stamps see the readings end there.
+    """
     time = jnp.arange(inputs.commands.shape[0]) * chain.step
     gusts = airflow.gusts(chain.model, chain.effects, inputs.gusts, inputs.turbulence, time)
     coming = (_next(inputs.commands), _next(gusts), time + chain.step, inputs.noise)
     carry, surfaces = begin(chain, initial, inputs.commands[0], gusts[0], pilot_state)
     _, rows = jax.lax.scan(lambda c, new: advance(chain, pilot, c, *new), carry, coming)
     readings, states, coefficients, moved = rows
+    if samples is not None:
+        readings = readings[jnp.minimum(jnp.arange(readings.shape[0]), samples - 1)]
     stamped = clock.stamp(chain.effects, _continuous_angles(readings), chain.step)
     outputs = sensors.noisy(chain.model, chain.effects, stamped, inputs.noise)
     surfaces, commands = jnp.split(_previous(jnp.concatenate([surfaces, inputs.commands[0]]), moved), 2, axis=1)

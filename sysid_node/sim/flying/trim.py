@@ -94,7 +94,8 @@ def _solve(
         return np.asarray(_residual(*fixed, whole(z)))
 
     def slope(z: Array) -> Array:
-        return np.asarray(_slope(*fixed, whole(z)))[:, free]
+        columns = (_slope(*fixed, whole(z), direction) for direction in np.eye(len(start))[free])
+        return np.column_stack([np.asarray(column) for column in columns])
 
     solution = least_squares(
         residual,
@@ -140,9 +141,15 @@ def _residual(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: 
 
 
 @partial(jax.jit, static_argnums=0)
-def _slope(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
-    """d residual / d unknowns, (7, unknowns)."""
-    slope: Scalar = jax.jacfwd(lambda y: _residual(layout, model, theta, point, y))(z)
+def _slope(
+    layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar, direction: Scalar | Array
+) -> Scalar:
+    """The residual's derivative (7,) along a direction of the unknowns.
+
+    A program for all directions at once takes four times as long to compile, and a trim calls it a few times only.
+    """
+    slope: Scalar
+    _, slope = jax.jvp(lambda y: _residual(layout, model, theta, point, y), (z,), (direction,))
     return slope
 
 

@@ -1,0 +1,41 @@
+"""Flights padded to few lengths: each length of arrays needs a program of its own, which takes seconds to compile."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sysid_node.sim.flying.rollout import SimulatedFlight
+
+_Series = TypeVar("_Series")
+
+#: The shortest length, samples; each next one is twice as long, up to ``_BLOCK``, and then a multiple of that. Flights
+#: of 15 s, half a minute, one and two minutes at 100 Hz, with their last samples, fit closely.
+_SHORTEST, _BLOCK = 768, 12288
+
+
+def padded_length(samples: int) -> int:
+    """The length to which a flight of so many samples is padded."""
+    length = _SHORTEST
+    while length < min(samples, _BLOCK):
+        length *= 2
+    return length if samples <= length else -(-samples // _BLOCK) * _BLOCK
+
+
+def padded(series: _Series) -> _Series:
+    """A tree of series (N, ...) with their last values repeated up to ``padded_length``."""
+
+    def longer(values: jax.Array) -> jax.Array:
+        missing = padded_length(len(values)) - len(values)
+        return jnp.asarray(np.pad(values, [(0, missing)] + [(0, 0)] * (values.ndim - 1), mode="edge"))
+
+    longest: _Series = jax.tree.map(longer, series)
+    return longest
+
+
+def cut(flight: SimulatedFlight, samples: int) -> SimulatedFlight:
+    """The first samples of a flight that was padded."""
+    return SimulatedFlight(*(jnp.asarray(np.asarray(series)[:samples]) for series in flight))
