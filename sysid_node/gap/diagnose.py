@@ -10,7 +10,7 @@ from typing import Any
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
-from sysid_node.gap.estimation.predictive_density import transferred_parameters
+from sysid_node.gap.estimation.predictive_density import can_be_divided, transferred_parameters
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, inferred_again
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
 from sysid_node.gap.residuals.admissibility import require_admissible, require_distinct_flights
@@ -58,6 +58,15 @@ class Diagnosis:
     def models(self) -> tuple[ResidualModel, ...]:
         """The flights on which the gap is measured."""
         return self.check.models
+
+    @property
+    def measured_on(self) -> str:
+        """The flight on which the gap is measured, in words."""
+        if self.held_out:
+            return "the flight held out"
+        if can_be_divided(self.models):
+            return "parts of the flight that were not fitted"
+        return "the flight that was fitted, whose only manoeuvre cannot be divided"
 
     @property
     def gap(self) -> Gap:

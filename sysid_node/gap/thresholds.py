@@ -107,6 +107,12 @@ class PredictiveEvidence:
 
     groups: int = _threshold(8, "1", "groups of neighbouring windows that a flight is divided into, at most")
     fewest: int = _threshold(3, "1", "groups below which the power that the fits leave counts, too")
+    excited: float = _threshold(
+        0.75,
+        "1",
+        "share of the groups that the commands excite (effective number) below which flights cannot be divided: 0.4 to "
+        "0.6 where there is one manoeuvre, 0.9 and more where each is repeated",
+    )
     draws: int = _threshold(2000, "1", "draws of the Bayesian bootstrap over the groups")
 
 
@@ -172,6 +178,13 @@ class Calibration:
     constant: float = _threshold(-4.02, "1", "constant of the logistic regression", "bench/gap/calibration_weights.py")
     per_log_nat: float = _threshold(
         1.18, "1", "its weight of the natural logarithm of the log Bayes factor", "bench/gap/calibration_weights.py"
+    )
+    windows: float = _threshold(
+        9.8,
+        "1",
+        "windows in which the commands excite a flight (effective number), to which the log Bayes factor is scaled: "
+        "those of the flights that the weights were learned from",
+        "chosen: excited_windows of fifteen of these is 9.7 to 9.9",
     )
     flexible: float = _threshold(-1.12, "1", "its weight of a flexible effect", "bench/gap/calibration_weights.py")
     flexible_effects: frozenset[str] = _threshold(

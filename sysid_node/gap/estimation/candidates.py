@@ -15,6 +15,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, derivative_tolerances
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS, Simulator
 
 #: Effects that leave no residual of their own: motion of the air is measured by the vanes, and noise is no deficiency.
@@ -26,6 +27,9 @@ _OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_la
 
 #: Effects of propulsion, which a flight without measured thrust cannot show.
 _OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")
+
+#: Effects of the structure, which a flight that is compared below all structural modes cannot show.
+_OF_STRUCTURE = frozenset({"structural_mode"})
 
 #: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
 _FIXED = frozenset(
@@ -83,6 +87,8 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
     length = max(model.windows.starts[-1] + model.windows.length for model in models)
     unseen = UNOBSERVABLE | (_OF_VANES if any(model.flight.inferred for model in models) else frozenset())
     unseen |= frozenset() if all(model.flight.metered for model in models) else _OF_THRUST
+    band = min(model.windows.highest for model in models)
+    unseen |= _OF_STRUCTURE if band < THRESHOLDS.priors.lowest_mode else frozenset()
     for effect in EFFECTS:
         if effect in unseen:
             continue

@@ -23,7 +23,14 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.bounded_least_squares import solve
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit, linearised, stepped
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, HeldOutFlight, Nuisances
-from sysid_node.gap.estimation.spectral_weights import amplitudes, real_rows, residual_power, weights
+from sysid_node.gap.estimation.spectral_weights import (
+    amplitudes,
+    real_rows,
+    residual_power,
+    spectral_deviance,
+    weights,
+)
+from sysid_node.gap.residuals.excited_axes import commanded_by_window, effective_number
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -71,9 +78,45 @@ def with_neighbours(group: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     return np.arange(max(group[0] - 1, 0), min(group[-1] + 2, count))
 
 
-def cross_validated_evidence(fit: CandidateFit) -> Evidence:
-    """Evidence of the flights fitted: each group of windows predicted from those that do not overlap it."""
+def can_be_divided(models: Sequence[ResidualModel]) -> bool:
+    """Whether each group of the flights' windows can be predicted from the others.
+
+    Where the commands excite hardly more than one group, the others are quiet: without the only manoeuvre nothing can
+    be fitted, and what is predicted of it from noise says nothing for or against an explanation.
+    """
+    groups = [commanded_by_window(model)[group].sum(axis=0) for model in models for group in window_groups(model)]
+    return effective_number(np.array(groups)) > THRESHOLDS.evidence.excited * len(groups)
+
+
+def whole_flight_evidence(fit: CandidateFit) -> Evidence:
+    """Evidence of flights fitted that cannot be divided: the log evidence of all of them, by Laplace's approximation.
+
+    The spectrum of the noise is profiled out. The groups of windows bear equal shares (MacKay (1992), Neural
+    Computation 4(3), eq. 2.5).
+    """
     assert fit.information is not None
+    among = np.ix_(fit.uncertain, fit.uncertain)
+    (_, after), (_, before) = (np.linalg.slogdet(each[among]) for each in (fit.information, fit.prior_information))
+    residuals = [flight.residual for flight in fit.flights]
+    pairs = zip(fit.models, residuals, strict=True)
+    deviance = sum(spectral_deviance(model, (np.abs(residual) ** 2).mean(axis=0)) for model, residual in pairs)
+    flights = tuple(
+        FlightEvidence(f.model, residual, (exported_parameters(fit, f.point),) * len(window_groups(f.model)))
+        for f, residual in zip(fit.flights, residuals, strict=True)
+    )
+    count = sum(len(flight.points) for flight in flights)
+    total = -0.5 * deviance + fit.prior_score - 0.5 * float(after - before)
+    return Evidence(np.full(count, total / count), flights)
+
+
+def cross_validated_evidence(fit: CandidateFit) -> Evidence:
+    """Evidence of the flights fitted: each group of windows predicted from those that do not overlap it.
+
+    Of flights that cannot be divided it is that of the whole.
+    """
+    assert fit.information is not None
+    if not can_be_divided(fit.models):
+        return whole_flight_evidence(fit)
     scores: list[float] = []
     flights: list[FlightEvidence] = []
     grams = [

@@ -15,6 +15,7 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
+from sysid_node.gap.flightdata.time_scales import highest_frequency
 from sysid_node.gap.residuals.air_motion import (
     LONGEST_MEMORY,
     best_instrument_parameters,
@@ -61,7 +62,8 @@ def residual_model_of(
     ``will_be_fitted`` all programs of slopes are compiled meanwhile; otherwise each is when it is first needed.
     """
     record = resampled(flight, simulator.rate)
-    windows = Windows.over(len(record), simulator.rate)
+    highest = highest_frequency(simulator.aircraft, lateral=flight.lateral)
+    windows = Windows.over(len(record), simulator.rate, highest=highest)
     axes = _measured_channels(flight, record)
     silent = noiseless_model(simulator, flight, record, windows, axes, ObserverMemory(LONGEST_MEMORY, LONGEST_MEMORY))
     with ThreadPoolExecutor(1) as pool:  # compiling needs the processor more than Python's lock

@@ -26,16 +26,15 @@ _SIDEWAYS = frozenset({*LATERAL, "ay", "p", "r", "beta", "phi", "psi"})
 def excited_motions(models: Sequence[ResidualModel]) -> frozenset[str]:
     """Of ``longitudinal`` and ``lateral`` those that the commands of at least one flight excite.
 
-    A motion counts where the surfaces command a share of the strongest angular acceleration about it, or the thrust a
-    longitudinal acceleration that counts. Both count where nothing is commanded at all.
+    A motion counts where the surfaces command a share of the strongest angular acceleration of all flights about it, or
+    the thrust a longitudinal acceleration that counts. Both count where nothing is commanded at all.
     """
-    found: set[str] = set()
-    for model in models:
-        pitch, side = _commanded(model)
-        strongest, limits = max(pitch, side), THRESHOLDS.admission
-        found |= {IN_PLANE} if pitch > limits.share_of_command * strongest or _thrust(model) > limits.thrust else set()
-        found |= {SIDEWAYS} if side > limits.share_of_command * strongest else set()
-    return frozenset(found or MOTIONS)
+    pitch, side = np.max([_commanded(model) for model in models], axis=0)
+    limits = THRESHOLDS.admission
+    least = limits.share_of_command * max(pitch, side)
+    pushed = any(_thrust(model) > limits.thrust for model in models)
+    found = {IN_PLANE} if pitch > least or pushed else set()
+    return frozenset(found | ({SIDEWAYS} if side > least else set()) or MOTIONS)
 
 
 def quiet_motions(models: Sequence[ResidualModel]) -> list[str]:
@@ -55,19 +54,50 @@ def excited_channels(models: Sequence[ResidualModel]) -> NDArray[np.bool_]:
     return of_motions(CHANNELS, excited_motions(models))
 
 
+def excited_windows(models: Sequence[ResidualModel]) -> float:
+    """In how many windows of the spectra of all flights the commands excite the aircraft: the effective number."""
+    return effective_number(np.concatenate([commanded_by_window(model) for model in models]))
+
+
+def effective_number(powers: Array) -> float:
+    """The effective number of parts that are excited, from the powers (n, 3) that ``commanded_by_window`` gives them.
+
+    It is the inverse Simpson index of the power, each axis that is excited counted alike (Hill (1973), Ecology 54(2)):
+    all parts where the same manoeuvre is in each, two where the only manoeuvre is in two.
+    """
+    whole = powers.sum(axis=0)
+    if not whole.max() > 0.0:
+        return float(len(powers))
+    counted = whole > THRESHOLDS.admission.share_of_command**2 * whole.max()
+    shares = (powers[:, counted] / whole[counted]).mean(axis=1)
+    return float(1.0 / np.sum(shares**2))
+
+
+def commanded_by_window(model: ResidualModel) -> Array:
+    """Power (W, 3) of the angular accelerations in roll, pitch and yaw that the surfaces command, by window."""
+    spectra = model.windows.transform(np.column_stack(list(_accelerations(model).values())))
+    return np.asarray((np.abs(spectra[:, 1:]) ** 2).sum(axis=1))
+
+
 def _commanded(model: ResidualModel) -> tuple[float, float]:
     """Angular accelerations (rms about the mean, rad/s^2) in pitch, and in roll or yaw, that the surfaces command."""
+    sizes = {name: float(np.sqrt(np.mean(series**2))) for name, series in _accelerations(model).items()}
+    return sizes["Cm"], max(sizes["Cl"], sizes["Cn"])
+
+
+def _accelerations(model: ResidualModel) -> dict[str, Array]:
+    """Angular accelerations (N,) about the mean, rad/s^2, that the surfaces command, by coefficient of moment."""
     aircraft, record = model.simulator.aircraft, model.record
     pressure = float(np.mean(0.5 * record["rho"] * record["V"] ** 2)) * aircraft.geometry.S
     b, cbar, inertia = aircraft.geometry.b, aircraft.geometry.cbar, aircraft.inertia
     arms = {"Cl": b / inertia.Ixx, "Cm": cbar / inertia.Iyy, "Cn": b / inertia.Izz}
     commands = model.commands[:, :-1] - model.commands[:, :-1].mean(axis=0)
-    sizes = {}
+    found = {}
     for coefficient, arm in arms.items():
         known = (aircraft.derivatives.get(f"{coefficient}_{symbol}") for symbol in aircraft.control_symbols)
         slopes: Array = np.array([derivative.value if derivative else 0.0 for derivative in known])
-        sizes[coefficient] = pressure * arm * float(np.sqrt(np.mean((commands @ slopes) ** 2)))
-    return sizes["Cm"], max(sizes["Cl"], sizes["Cn"])
+        found[coefficient] = np.asarray(pressure * arm * (commands @ slopes))
+    return found
 
 
 def _thrust(model: ResidualModel) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
+from sysid_node.gap.flightdata.time_scales import HIGHEST_FREQUENCY
 
 Complex = NDArray[np.complex128]
 
@@ -26,9 +27,6 @@ LEAST_WINDOWS = 3.0
 #: Time that is left out at either end of a flight, s, where delayed signals are not known.
 MARGIN = 0.25
 
-#: Highest frequency, Hz: above it, vanes and rigid-body dynamics contain little information.
-HIGHEST_FREQUENCY = 4.0
-
 #: Number of independent coefficients for each coefficient.
 INDEPENDENT_SHARE = 0.5
 
@@ -38,26 +36,30 @@ BAND_EDGES = (0.0, 0.06, 0.3, 0.6, 1.0, 1.6, 2.4, HIGHEST_FREQUENCY + 0.1)
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of ``size`` samples at ``rate`` Hz, ``count`` of them, half a window apart, from ``first`` on."""
+    """Windows of ``size`` samples at ``rate`` Hz, ``count`` of them, half a window apart, from ``first`` on.
+
+    Above the frequency ``highest``, Hz, vanes and rigid-body dynamics contain little information.
+    """
 
     rate: float
     size: int
     count: int
     first: int = 0
+    highest: float = HIGHEST_FREQUENCY
 
     @classmethod
-    def over(cls, samples: int, rate: float, length: float = LENGTH) -> Windows:
+    def over(cls, samples: int, rate: float, length: float = LENGTH, highest: float = HIGHEST_FREQUENCY) -> Windows:
         """Windows of about this length, s, that fill a flight of so many samples except its ends."""
         first = round(MARGIN * rate)
         inner = samples - 2 * first
         halves = max(2, round(2.0 * inner / min(length * rate, inner / LEAST_WINDOWS)))
-        return cls(rate, 2 * (inner // halves), halves - 1, first)
+        return cls(rate, 2 * (inner // halves), halves - 1, first, highest)
 
     @property
     def frequencies(self) -> Array:
         """Lines (L,), Hz, from zero."""
         step = self.rate / self.size
-        lines: Array = np.asarray(np.arange(int(HIGHEST_FREQUENCY / step + 1e-9) + 1) * step, dtype=np.float64)
+        lines: Array = np.asarray(np.arange(int(self.highest / step + 1e-9) + 1) * step, dtype=np.float64)
         return lines
 
     @property

@@ -24,14 +24,19 @@ class CauseEvidence:
     log_bayes_factor: float  # nats by which what the commands predict is better accounted for with the cause
     misfit: float  # amplitude of what is left and depends on the cause, as a share of what the cause does
     flexible: bool  # the effect acts as other values of the file's derivatives
+    windows: float = THRESHOLDS.calibration.windows  # in which the commands excite the flights (effective number)
 
 
 def evidence_of(
-    effect: str, log_bayes_factor: float, tested: Misspecification, thresholds: Thresholds = THRESHOLDS
+    effect: str,
+    log_bayes_factor: float,
+    tested: Misspecification,
+    windows: float,
+    thresholds: Thresholds = THRESHOLDS,
 ) -> CauseEvidence:
     """The evidence of an effect from its log Bayes factor (nats) and the test of its equation."""
     flexible = effect in thresholds.calibration.flexible_effects
-    return CauseEvidence(log_bayes_factor, misfit_of(tested, thresholds), flexible)
+    return CauseEvidence(log_bayes_factor, misfit_of(tested, thresholds), flexible, windows)
 
 
 def misfit_of(tested: Misspecification, thresholds: Thresholds = THRESHOLDS) -> float:
@@ -61,8 +66,12 @@ def is_supported_but_misspecified(evidence: CauseEvidence, thresholds: Threshold
 
 
 def regressors(evidence: CauseEvidence) -> tuple[float, float, float]:
-    """Regressors (3,) of the logistic regression: one, log of the log Bayes factor (at least 1 nat), flexibility."""
-    return 1.0, float(np.log(max(evidence.log_bayes_factor, 1.0))), float(evidence.flexible)
+    """Regressors (3,) of the logistic regression: one, log of the log Bayes factor (at least 1 nat), flexibility.
+
+    The log Bayes factor is that of as much excited flight as the weights were learned from.
+    """
+    scaled = evidence.log_bayes_factor * THRESHOLDS.calibration.windows / evidence.windows
+    return 1.0, float(np.log(max(scaled, 1.0))), float(evidence.flexible)
 
 
 def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:

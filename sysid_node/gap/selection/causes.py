@@ -18,6 +18,7 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
+from sysid_node.gap.residuals.excited_axes import excited_windows
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
 from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, evidence_of, prior_odds
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
@@ -148,7 +149,8 @@ class _Successor:
 def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> CauseEvidence:
     """The evidence of a candidate that one fitted set has and another has not."""
     factor = log_bayes_factor(fitted.fit, without.fit)
-    return evidence_of(candidate.effect, factor, misspecification_of(fitted.fit, candidate))
+    windows = excited_windows(fitted.fit.models)
+    return evidence_of(candidate.effect, factor, misspecification_of(fitted.fit, candidate), windows)
 
 
 def _weighed(

@@ -106,16 +106,15 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
     """The first explanation that stands, and its validation.
 
     In this order: all causes; the same with the sizes of least squares; without the least probable cause; no cause.
-    Each is also tried with the file's own derivatives, where these predict better than the fitted ones. An explanation
-    whose predictions are not finite is passed over.
+    Each is also tried with the file's own derivatives, and kept so where these predict better. An explanation whose
+    predictions are not finite is passed over.
     """
     for explanation in _explanations(attribution):
         try:
             found = explanation, validator(explanation)
         except np.linalg.LinAlgError:
             continue
-        if file_predicts_better(found[1].gaps):
-            found = _with_better_derivatives(*found, validator)
+        found = _with_better_derivatives(*found, validator)
         if causes_stand(found[1].gaps, excused=not found[0].relieves_derivatives):
             return found
     bare = attribution.without_causes()
@@ -135,13 +134,17 @@ def _explanations(attribution: Attribution) -> Iterator[Attribution]:
 def _with_better_derivatives(
     attribution: Attribution, checked: Check, validator: Validator
 ) -> tuple[Attribution, Check]:
-    """The causes with the file's own derivatives, where these predict better than with the fitted ones."""
+    """The causes with the file's own derivatives, where these predict better than with the fitted ones.
+
+    What an effect does that the derivatives cannot account for, they are bent to. Beside the effect they may be right.
+    """
     explanation = attribution.with_file_derivatives()
     try:
         found = validator(explanation)
     except np.linalg.LinAlgError:
         return attribution, checked
-    if not file_derivatives_suit_causes(found.gaps, checked.gaps):
+    clearly = not file_predicts_better(checked.gaps)
+    if not file_derivatives_suit_causes(found.gaps, checked.gaps, clearly=clearly):
         return attribution, checked
     filed = found.as_in_file(attribution.structure_left)
     gap = spectral_error.gap_of(filed.base, found.final, attribution.structure_left)

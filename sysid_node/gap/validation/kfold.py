@@ -18,7 +18,9 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, step_limits, s
 from sysid_node.gap.estimation.predictive_density import (
     Evidence,
     FlightEvidence,
+    can_be_divided,
     exported_parameters,
+    whole_flight_evidence,
     window_groups,
     with_neighbours,
 )
@@ -31,7 +33,10 @@ def kfold_evidence(evidence: Evidence, fit: CandidateFit, *, filed: bool = False
     """The evidence with each group's residuals and parameters by the other groups, from a fit of ``liml_estimate``.
 
     ``filed`` holds the nuisances where they are. The scores stay: they compare explanations of the same flights.
+    Flights that cannot be divided are predicted by the fit to all of them.
     """
+    if not can_be_divided(fit.models):
+        return replace(evidence, flights=whole_flight_evidence(fit).flights)
     flights = []
     for number, (flight, steps) in enumerate(zip(fit.flights, steps_without_groups(fit, filed=filed), strict=True)):
         residual = amplitudes(flight.rows, flight.weights)

@@ -64,9 +64,19 @@ def file_predicts_better(errors: Sequence[Errors]) -> bool:
     return any(e.tolerances > e.before for e in errors)
 
 
-def file_derivatives_suit_causes(with_file: Sequence[Errors], with_fitted: Sequence[Errors]) -> bool:
-    """Whether causes predict better with the file's derivatives than with the fitted ones, by the last measure."""
-    return with_file[-1].after < with_fitted[-1].after
+def file_derivatives_suit_causes(
+    with_file: Sequence[Errors],
+    with_fitted: Sequence[Errors],
+    *,
+    clearly: bool = False,
+    thresholds: Thresholds = THRESHOLDS,
+) -> bool:
+    """Whether causes predict better with the file's derivatives than with the fitted ones, by the last measure.
+
+    ``clearly``: by more than a tie, which is asked for where without causes the fitted ones predict better.
+    """
+    least = thresholds.validation.tie if clearly else 1.0
+    return with_file[-1].after * least < with_fitted[-1].after
 
 
 def shares_taken_away(readings: Mapping[str, Mapping[str, float]]) -> tuple[float, ...]:

@@ -1,12 +1,21 @@
 """Probabilities from scores: sure where every group agrees, not where one group decides."""
 
+from dataclasses import replace
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from sysid_node.gap.estimation.candidate_fit import unfitted
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
-from sysid_node.gap.estimation.predictive_density import cross_validated_evidence, held_out_evidence, probabilities
+from sysid_node.gap.estimation.predictive_density import (
+    can_be_divided,
+    cross_validated_evidence,
+    held_out_evidence,
+    probabilities,
+    whole_flight_evidence,
+)
 
 
 def test_equal_scores_share() -> None:
@@ -34,3 +43,30 @@ def test_what_is_flown_is_what_is_written(plain_model) -> None:
         for point in evidence.flights[0].points:
             np.testing.assert_array_equal(point[others], neutral[others])
             assert np.any(point != neutral)
+
+
+def test_a_flight_whose_commands_rest_but_for_one_part_is_not_divided(plain_model) -> None:
+    assert can_be_divided([plain_model])
+    commands = np.array(plain_model.inputs.signals.commands)
+    commands[commands.shape[0] // 3 :] = commands[0]
+    signals = plain_model.inputs.signals._replace(commands=jnp.asarray(commands))
+    once = replace(plain_model, inputs=plain_model.inputs._replace(signals=signals))
+    assert not can_be_divided([once])
+
+
+def test_the_evidence_of_a_whole_flight_is_the_integral_of_likelihood_and_prior(plain_model) -> None:
+    """Truth: near its maximum the posterior is Gaussian; halving a prior's width where it is sure gains ln 2."""
+    nuisances = nuisances_of(plain_model.simulator.aircraft, plain_model)
+    fit = converged(unfitted([plain_model], nuisances), rounds=1)
+    narrow = replace(nuisances, sigma=0.5 * nuisances.sigma)
+    flights = tuple(replace(flight, nuisances=narrow) for flight in fit.flights)
+    other = replace(fit, flights=flights)
+    sharper = replace(other, information=fit.information + other.prior_information - fit.prior_information)
+    wide, sharp = whole_flight_evidence(fit), whole_flight_evidence(sharper)
+    free = int(fit.uncertain.sum())
+    gained = 0.5 * (np.linalg.slogdet(sharper.information)[1] - np.linalg.slogdet(fit.information)[1])
+    assert sharp.total - wide.total == pytest.approx(
+        free * np.log(2.0) - gained + other.prior_score - fit.prior_score, abs=1e-6
+    )
+    assert np.ptp(wide.scores) == 0.0
+    np.testing.assert_array_equal(wide.flights[0].residual, fit.flights[0].residual)

@@ -8,7 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sysid_node.gap.residuals.excited_axes import excited_channels, excited_motions, of_motions, quiet_motions
+from sysid_node.gap.residuals.excited_axes import (
+    effective_number,
+    excited_channels,
+    excited_motions,
+    excited_windows,
+    of_motions,
+    quiet_motions,
+)
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 
 
@@ -56,3 +63,23 @@ def test_what_was_not_measured_is_not_listed_as_quiet(plain_model) -> None:
     model = flown_with(plain_model, "de")
     in_plane = replace(model, measurement=model.measurement, flight=replace(model.flight, lateral=False))
     assert quiet_motions([in_plane]) == []
+
+
+def test_a_motion_that_hardly_moves_beside_another_flight_of_the_same_aircraft_is_quiet(plain_model) -> None:
+    """A small rudder manoeuvre, in which the elevator holds, beside one with large ailerons."""
+    rolling, holding = flown_with(plain_model, "da"), flown_with(plain_model, "de")
+    commands = np.array(holding.inputs.signals.commands)
+    commands[:, 0] *= 0.01
+    signals = holding.inputs.signals._replace(commands=jnp.asarray(commands))
+    holding = replace(holding, inputs=holding.inputs._replace(signals=signals))
+    assert excited_motions([holding]) == {"longitudinal"}
+    assert excited_motions([rolling, holding]) == {"lateral"}
+
+
+def test_windows_are_counted_by_what_is_commanded_in_them(plain_model) -> None:
+    """By hand: n equal parts count n, one alone one; two axes, each in another part, two."""
+    assert effective_number(np.ones((7, 3))) == pytest.approx(7.0)
+    assert effective_number(np.eye(5)[:, [2, 2, 2]]) == pytest.approx(1.0)
+    assert effective_number(np.eye(6)[:, [1, 4, 4]] * [1.0, 0.0, 0.3]) == pytest.approx(2.0)
+    assert effective_number(np.zeros((4, 3))) == 4.0
+    assert 0.8 * plain_model.windows.count < excited_windows([plain_model]) <= plain_model.windows.count

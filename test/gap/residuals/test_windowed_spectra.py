@@ -49,3 +49,13 @@ def test_power_is_averaged_within_each_band_and_nowhere_else(random) -> None:
 def test_the_power_of_a_residual_is_its_sum_of_squares_with_the_mean_by_half() -> None:
     residual = np.ones((4, 5, 12), complex)
     np.testing.assert_allclose(power_of(residual), 4 * (0.5 + 4.0))
+
+
+def test_a_slow_aircraft_is_compared_in_a_narrower_band() -> None:
+    wide, narrow = (Windows.over(2000, 50.0, highest=highest) for highest in (4.0, 1.3))
+    assert narrow.frequencies[-1] <= 1.3 < narrow.frequencies[-1] + 1.0 / narrow.length
+    np.testing.assert_array_equal(narrow.frequencies, wide.frequencies[: narrow.frequencies.size])
+    series = np.sin(np.arange(2000) / 7.0)
+    np.testing.assert_allclose(
+        narrow.transform(series), wide.transform(series)[:, : narrow.frequencies.size], atol=1e-12
+    )

@@ -65,6 +65,11 @@ def test_the_probability_is_the_logistic_regressions() -> None:
     assert regressors(evidence(-5.0)) == (1.0, 0.0, 0.0)  # no support counts as one nat
 
 
+def test_the_same_support_by_a_quarter_of_the_flight_says_as_much_as_four_times_by_all_of_it() -> None:
+    short = replace(evidence(50.0), windows=0.25 * LIMITS.windows)
+    assert calibrated_probability(short) == pytest.approx(calibrated_probability(evidence(200.0)))
+
+
 def test_no_support_is_not_probable_and_a_large_one_is() -> None:
     assert calibrated_probability(evidence(0.0)) < LIMITS.probability < calibrated_probability(evidence(1e4))
 
@@ -72,8 +77,8 @@ def test_no_support_is_not_probable_and_a_large_one_is() -> None:
 def test_prior_odds_are_lower_for_flexible_effects() -> None:
     assert prior_odds("actuator_lag") == 1.0
     assert prior_odds("mass_error") == pytest.approx(np.exp(LIMITS.flexible))
-    assert evidence_of("mass_error", 10.0, misfit_table()).flexible
-    assert not evidence_of("actuator_lag", 10.0, misfit_table()).flexible
+    assert evidence_of("mass_error", 10.0, misfit_table(), LIMITS.windows).flexible
+    assert not evidence_of("actuator_lag", 10.0, misfit_table(), LIMITS.windows).flexible
 
 
 def misfit_table(contributed: float = 90.0, deviations: float = 10.0) -> Misspecification:

@@ -13,6 +13,7 @@ from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.calibration import calibrated_probability, evidence_of, is_supported_but_misspecified
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.misspecification import misspecification_of
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
 
 
@@ -26,9 +27,8 @@ def misfit(aircraft):
         fitter = CandidateFitter(nuisances, Checkpoint())
         base = fitter.fit_set(unfitted([model], nuisances), [])
         (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "imu_scale")
-        return evidence_of(
-            "imu_scale", 1000.0, misspecification_of(fitter.add_candidate(base, candidate).fit, candidate)
-        )
+        tested = misspecification_of(fitter.add_candidate(base, candidate).fit, candidate)
+        return evidence_of("imu_scale", 1000.0, tested, THRESHOLDS.calibration.windows)
 
     return of
 

@@ -74,6 +74,14 @@ def test_the_last_measure_decides_on_the_derivatives(after: float, suit: bool) -
     assert file_derivatives_suit_causes([GOOD._replace(after=9.0), GOOD._replace(after=after)], fitted) is suit
 
 
+@pytest.mark.parametrize(("after", "suit"), [(0.37, True), (0.39, False), (0.4, False)])
+def test_where_fitted_derivatives_predict_better_without_causes_the_file_must_lead_by_more_than_a_tie(
+    after: float, suit: bool
+) -> None:
+    fitted = [GOOD._replace(after=0.4)]
+    assert file_derivatives_suit_causes([GOOD._replace(after=after)], fitted, clearly=True) is suit
+
+
 def test_weather_accounts_for_an_error_in_every_reading_or_not_at_all() -> None:
     floors = np.array([[1.0, 2.0], [3.0, 4.0]])  # means 2 and 3
     limit = THRESHOLDS.validation.chance**2 * np.array([2.0, 3.0])

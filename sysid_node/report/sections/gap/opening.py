@@ -44,7 +44,7 @@ def channels(found: Diagnosis) -> Mapping[str, Any]:
     return {
         "rows": rows,
         "whole": [whole, ends],
-        "held_out": found.held_out,
+        "measured_on": found.measured_on,
         "short": bool(found.simulation_gap),
         "window": f"{WINDOW:g} s",
     }

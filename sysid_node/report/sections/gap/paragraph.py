@@ -113,7 +113,7 @@ def _share(found: Diagnosis) -> str:
 def _correction(found: Diagnosis, condition: str) -> str:
     """The error on flight that was not fitted, before and after; ``condition`` begins the sentence."""
     gap, (low, high) = found.size, found.size.ci95
-    flight = "the flight held out" if found.held_out else "parts of the flight that were not fitted"
+    flight = found.measured_on
     floor = f"Noise alone would leave {percent(gap.noise_floor)}."
     if gap.after > 0.95 * gap.before:
         return f"{condition} the error on {flight} is {percent(gap.after)} of the motion. {floor}"

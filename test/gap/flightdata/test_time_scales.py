@@ -1,0 +1,41 @@
+"""The band of an aircraft. Truth: modes that the documentation prints, from eigenvalues; and the literature."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Derivative, Reference
+from sysid_node.gap.flightdata.time_scales import dutch_roll, highest_frequency, roll_subsidence, short_period
+
+
+def test_modes_are_those_of_the_eigenvalues() -> None:
+    """cdrw: Dutch roll 0.90 Hz, roll subsidence 0.07 s by the equations of motion (aircraft_file.md)."""
+    aircraft = load_aircraft("cdrw")
+    assert dutch_roll(aircraft) == pytest.approx(0.9, rel=0.25)
+    assert roll_subsidence(aircraft) == pytest.approx(1.0 / (2.0 * np.pi * 0.07), rel=0.2)
+
+
+def test_modes_follow_the_airspeed() -> None:
+    """All derivatives held, they are proportional to it."""
+    aircraft = load_aircraft("cdrw")
+    slow = replace(aircraft, reference=Reference(0.5 * aircraft.reference.airspeed, aircraft.reference.air_density))
+    for mode in (short_period, dutch_roll, roll_subsidence):
+        assert mode(slow) == pytest.approx(0.5 * mode(aircraft))
+
+
+def test_the_band_of_a_small_aircraft_is_the_widest_and_that_of_a_heavy_one_narrow() -> None:
+    aircraft = load_aircraft("cdrw")
+    assert highest_frequency(aircraft, lateral=True) == highest_frequency(aircraft, lateral=False) == 4.0
+    inertia = replace(aircraft.inertia, Ixx=30.0 * aircraft.inertia.Ixx, Iyy=30.0 * aircraft.inertia.Iyy,
+                      Izz=30.0 * aircraft.inertia.Izz)  # fmt: skip
+    heavy = replace(aircraft, inertia=inertia, mass=30.0 * aircraft.mass)
+    assert highest_frequency(heavy, lateral=False) == pytest.approx(4.0 * short_period(heavy))
+    assert highest_frequency(heavy, lateral=True) < 2.0
+
+
+def test_a_file_without_a_pitching_slope_says_nothing_of_the_band() -> None:
+    aircraft = load_aircraft("cdrw")
+    bare = replace(aircraft, derivatives={**aircraft.derivatives, "Cm_alpha": Derivative(0.0)})
+    assert highest_frequency(bare, lateral=True) == 4.0
