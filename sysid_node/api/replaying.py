@@ -183,7 +183,10 @@ def _estimated(
 def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> FaultVerdict:
     """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
     pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
-    published = (RecordedEstimates(stamp, identifier_estimates(estimates)) for stamp, estimates in pairs)
+    published = (
+        RecordedEstimates(stamp, identifier_estimates(estimates.derivatives.values(), estimates.servos.values()))
+        for stamp, estimates in pairs
+    )
     return judge(found.aircraft, FaultSettings(), found.streams, recorded_commands(bag), published, progress)
 
 

@@ -6,7 +6,7 @@ identifier's estimates are taken directly after the sample with their stamp.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import watch as watching
-from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.model.reference_model import IdentifierEstimates
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import FORCES, Fault
 from sysid_node.faults.watch import PERIOD, STALE_AFTER, Announcements, MessageWatch
@@ -30,7 +30,7 @@ class RecordedEstimates(NamedTuple):
     """The identifier's estimates at the sample with a header stamp."""
 
     stamp_ns: int
-    known: Mapping[str, IdentifierEstimate]
+    known: IdentifierEstimates
 
 
 class FaultReport(NamedTuple):

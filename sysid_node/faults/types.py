@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-#: Kinds of faults: five of a surface, four of a sensor, one of the airframe.
+#: Kinds of faults: six of a surface, four of a sensor, one of the airframe.
 LOSS, STUCK, HARD_OVER, SHIFTED = "loss of effectiveness", "stuck surface", "hard-over", "surface shifted"
-NOT_FOLLOWING = "surface does not follow"
+NOT_FOLLOWING, SLOWER = "surface does not follow", "servo slower"
 AIRSPEED, VANE_OFFSET, VANE_STUCK, SILENT = "airspeed wrong", "vane offset", "vane stuck", "sensor silent"
 DAMAGE = "structural damage"
 #: The evidence by which a fault was found.
-FORCES, POSITION, ARRIVAL = "forces", "position", "arrival"
+FORCES, POSITION, ARRIVAL, ESTIMATES = "forces", "position", "arrival", "estimates"
 
 
 class Change(NamedTuple):

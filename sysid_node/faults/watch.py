@@ -1,4 +1,4 @@
-"""The complete fault monitor, from messages to the present faults: by forces, servo positions and silent topics.
+"""The complete fault monitor, from messages to the present faults: by forces, servos and silent topics.
 
     watch = init(aircraft, FaultMonitorSettings(), stale_after=0.5)
     on_imu(watch, arrived, stamp_ns, values)            # and so on, for every message in the order of arrival
@@ -11,15 +11,17 @@ jumps, the node's or the recorder's. A fault's times are those of the samples: s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
 from sysid_node.faults.hypotheses import servo_check as servos
+from sysid_node.faults.hypotheses import servo_times
 from sysid_node.faults.hypotheses.servo_check import ServoState
+from sysid_node.faults.hypotheses.servo_times import ServoTimes
 from sysid_node.faults.model import blocks
-from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.model.reference_model import IdentifierEstimates
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import ARRIVAL, SILENT, Fault
@@ -47,6 +49,7 @@ class MessageWatch:
     heard: dict[str, tuple[float, float]] = field(default_factory=dict)  # by topic: arrival (s), ``now`` then
     moved: float = math.nan  # s, time of the last positions
     off_command: list[Fault] = field(default_factory=list)  # of surfaces that are not where they were commanded
+    servo_times: ServoTimes = field(default_factory=ServoTimes)
 
     @property
     def judged(self) -> float:
@@ -92,9 +95,10 @@ def on_command(watch: MessageWatch, stamp_ns: int, names: Sequence[str], positio
         servos.command(watch.servos, moment, controls)
 
 
-def on_estimates(watch: MessageWatch, known: Mapping[str, IdentifierEstimate]) -> None:
+def on_estimates(watch: MessageWatch, known: IdentifierEstimates) -> None:
     """Take the identifier's estimates of the last sample."""
-    monitor.receive_estimates(watch.state, watch.now, known)
+    monitor.receive_estimates(watch.state, watch.now, known.derivatives)
+    servo_times.receive(watch.servo_times, watch.now, known.servos, known.changed)
 
 
 def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
@@ -115,7 +119,7 @@ def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
         if now - arrived > watch.stale_after
     ]
     forces = [watch.state.fault] if watch.state.fault and not silent else []
-    return [*silent, *watch.off_command, *forces]
+    return [*silent, *watch.off_command, *watch.servo_times.faults, *forces]
 
 
 @dataclass

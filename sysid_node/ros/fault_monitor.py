@@ -13,7 +13,7 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.faults import watch as watching
-from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.settings import RANGES, FaultMonitorSettings
 from sysid_node.faults.types import Fault
 from sysid_node.faults.watch import PERIOD, STALE_AFTER, Announcements
@@ -107,8 +107,7 @@ class FaultMonitor(LoopNode):
         watching.on_command(self._watch, *messages.actuators(numbers, texts))
 
     def _on_estimates(self, message: Any) -> None:
-        known = {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in message.derivatives}
-        watching.on_estimates(self._watch, known)
+        watching.on_estimates(self._watch, identifier_estimates(message.derivatives, message.servos))
 
     # Reports
 

@@ -6,9 +6,11 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.faults import watch as watching
+from sysid_node.faults.model.reference_model import IdentifierEstimates, identifier_estimates
 from sysid_node.faults.settings import FaultMonitorSettings
-from sysid_node.faults.types import ARRIVAL, POSITION, SILENT, STUCK, Fault
+from sysid_node.faults.types import ARRIVAL, ESTIMATES, POSITION, SILENT, SLOWER, STUCK, Fault
 from sysid_node.faults.watch import Announcements, MessageWatch
+from sysid_node.online.types import DerivativeEstimate
 
 AIRCRAFT = load_aircraft("cdrw")
 JOINTS = ("throttle", "elevator", "aileron", "rudder")
@@ -83,3 +85,19 @@ def test_it_says_what_is_news_and_repeats_it_once_a_second() -> None:
     speech = Announcements()
     said = [k for k in range(40) if speech.due([jam] if k >= 15 else [], 0.1 * k)]
     assert said == [0, 10, 15, 25, 35]
+
+
+def test_a_servo_that_is_slower_after_a_change_is_among_the_faults(watch: MessageWatch) -> None:
+    """From the identifier's estimates as a message or a replay holds them: 20 ms before the change, 100 ms after it."""
+
+    def estimated(late: float, status: str) -> IdentifierEstimates:
+        servo = DerivativeEstimate("elevator", late, 0.004, late - 0.008, late + 0.008, True, "ok")
+        return identifier_estimates([DerivativeEstimate("Cm_de", -1.0, 0.1, -1.2, -0.8, False, status)], [servo])
+
+    for second in range(9):
+        flown(watch, second, second + 1.0)
+        status = "changed" if second == 5 else "ok"
+        watching.on_estimates(watch, estimated(0.02 if second < 5 else 0.1, status))
+    fault = only(watching.present_faults(watch, 9.0))
+    assert (fault.kind, fault.part, fault.source) == (SLOWER, "elevator", ESTIMATES)
+    assert fault.size == pytest.approx(0.08)

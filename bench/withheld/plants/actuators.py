@@ -38,6 +38,8 @@ class Actuators:
         limit, effects = self._limits[name], self._effects
         wanted = self._servo_step(name, max(-limit, min(limit, command)))
         tau = _of(effects, "actuator_lag", "time_constant", name, 0.0)
+        slows = effects.get("servo_slows", {})  # on no list: another lag of a control from ``onset`` (s) on
+        tau += slows.get(name, 0.0) if time >= slows.get("onset", math.inf) else 0.0
         share = 1.0 - math.exp(-self._step / tau) if tau else 1.0
         self._lagged[name] += share * (wanted - self._lagged[name])
         play = 0.5 * effects.get("actuator_backlash", {}).get(name, 0.0)

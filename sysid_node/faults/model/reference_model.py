@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sysid_node.faults.model.residual_whitening import WhiteningFilter
 from sysid_node.faults.model.terms import Terms
-from sysid_node.online.types import Estimates
+from sysid_node.online.types import DerivativeEstimate
 
 Array = NDArray[np.float64]
 
@@ -30,16 +30,31 @@ KEPT = 0.9995  # factor of the old information at each block: a memory of 200 s
 
 
 class IdentifierEstimate(NamedTuple):
-    """A derivative as identified."""
+    """A derivative, or how late a servo is (s), as identified."""
 
     value: float
     standard_error: float
     valid: bool
 
 
-def identifier_estimates(estimates: Estimates) -> dict[str, IdentifierEstimate]:
-    """The identifier's estimates in the form that the monitor takes."""
-    return {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in estimates.derivatives.values()}
+class IdentifierEstimates(NamedTuple):
+    """What the identifier says at one time, in the form that the monitor takes."""
+
+    derivatives: Mapping[str, IdentifierEstimate]
+    servos: Mapping[str, IdentifierEstimate]  # how late each control's is, s
+    changed: bool  # whether it announces a change of the aircraft
+
+
+def identifier_estimates(
+    derivatives: Iterable[DerivativeEstimate], servos: Iterable[DerivativeEstimate]
+) -> IdentifierEstimates:
+    """The identifier's estimates: those of a replay, or a message's."""
+    derivatives = list(derivatives)
+    known, late = (
+        {d.name: IdentifierEstimate(d.value, d.standard_error, d.valid) for d in those}
+        for those in (derivatives, servos)
+    )
+    return IdentifierEstimates(known, late, any(d.status == "changed" for d in derivatives))
 
 
 @dataclass
