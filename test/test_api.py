@@ -120,16 +120,3 @@ def test_a_table_for_pandas(replayed, flight):
 def test_mistakes_are_one_line(work, said):
     with pytest.raises(InputError, match=re.escape(said)):
         work()
-
-
-def test_the_pages_five_lines_run(tmp_path, monkeypatch):
-    """The first block of docs/python_api.md, as it stands there."""
-    (code, *_) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python_api.md").read_text(), re.DOTALL)
-    lines = [line for line in code.splitlines() if line and not line.startswith(("from", "import"))]
-    assert len(lines) == 5
-    monkeypatch.chdir(ROOT)
-    names: dict[str, object] = {}
-    exec(compile(code, "docs/python_api.md", "exec"), names)
-    assert "cdrw_multistep" in repr(names["flight"])
-    assert type(names["figure"]).__name__ == "Figure"
-    assert names["gap"].verdict == "no_gap"  # the bundled flight was made by the simulator that it is held against

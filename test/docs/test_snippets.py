@@ -8,6 +8,7 @@ import json
 import re
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -33,6 +34,7 @@ class Desk:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.printed: dict[str, str] = {}
+        self.first_names: dict[Path, dict[str, object]] = {}  # what a page's first block of Python leaves
         for name in ("bags", "config"):
             (folder / name).symlink_to(ROOT / name)
 
@@ -52,6 +54,7 @@ class Desk:
                 with contextlib.redirect_stdout(io.StringIO()) as out:
                     exec(compile(snippet.text, snippet.place, "exec"), names)
                 printed = out.getvalue()
+                self.first_names.setdefault(page, dict(names))
 
     def write_yaml(self, snippet: Snippet) -> None:
         assert yaml.safe_load(snippet.text) is not None, snippet.place
@@ -88,6 +91,23 @@ def test_what_the_page_shows_can_be_done(page: Path, desk: Desk, monkeypatch: py
     monkeypatch.chdir(desk.folder)
     monkeypatch.setenv("COLUMNS", "120")
     desk.work_through(page)
+
+
+def test_the_five_lines_of_the_python_interface_run(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first block of docs/python_api.md, as it stands there."""
+    page = ROOT / "docs" / "python_api.md"
+    (code, *_) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    lines = [line for line in code.splitlines() if line and not line.startswith(("from", "import"))]
+    assert len(lines) == 5
+    if page not in desk.first_names:
+        monkeypatch.chdir(desk.folder)
+        monkeypatch.setenv("COLUMNS", "120")
+        desk.work_through(page)
+    names = desk.first_names[page]
+    assert "cdrw_multistep" in repr(names["flight"])
+    assert type(names["figure"]).__name__ == "Figure"
+    gap: Any = names["gap"]
+    assert gap.verdict == "no_gap"  # the simulator made the bundled flight
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
