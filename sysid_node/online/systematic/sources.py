@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.systematic.column_changes import AXES, FORCES, RATES, ColumnChanges
+from sysid_node.online.systematic.column_changes import AXES, FORCES, RATES, ColumnChanges, Terms
 
 Change = Callable[[ColumnChanges, str, str], None]
 
@@ -156,9 +156,14 @@ def _vane_bias(changes: ColumnChanges, name: str, key: str) -> None:
 
 
 def _air_data_late(changes: ColumnChanges, name: str, key: str) -> None:
+    """The rates of what the probe measures: of the flow at the CG, and of its difference from the flow at the probe."""
     changes.turn_flow({"alpha": (0.0, 1.0)}, 0.0)
     changes.turn_sideslip({"beta": (0.0, 1.0)}, 0.0)
     changes.airspeed_varies({"0": (0.0, 0.5)})  # k goes with the airspeed's square
+    for along, arm in enumerate(changes.aircraft.sensors.air_data):
+        for change, rate, share in _probe_flow(changes, along):
+            # the flow at the CG is that at the probe and what a longer arm adds
+            change({rate: (0.0, -arm * share)}, 0.0)
 
 
 def _imu_late(changes: ColumnChanges, name: str, key: str) -> None:
@@ -227,18 +232,28 @@ def _probe_place(changes: ColumnChanges, name: str, key: str) -> None:
 
 def _probe_moved(changes: ColumnChanges, name: str, by: float) -> None:
     """The probe's arm is longer: the flow at the CG is that at the probe less rates x arm."""
-    along = AXES.index(name)
+    for change, rate, share in _probe_flow(changes, AXES.index(name)):
+        change({rate: (by * share, 0.0)}, by * share * changes.means.of(rate))
+
+
+def _probe_flow(changes: ColumnChanges, along: int) -> list[tuple[Callable[[Terms, float], None], str, float]]:
+    """What each m of the probe's arm ``along`` an axis changes of the flow at the CG, by which rate's column."""
     cos, sin = math.cos(changes.means.of("alpha")), math.sin(changes.means.of("alpha"))
-    for target, rate, sign in (((along + 1) % 3, (along + 2) % 3, -by), ((along + 2) % 3, (along + 1) % 3, by)):
-        share = sign * changes.per_column(RATES[rate]) * changes.means.k / changes.airspeed
-        mean = share * changes.means.of(RATES[rate])
-        source = RATES[rate]
+    found: list[tuple[Callable[[Terms, float], None], str, float]] = []
+    for target, turning, sign in (((along + 1) % 3, (along + 2) % 3, -1.0), ((along + 2) % 3, (along + 1) % 3, 1.0)):
+        rate = RATES[turning]
+        share = sign * changes.per_column(rate) * changes.means.k / changes.airspeed
         if target == 1:
-            changes.turn_sideslip({source: (share, 0.0)}, mean)
+            found.append((changes.turn_sideslip, rate, share))
             continue
         across, forward = (cos, sin) if target == 2 else (-sin, cos)
-        changes.turn_flow({source: (across * share, 0.0)}, across * mean)
-        changes.airspeed_varies({source: (forward * share, 0.0)})
+        found.append((changes.turn_flow, rate, across * share))
+        found.append((_airspeed_by(changes), rate, forward * share))
+    return found
+
+
+def _airspeed_by(changes: ColumnChanges) -> Callable[[Terms, float], None]:
+    return lambda terms, mean: changes.airspeed_varies(terms)
 
 
 def _cg(changes: ColumnChanges, name: str, key: str) -> None:

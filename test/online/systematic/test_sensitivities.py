@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from plant import fly, made_aircraft, multisteps
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from sysid_node.aircraft.model import Aircraft, Sensors
@@ -111,6 +112,36 @@ def test_the_imus_place_is_counted():
     ]
     difference = (moved[1] - moved[0]) / 0.02
     assert np.all(np.abs(jacobian - difference) < 0.05 * np.abs(difference) + 0.02 * np.abs(difference).max())
+
+
+def at_a_probe(samples: np.ndarray, arm: float) -> np.ndarray:
+    """The same flight with the flow as a probe has it ``arm`` (m) in front of the CG: velocity + rates x arm."""
+    found = samples.copy()
+    speed, alpha, beta = samples[:, V], samples[:, ALPHA], samples[:, ALPHA + 1]
+    u, w = speed * np.cos(beta) * np.cos(alpha), speed * np.cos(beta) * np.sin(alpha) - arm * samples[:, Q]
+    v = speed * np.sin(beta) + arm * samples[:, Q + 1]
+    found[:, V] = np.sqrt(u * u + v * v + w * w)
+    found[:, ALPHA], found[:, ALPHA + 1] = np.arctan2(w, u), np.arcsin(v / found[:, V])
+    return found
+
+
+def test_late_air_data_are_those_of_the_probe():
+    """Air data that are read later, at the probe and not at the CG, where the aircraft's rates are not in them."""
+    arm, step = 0.5, 1e-3
+    exact, samples = replace(EXACT, sensors=Sensors(air_data=(arm, 0.0, 0.0))), at_a_probe(flown()[1], arm)
+    state = identified(replace(exact, stated_tolerances={"delays.air_data": step}), samples)
+    assert state.latest is not None and state.latest.systematic is not None
+    jacobian = state.latest.systematic.considered.jacobian[0].reshape(-1)[state.model.table.place]
+    time, air = flown()[0], [V, ALPHA, ALPHA + 1]
+    ends = []
+    for by in (-step, step):
+        changed = samples.copy()
+        changed[:, air] = CubicSpline(time, samples[:, air])(np.clip(time + by, time[0], time[-1]))
+        ends.append(slopes_and_offsets(identified(exact, changed)))
+    difference = (ends[1] - ends[0]) / (2.0 * step)
+    slopes = [not name.endswith("_0") for name in EXACT.derivatives]
+    size = 0.02 * np.abs(difference).max()
+    assert np.all(np.abs(jacobian - difference)[slopes] < (0.1 * np.abs(difference) + size)[slopes])
 
 
 def late(samples: np.ndarray, lag: float) -> np.ndarray:
