@@ -51,9 +51,12 @@ class RegressionResponse:
             for c, regressors in self._structure.items()
         }
 
-    def __call__(self, records: Sequence[FlightRecord]) -> Array:
-        """(P,) change of the estimates, those of other parameters than the regressions' zero."""
-        flights = [measured_coefficients(self._aircraft, record) for record in records]
+    def __call__(self, records: Sequence[FlightRecord], aircraft: Aircraft | None = None) -> Array:
+        """(P,) change of the estimates, those of other parameters than the regressions' zero.
+
+        ``aircraft``: another file, by which the coefficients of the ``records`` are measured.
+        """
+        flights = [measured_coefficients(aircraft or self._aircraft, record) for record in records]
         change = np.zeros(len(self._names))
         for c, regressors in self._structure.items():
             rows = zip(self._residual(c, flights), self._residuals[c], flights, self._flights, strict=True)

@@ -6,8 +6,9 @@ estimates theta(kappa) move by G = d theta / d kappa. They are evaluated at m, a
     cov theta = (noise's part) + G P G'                                      (GUM: JCGM 100:2008, eq. 16)
 
 For lateness of servos and instruments G is the method's own (``sensitivities``), because fast signals weigh differently
-in every method. All other imperfections the derivatives can absorb: a mass that is off, say, scales the derivatives of
-all forces. They move every consistent estimator by the same amount, which the online estimator knows.
+in every method. So do slow ones, which the online estimator leaves out: a regression's G is its own for all that
+``perturbations`` can change in a flight. For other methods, and other imperfections, the online estimator's G is taken:
+what the derivatives can absorb, as a mass that scales those of all forces, moves every consistent estimator alike.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
-from sysid_node.batch.systematic.sensitivities import Response
+from sysid_node.batch.systematic.perturbations import perturbed
+from sysid_node.batch.systematic.sensitivities import RegressionResponse, Response
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.estimates.published import SERVO_KNOWN
 from sysid_node.online.systematic.budget import Budget
@@ -123,6 +125,8 @@ def _jacobian(
         if name in posterior.names:
             G[:, p] = posterior.jacobian[:, posterior.names.index(name)]
     timing, known = _timing(posterior), {}
+    if isinstance(response, RegressionResponse):
+        _own(G, aircraft, _records(aircraft, records, timing), names, posterior, response)
     for k, (one, error) in enumerate(zip(posterior.imperfections, posterior.errors.tolist(), strict=True)):
         if not is_timing(one):
             continue
@@ -133,3 +137,33 @@ def _jacobian(
             known[same] = response(_records(aircraft, records, timing | {one: timing[one] + step})) / step
         G[k] = known[same]
     return G
+
+
+def _own(
+    G: Array,
+    aircraft: Aircraft,
+    records: Sequence[FlightRecord],
+    names: Sequence[str],
+    posterior: FlightPosterior,
+    response: RegressionResponse,
+) -> None:
+    """Replace rows of G (K, P) by the regression's own, where the flights can be changed accordingly."""
+    formed = np.array([name in aircraft.derivatives for name in names])
+    online, keys = G.copy(), [one.key if one.role == "source" else "" for one in posterior.imperfections]
+
+    def own(key: str, step: float) -> Array | None:
+        changed = [perturbed(aircraft, record, key, step) for record in records]
+        if any(one is None for one in changed):
+            return None
+        flights = [one for one in changed if one is not None]
+        return response([record for _, record in flights], flights[0][0]) / step
+
+    for k, (key, error) in enumerate(zip(keys, posterior.errors.tolist(), strict=True)):
+        if key and error > 0.0 and not is_timing(posterior.imperfections[k]) and (found := own(key, error)) is not None:
+            G[k] = np.where(formed, found, G[k])
+    for k, key in enumerate(keys):
+        # a CG further along an axis makes the sensors' arms shorter, besides what it does to the moments
+        for sensor in ("imu", "air_data") if key.startswith("cg_shift.") else ():
+            arm = f"sensors.{sensor}.{key[-1]}"
+            if arm in keys:
+                G[k] += online[keys.index(arm)] - G[keys.index(arm)]
