@@ -90,7 +90,7 @@ DEFAULT_TOLERANCES: tuple[DefaultTolerance, ...] = (
     DefaultTolerance("*", "", 0.0, 0.2, "any other parameter of an effect", "a value from a handbook or a computation"),
 )  # fmt: skip
 
-#: 1 sigma of the time constant (s) of a servo of which the file says nothing, and what is expected of it.
+#: 1 sigma of the time constant (s) of a servo of which the file says nothing.
 UNKNOWN_SERVO_LAG = 0.06
 
 #: 1 sigma of what stays constant in a flight, after the calibration on the ground: SI units.

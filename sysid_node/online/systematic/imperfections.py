@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.default_tolerances import UNKNOWN_SERVO_LAG
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.servos import servos_of
 from sysid_node.online.frequency.regression_signals import Layout
@@ -38,8 +37,7 @@ class Imperfections:
     controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
     timed: Index  # (m,) places of these controls among those of the layout
     applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
-    expected: Array  # (m,) s: the lateness before the flight: the aircraft file's, or that of a servo it does not state
-    sigmas: Array  # (m,) s: 1 sigma of the lateness about it
+    sigmas: Array  # (m,) s: 1 sigma of the lateness about the aircraft file's
     columns: ServoColumns
     places: Index  # (W,) where the columns of the signal vector stand among them
 
@@ -71,22 +69,18 @@ def imperfections(aircraft: Aircraft, layout: Layout, *, commanded: bool, positi
         sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
         if not commanded:
             sigma = math.hypot(sigma, stated[place][0])
-        expected = stated[place][0] if commanded else 0.0
-        if commanded and _is_silent(aircraft, name):
-            expected += UNKNOWN_SERVO_LAG
         if sigma > 0.0 and not positions:
-            rows.append((name, place, expected, sigma))
+            rows.append((name, place, sigma))
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
-    controls, timed, expectations, sigmas = zip(*rows, strict=True) if rows else ((), (), (), ())
+    controls, timed, sigmas = zip(*rows, strict=True) if rows else ((), (), ())
     applied = np.array(stated).reshape(-1, 2) if commanded else np.zeros((len(layout.timed), 2))
     return Imperfections(
         found,
         controls,
         np.array(timed, np.intp),
         ServoModel(applied[:, 0].copy(), applied[:, 1].copy()),
-        np.array(expectations),
         np.array(sigmas),
         columns,
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
@@ -94,15 +88,6 @@ def imperfections(aircraft: Aircraft, layout: Layout, *, commanded: bool, positi
 
 
 _SERVO_EFFECTS = ("actuator_lag", "command_delay")
-
-
-def _is_silent(aircraft: Aircraft, control: str) -> bool:
-    """Whether the aircraft file says nothing of a control's servo. No servo is early, so that its lateness has the
-    mean of what is possible (JCGM 100:2008, 4.3.8), not zero.
-    """
-    key = f"actuator_lag.{control}"
-    stated = control in aircraft.effects.get("actuator_lag", {}) or key in aircraft.stated_tolerances
-    return not (aircraft.ideal or stated)
 
 
 def line_model(
@@ -141,7 +126,7 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     stated, expected = imperfect.applied.lateness[imperfect.timed], imperfect.applied.curvature[imperfect.timed]
     # what is late beyond the file's servo may be a lag or a delay
     expected = expected + CURVATURE * (late - stated) ** 2
-    means = np.concatenate([np.zeros(len(imperfect.sources)), imperfect.expected - late, expected - curved])
+    means = np.concatenate([np.zeros(len(imperfect.sources)), stated - late, expected - curved])
     return sigmas, means
 
 
