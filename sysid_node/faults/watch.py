@@ -20,8 +20,9 @@ from sysid_node.faults.hypotheses import servo_check as servos
 from sysid_node.faults.hypotheses import servo_times
 from sysid_node.faults.hypotheses.servo_check import ServoState
 from sysid_node.faults.hypotheses.servo_times import ServoTimes
-from sysid_node.faults.model import blocks
+from sysid_node.faults.model import blocks, servo_follower
 from sysid_node.faults.model.reference_model import IdentifierEstimates
+from sysid_node.faults.model.servo_follower import ServoFollower
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import ARRIVAL, SILENT, Fault
@@ -43,6 +44,7 @@ class MessageWatch:
     state: MonitorState
     servos: ServoState
     intake: AlignmentState
+    follower: ServoFollower
     stale_after: float  # s
     now: float = 0.0  # s, of the last sample
     stamp_ns: int = 0  # header stamp of the last sample
@@ -60,7 +62,8 @@ class MessageWatch:
 def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:
     """A monitor before the first message. A topic that falls silent for ``stale_after`` s is a fault."""
     taken = intake.init(aircraft, blocks.MOST_GAP)
-    return MessageWatch(monitor.init(aircraft, settings), servos.init(aircraft, settings), taken, stale_after)
+    forces, positions = monitor.init(aircraft, settings), servos.init(aircraft, settings)
+    return MessageWatch(forces, positions, taken, servo_follower.init(aircraft), stale_after)
 
 
 def on_imu(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
@@ -99,6 +102,8 @@ def on_estimates(watch: MessageWatch, known: IdentifierEstimates) -> None:
     """Take the identifier's estimates of the last sample."""
     monitor.receive_estimates(watch.state, watch.now, known.derivatives)
     servo_times.receive(watch.servo_times, watch.now, known.servos, known.changed)
+    if watch.state.alarm is None:
+        servo_follower.receive_estimates(watch.follower, watch.now, known.servos)
 
 
 def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
@@ -141,7 +146,7 @@ class Announcements:
 def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
     for moment, sample, _ in samples:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
-        monitor.update(watch.state, moment, sample)
+        monitor.update(watch.state, moment, servo_follower.deflected(watch.follower, moment, sample))
 
 
 def _time_of(taken: AlignmentState, stamp_ns: int) -> float:

@@ -98,6 +98,7 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
     none = np.zeros(len(equations.coefficients), dtype=bool)
     selection_bias = selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior)
     bounds = weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts)
+    systematic = _systematic(state, total, solution, spread, inflation)
     state.latest = SegmentSolution(
         time=now,
         pieces=state.finished.pieces,
@@ -109,8 +110,8 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
         trim_noise=spread.bands[:, 0] * total.energy,
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
         instruments=InstrumentChecks(strength, selection_bias, bounds),
-        tests=ModelTests(*_lag_test(state, solution, spread, gram), none, none),
-        systematic=_systematic(state, total, solution, spread, inflation),
+        tests=ModelTests(*_lag_test(state, solution, spread, gram, systematic), none, none),
+        systematic=systematic,
     )
     state.changes.monitor.references.append(Reference(now, equations, solution, spread))
 
@@ -159,12 +160,15 @@ def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[Inst
     return instrument_strength, solution, compensation
 
 
-def _lag_test(state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array) -> tuple[LagTest, int]:
+def _lag_test(
+    state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array, systematic: SystematicErrors | None
+) -> tuple[LagTest, int]:
     """The test for actuator lag, carried out every few pieces, and the number of pieces when it was."""
     latest, pieces = state.latest, state.finished.pieces
     if latest is not None and pieces - latest.tests.lag_tested < TIMING_EVERY:
         return latest.tests.lag, latest.tests.lag_tested
-    return actuator_lag_test.examine(state.equations, state.model.layout, solution, spread, gram), pieces
+    variance = None if systematic is None else np.maximum(systematic.variance[:, :-1], 0.0)
+    return actuator_lag_test.examine(state.equations, state.model.layout, solution, spread, gram, variance), pieces
 
 
 def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:

@@ -14,6 +14,7 @@ from sysid_node.online.alignment import schedule, streaming
 from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
+from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 
@@ -34,6 +35,7 @@ class Session:
         self.settings = settings
         self.publish_rate = publish_rate  # Hz
         self.update_times = Durations()
+        self._servo_times = servo_times_in_file(aircraft)
         self.reset()
 
     def reset(self) -> None:
@@ -65,6 +67,10 @@ class Session:
     def gap(self, due: Due) -> Sequence[CoefficientGap]:
         """How far the flight is from the aircraft file where estimates fell due, before anything else comes."""
         return model_gap(self.state, due.current)
+
+    def servo_gaps(self, due: Due) -> Sequence[ServoGap]:
+        """How far the servos are from the aircraft file where estimates fell due."""
+        return servo_gaps(self._servo_times, due.estimates.servos)
 
     def use_pause(self) -> None:
         """Do what would else be done when the next sample comes; called when all that fell due is published."""

@@ -155,7 +155,8 @@ class Identifier(CarefulNode):
         self._derivatives.publish(self._serialiser.one(due.estimates, due.stamp_ns, self._frame_id))
         self._lag = (self.get_clock().now().nanoseconds - due.stamp_ns) / conversion.NANOSECONDS
         header = conversion.header(due.stamp_ns, self._frame_id)
-        self._model_gap.publish(conversion.gap_message(session.gap(due), header, session.aircraft.name))
+        gaps, servos = session.gap(due), session.servo_gaps(due)
+        self._model_gap.publish(conversion.gap_message(gaps, servos, header, session.aircraft.name))
         self._publish_times.add(time.perf_counter() - start)
         # Diagnostics follow an estimate at once, as no other estimate can be waiting then.
         if time.monotonic() - self._reported >= DIAGNOSTICS:

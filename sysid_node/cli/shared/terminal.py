@@ -33,12 +33,12 @@ def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[
 
     ``since``: s from which on it is that, of those that have changed.
     """
-    table = Table(box=None, header_style="bold")
+    table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0))
     for heading, justify in (("derivative", "left"), ("estimate", "right"), ("95 % interval", "left")):
         table.add_column(heading, justify=justify)  # type: ignore[arg-type]
     table.add_column("status")
     if truth:
-        table.add_column("true", justify="right")
+        table.add_column("true", justify="right", no_wrap=True)
     for d in final.derivatives.values():
         cells = [d.name, f"{d.value:.4f}", f"{d.lower:.4f} to {d.upper:.4f}", d.status]
         known = [_true(d.name, truth, since or {})] if truth else []

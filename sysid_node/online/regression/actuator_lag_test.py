@@ -44,15 +44,26 @@ class LagTest(NamedTuple):
 
 
 def examine(
-    equations: NormalEquations, layout: Layout, solution: Solution, spread: Uncertainty, gram: Array
+    equations: NormalEquations,
+    layout: Layout,
+    solution: Solution,
+    spread: Uncertainty,
+    gram: Array,
+    systematic: Array | None = None,
 ) -> LagTest:
-    """Solve every equation again with the rate of each of its controls; ``gram`` (W, W) is that of ``solution``."""
+    """Solve every equation again with the rate of each of its controls; ``gram`` (W, W) is that of ``solution``.
+
+    ``systematic`` (C, P) are the variances of the slopes by what is taken as known: the interval holds them, too.
+    """
     biased = np.zeros(equations.belongs.shape, dtype=bool)
     blamed_control: dict[int, str] = {}
     best: dict[str, Lag] = {}
     for c in np.flatnonzero(spread.density > 0.0).tolist():
         unknowns = equations.unknowns(c)
-        errors = np.sqrt(np.maximum(spread.covariance[c].diagonal()[unknowns], 0.0))
+        variance = spread.covariance[c].diagonal()[unknowns]
+        if systematic is not None:
+            variance = variance + systematic[c, unknowns]
+        errors = np.sqrt(np.maximum(variance, 0.0))
         for symbol in layout.timed:
             places = [k for k, i in enumerate(unknowns.tolist()) if equations.regressors[i] == symbol]
             if not places:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.flight.servos import servos_of
-from sysid_node.online.systematic.servo_model import of_servo
+from sysid_node.online.estimates.servo_gap import servo_times_in_file
 from sysid_node.online.types import Estimates
 from sysid_node.report.results.comparison import half_width
 
@@ -12,11 +11,10 @@ from sysid_node.report.results.comparison import half_width
 def servo_remarks(aircraft: Aircraft, final: Estimates) -> list[str]:
     """A sentence on all servos whose time is known; none where there is none."""
     known = {name: d for name, d in final.servos.items() if d.valid}
-    late = {name: of_servo(servo)[0] for name, servo in zip(aircraft.controls, servos_of(aircraft)[1:], strict=True)}
-    stated = aircraft.effects.get("actuator_lag", {}).keys() | aircraft.effects.get("command_delay", {}).keys()
+    late = servo_times_in_file(aircraft)
     delays = [
         f"{name} {1e3 * d.value:.0f} \u00b1 {1e3 * half_width(d):.0f} ms "
-        f"(the file says {f'{1e3 * late[name]:.0f} ms' if name in stated else 'nothing'})"
+        f"(the file says {f'{1e3 * late[name]:.0f} ms' if name in late else 'nothing'})"
         for name, d in known.items()
     ]
     return [f"Controls follow what is recorded of them later by: {', '.join(delays)}."] if delays else []

@@ -11,6 +11,7 @@ from sysid_msgs.msg import ModelGap
 
 from sysid_node.online import types
 from sysid_node.online.estimates.model_gap import CoefficientGap
+from sysid_node.online.estimates.servo_gap import ServoGap
 from sysid_node.online.types import Estimates
 
 NANOSECONDS = 1_000_000_000
@@ -37,8 +38,8 @@ def axes_sign(body_frame: str) -> float:
     return 1.0 if body_frame == "frd" else -1.0
 
 
-def gap_message(gaps: Sequence[CoefficientGap], header: Header, aircraft: str) -> ModelGap:
-    """The message of the gaps of all coefficients."""
+def gap_message(gaps: Sequence[CoefficientGap], servos: Sequence[ServoGap], header: Header, aircraft: str) -> ModelGap:
+    """The message of the gaps of all coefficients and servos."""
     return ModelGap(
         header=header,
         aircraft=aircraft,
@@ -48,6 +49,10 @@ def gap_message(gaps: Sequence[CoefficientGap], header: Header, aircraft: str) -
         relative=[gap.relative for gap in gaps],
         derivatives=[gap.derivative for gap in gaps],
         deviation=[gap.deviation for gap in gaps],
+        servos=[servo.control for servo in servos],
+        servo_time=[servo.time for servo in servos],
+        servo_time_error=[servo.standard_error for servo in servos],
+        servo_time_in_file=[servo.in_file for servo in servos],
     )
 
 
