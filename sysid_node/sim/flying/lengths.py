@@ -26,11 +26,16 @@ def padded_length(samples: int) -> int:
 
 
 def padded(series: _Series) -> _Series:
-    """A tree of series (N, ...) with their last values repeated up to ``padded_length``."""
+    """A tree of series (N, ...) with their last values repeated up to ``padded_length``.
+
+    NumPy does it, so that padding itself compiles nothing, except where many flights are flown at once and the series
+    are being traced.
+    """
 
     def longer(values: jax.Array) -> jax.Array:
         missing = padded_length(len(values)) - len(values)
-        return jnp.asarray(np.pad(values, [(0, missing)] + [(0, 0)] * (values.ndim - 1), mode="edge"))
+        pad = jnp.pad if isinstance(values, jax.core.Tracer) else np.pad
+        return jnp.asarray(pad(values, [(0, missing)] + [(0, 0)] * (values.ndim - 1), mode="edge"))
 
     longest: _Series = jax.tree.map(longer, series)
     return longest
@@ -38,4 +43,6 @@ def padded(series: _Series) -> _Series:
 
 def cut(flight: SimulatedFlight, samples: int) -> SimulatedFlight:
     """The first samples of a flight that was padded."""
-    return SimulatedFlight(*(jnp.asarray(np.asarray(series)[:samples]) for series in flight))
+    return SimulatedFlight(
+        *(s[:samples] if isinstance(s, jax.core.Tracer) else jnp.asarray(np.asarray(s)[:samples]) for s in flight)
+    )
