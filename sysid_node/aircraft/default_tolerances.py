@@ -90,8 +90,9 @@ DEFAULT_TOLERANCES: tuple[DefaultTolerance, ...] = (
     DefaultTolerance("*", "", 0.0, 0.2, "any other parameter of an effect", "a value from a handbook or a computation"),
 )  # fmt: skip
 
-#: 1 sigma of the time constant (s) of a servo of which the file says nothing.
-UNKNOWN_SERVO_LAG = 0.06
+#: 1 sigma about zero of the lateness (s) of a servo of which the file says nothing: the root mean square of lags of 20
+#: to 120 ms (see ``_SERVO``) together with delays of up to 40 ms (two PWM frames, a driver's queue).
+UNKNOWN_SERVO_LAG = 0.09
 
 #: 1 sigma of what stays constant in a flight, after the calibration on the ground: SI units.
 DEFAULT_NOISE_BIAS: Mapping[str, float] = MappingProxyType(

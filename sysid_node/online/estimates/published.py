@@ -20,6 +20,7 @@ from sysid_node.online.types import DerivativeEstimate, Estimates
 Array = NDArray[np.float64]
 
 NORMAL_95 = 1.959963984540054  # standard errors of the normal distribution's two-sided 95 % interval
+AHEAD = "ahead of its command"  # status of a servo that no surface can have
 SERVO_KNOWN = 0.01  # s: the largest standard error of a servo's time that is valid
 
 
@@ -53,10 +54,10 @@ def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, Derivat
     imperfect, found = state.model.imperfections, latest.systematic
     assert imperfect is not None
     assert found is not None
-    late, rows = found.servos.lateness[imperfect.timed].tolist(), {}
-    for name, value, error in zip(imperfect.controls, late, found.errors.tolist(), strict=True):
-        half, valid = NORMAL_95 * error, error <= SERVO_KNOWN
-        words = "ok" if valid else "converging"
+    late, ahead, rows = found.servos.lateness[imperfect.timed].tolist(), found.ahead(imperfect).tolist(), {}
+    for name, value, error, early in zip(imperfect.controls, late, found.errors.tolist(), ahead, strict=True):
+        half, valid = NORMAL_95 * error, error <= SERVO_KNOWN and not early
+        words = "ok" if valid else AHEAD if early else "converging"
         rows[name] = DerivativeEstimate(name, value, error, value - half, value + half, valid, words, error, 0.0)
     return rows
 

@@ -79,6 +79,9 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     lag = latest.tests.lag
     biased = lag.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{lag.blamed_control[i]} not on time") for i in c[biased].tolist()]
+    for symbol in _ahead_of_commands(state, latest):
+        of_it = state.equations.belongs[np.array(state.equations.regressors) == symbol].any(axis=0)
+        objections[np.asarray(of_it)[c] & ~table.offset] = words.code(f"{symbol} not on time")
     objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
     if not state.inputs.thrust_known:
         objections[table.needs_thrust] = status.THRUST
@@ -90,6 +93,14 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     objections[latest.tests.contradicted[c]] = status.CONTRADICTED
     objections[latest.tests.outside_model[c]] = status.OUTSIDE
     return objections
+
+
+def _ahead_of_commands(state: EstimatorState, latest: SegmentSolution) -> tuple[str, ...]:
+    """The controls whose surfaces would surely move before their commands."""
+    imperfect, found = state.model.imperfections, latest.systematic
+    if imperfect is None or found is None:
+        return ()
+    return tuple(state.model.layout.timed[i] for i in imperfect.timed[found.ahead(imperfect)].tolist())
 
 
 def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution, now: float) -> Codes:

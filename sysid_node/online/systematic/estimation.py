@@ -20,7 +20,9 @@ from sysid_node.online.systematic.imperfections import Imperfections, column_cha
 from sysid_node.online.systematic.servo_model import ServoModel
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
+SURE = 2.0  # standard errors, and tolerances of the stamps, by which a servo must be ahead of its command to be refused
 LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to first order.
@@ -44,6 +46,14 @@ class SystematicErrors:
     pieces: int  # number of pieces finished when this was found
     energy: float  # s: data that it rests on
     changes: tuple[float, ColumnChanges, Array]  # s: data that the column changes rest on; them; the signals' means
+
+    def ahead(self, imperfect: Imperfections) -> Flags:
+        """(m,) the servos that would surely move their surfaces before the commands.
+
+        No servo does: gusts or another error are taken for it.
+        """
+        late = self.servos.lateness[imperfect.timed]
+        return np.asarray(late + SURE * self.errors < -SURE * imperfect.stamps)
 
     def holds(self, pieces: int, servos: ServoModel, energy: float) -> bool:
         """Whether this is new enough: it changes slowly once there are data."""

@@ -39,6 +39,7 @@ class Imperfections:
     applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
     sigmas: Array  # (m,) s: 1 sigma of the lateness about the aircraft file's
     columns: ServoColumns
+    stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
     places: Index  # (W,) where the columns of the signal vector stand among them
 
     @property
@@ -83,6 +84,7 @@ def imperfections(aircraft: Aircraft, layout: Layout, *, commanded: bool, positi
         ServoModel(applied[:, 0].copy(), applied[:, 1].copy()),
         np.array(sigmas),
         columns,
+        math.hypot(*(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
     )
 

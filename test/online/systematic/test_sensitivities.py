@@ -172,3 +172,17 @@ def test_servos_are_found_and_derivatives_corrected(lag):
         assert abs(servo.value - lag) < 3.0 * servo.standard_error
     for name, d in found.derivatives.items():
         assert abs(d.value - EXACT.derivatives[name].value) < 4.0 * d.standard_error + 1e-4, name
+
+
+def test_a_servo_that_would_be_ahead_of_its_command_is_refused_with_what_rests_on_it():
+    """Controls recorded 60 ms too late, far beyond what stamps may be off: no servo answers before its command."""
+    time, samples = flown(1.0)
+    late = samples.copy()
+    late[:, ELEVATOR:] = CubicSpline(time, samples[:, ELEVATOR:])(np.maximum(time - 0.06, time[0]))
+    tolerances = {f"actuator_lag.{name}": 0.06 for name in EXACT.controls} | {"delays.actuators": 0.001}
+    settings = replace(SETTINGS, method="iv_rft", actuators="auto")
+    found = estimate(identified(replace(EXACT, stated_tolerances=tolerances), late, settings))
+    assert found.servos["elevator"].status == "ahead of its command"
+    assert not any(servo.valid for servo in found.servos.values())
+    assert found.derivatives["Cm_de"].status == "de not on time"
+    assert not any(found.derivatives[name].valid for name in ("Cm_alpha", "Cm_q", "Cl_p", "Cl_da", "Cn_dr"))
