@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -24,9 +25,7 @@ def render_page(title: str, sections: Sequence[Section[Results]], results: Resul
         {
             "anchor": section.anchor,
             "title": section.title,
-            "body": Markup(
-                environment.get_template(f"sections/{section.template}").render(section.context(results)).strip()
-            ),
+            "body": _body(environment, section, results),
         }
         for section in sections
     ]
@@ -37,6 +36,12 @@ def render_page(title: str, sections: Sequence[Section[Results]], results: Resul
         script=Markup(_text("page.js")),
         plotly=Markup(_text("vendor/plotly-basic.min.js")) if any('class="plot"' in f["body"] for f in filled) else "",
     )
+
+
+def _body(environment: Environment, section: Section[Results], results: Results) -> Markup:
+    """A section's template, filled; no line ends between a number and its percent sign."""
+    text = environment.get_template(f"sections/{section.template}").render(section.context(results)).strip()
+    return Markup(re.sub(r"(?<=\d) %", "\N{NARROW NO-BREAK SPACE}%", text))
 
 
 @cache

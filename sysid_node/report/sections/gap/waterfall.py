@@ -15,6 +15,9 @@ from sysid_node.report.wording.numbers import number
 #: Steps of the waterfall before the rest.
 _STEPS = 7
 
+#: Share of the gap's power from which a step is drawn by itself.
+_LEAST = 0.0005
+
 #: Height of a step, pixels: two lines of text and a gap.
 _ROW = 38
 
@@ -72,9 +75,10 @@ def waterfall(found: Diagnosis) -> Figure:
 def _steps_down(found: Diagnosis) -> list[tuple[str, str, float]]:
     """Station, label and percentage of each step: the largest by axis, the rest of all, then noise."""
     caused = [w for w in found.where if w["station"] != "noise"]
+    drawn = [w for w in caused if w["share"] >= _LEAST][:_STEPS]
     # Two lines a label: beside their bars they leave room for these on a phone, too.
-    labels = [f"{w['station']},<br>{WORDS[w['axis']]}" for w in caused[:_STEPS]]
-    steps = [(w["station"], label, 100.0 * w["share"]) for w, label in zip(caused, labels, strict=False)]
-    rest = 100.0 * sum(w["share"] for w in caused[_STEPS:])
+    labels = [f"{w['station']},<br>{WORDS[w['axis']]}" for w in drawn]
+    steps = [(w["station"], label, 100.0 * w["share"]) for w, label in zip(drawn, labels, strict=True)]
+    rest = 100.0 * sum(w["share"] for w in caused if w not in drawn)
     noise = 100.0 * sum(w["share"] for w in found.where if w["station"] == "noise")
-    return [*steps, *([("the rest", "the rest", rest)] if rest > 0.0 else []), ("noise", "noise", noise)]
+    return [*steps, *([("the rest", "the rest", rest)] if rest >= 100.0 * _LEAST else []), ("noise", "noise", noise)]
