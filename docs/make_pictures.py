@@ -1,7 +1,7 @@
 """Makes the pictures of reports in the tutorial and the README: ``python docs/make_pictures.py``.
 
 Runs the tutorial's own commands in ``out/pictures`` (what is there already is not run again), and photographs sections
-of the reports by Chromium, without a network. About two minutes, and nothing that a build of the site needs.
+of the reports by Chromium, without a network. About three minutes, and nothing that a build of the site needs.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
 WORK = ROOT / "out" / "pictures"
@@ -36,6 +38,8 @@ SHOWN = {
     "gap_flight": ("gap", ("flight",), (900, 480)),
     "gap_candidates": ("gap", ("candidates",), (900, 580)),
 }
+#: Name of each picture of the viewer: the run that it shows. Needs requirements/view.txt and Xvfb.
+VIEWED = {"view_run": "failed", "view_gap": "gap"}
 FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
@@ -53,6 +57,19 @@ def main() -> None:
             subprocess.run(command, cwd=ROOT, check=True)
     for name, (run, sections, size) in SHOWN.items():
         photograph(WORK / run / "report.html", sections, size, PICTURES / f"{name}.png")
+    for name, run in VIEWED.items():
+        view(WORK / run, PICTURES / f"{name}.png")
+
+
+def view(run: Path, out: Path) -> None:
+    """A picture of a run in the viewer, as it opens, drawn without a screen."""
+    recording = WORK / f"{run.name}.rrd"
+    subprocess.run([sys.executable, "-m", "sysid_node.cli", "view", run, "--save", recording], cwd=ROOT, check=True)
+    viewer = ["rerun", str(recording), "--screenshot-to", str(out), "--window-size", "1440x810"]
+    subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1440x810x24", *viewer], check=True)
+    with Image.open(out) as picture:  # the viewer draws two pixels for one
+        small = picture.convert("RGB").resize((1440, 810)).quantize(256)
+    small.save(out, optimize=True)
 
 
 def photograph(report: Path, sections: tuple[str, ...], size: tuple[int, int], out: Path) -> None:

@@ -38,7 +38,8 @@ def _left(scene: Scene) -> list[rrb.View | rrb.Container]:
 
 
 def _shares(scene: Scene) -> list[float]:
-    return [*([3.0] if scene.bodies else []), *([1.3] if scene.lanes else []), 1.6]
+    """Heights of the left column's parts, relative to each other; every lane is seen without scrolling."""
+    return [*([3.0] if scene.bodies else []), *([0.45 + 0.33 * len(scene.lanes)] if scene.lanes else []), 1.6]
 
 
 def _space(scene: Scene) -> rrb.Spatial3DView:
