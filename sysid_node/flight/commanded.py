@@ -123,8 +123,16 @@ def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool) -> str:
     if commanded:
         return f"Actuators carry commands{how}; of the servos the aircraft file says: {in_words(aircraft)}."
     if setting == "auto":
-        return "Actuators are taken as positions: no command jumps that a surface could not follow."
+        taken = "Actuators are taken as positions: no command jumps that a surface could not follow."
+        return f"{taken} {_UNSAID}" if aircraft.ideal else taken
     return ""
+
+
+#: Smooth commands look like positions, and an ideal aircraft has no tolerance for the difference.
+_UNSAID = (
+    "The aircraft file is ideal, so the intervals hold only if they are: state what they carry "
+    "(actuators: positions or commands)."
+)
 
 
 def take_command(state: Commands, epoch: int, stamp: int, values: Sequence[float]) -> None:

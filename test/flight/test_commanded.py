@@ -1,9 +1,12 @@
 """Whether commands are told from positions, against servos of known time constants."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sysid_node.flight.commanded import JumpCounter, known_from, take
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.flight.commanded import JumpCounter, carried_in_words, known_from, take
 from sysid_node.flight.servos import Servo, ServoState, give, move
 
 SECOND = 1_000_000_000  # ns
@@ -54,6 +57,15 @@ def test_smooth_commands_tell_nothing():
     time = np.arange(600) / 100.0
     wave = 0.06 * np.sin(2 * np.pi * 1.5 * time)[:, None]
     assert known_from(np.round(SECOND * (1.0 + time)).astype(np.int64), wave) is None
+
+
+def test_an_ideal_file_wants_to_be_told_what_smooth_messages_are():
+    aircraft = load_aircraft("cdrw")
+    ideal = replace(aircraft, ideal=True)
+    assert "state what they carry" in carried_in_words(ideal, "auto", commanded=False)
+    assert "state" not in carried_in_words(aircraft, "auto", commanded=False)
+    assert "state" not in carried_in_words(ideal, "auto", commanded=True)
+    assert carried_in_words(ideal, "positions", commanded=False) == ""
 
 
 def test_message_by_message_the_same():

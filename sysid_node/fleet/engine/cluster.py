@@ -117,5 +117,5 @@ def _silent_tracker() -> Iterator[None]:
 
 def _quiet() -> None:
     """Let Dask's loggers be silent: what concerns the user comes as one line of the command."""
-    for name in ("distributed", "tornado.application"):
+    for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)

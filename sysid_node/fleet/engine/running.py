@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 from distributed import Client, Future, KilledWorker
 from distributed.client import FutureCancelledError
 
+from sysid_node.errors import InputError
 from sysid_node.fleet.engine.guarded import BEGUN, Returned, guarded
 
 T = TypeVar("T")
@@ -25,7 +26,7 @@ _WAITING = 2
 _LOOK = 0.5  # s between looks at the scheduler and at the workers, and between counts of these
 
 
-class SchedulerLostError(RuntimeError):
+class SchedulerLostError(InputError):
     """The scheduler does not answer any more; what had come back is kept."""
 
 
