@@ -27,7 +27,7 @@ import numpy as np
 from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.live.ros_domain import own_domain
-from sysid_node.dynamics.linear_model import level_flight
+from sysid_node.dynamics.linearised import trimmed
 
 RATE, ESTIMATES = 50.0, 20.0  # Hz
 JUMP = 0.01  # rad/s, on either side of no pitch rate
@@ -80,7 +80,7 @@ class Aircraft:
         self.executor.add_node(self.node)
         self.jumps: list[tuple[float, float]] = []
         self.known = load_aircraft("cdrw")
-        self.level, _ = level_flight(self.known, 1.0)
+        self.level, _ = trimmed(self.known)
         self._sent: dict[tuple[int, int], float] = {}  # pitch rate by stamp
         self._last: tuple[float, float] | None = None  # pitch rate and elevator
         self._side, self._stamp = 1.0, time.time_ns()
@@ -157,8 +157,8 @@ def kill_once(aircraft: Aircraft) -> tuple[float, float]:
 def measure(kills: int) -> str:
     """The table of so many kills."""
     words = ["--ros-args", "-p", "aircraft:=cdrw"]
-    controller = subprocess.Popen([sys.executable, "-m", "sysid_node.ros.adaptive_controller", *words])
     aircraft = Aircraft()
+    controller = subprocess.Popen([sys.executable, "-m", "sysid_node.ros.adaptive_controller", *words])
     try:
         aircraft.until(lambda: len(aircraft.jumps) > 50)
         aircraft.fly(2.0)

@@ -10,6 +10,7 @@ its command; at the end stands a table of what was tried and what broke.
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import random
@@ -25,11 +26,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from bench.robustness.targets import Seeds
+from bench.robustness.seeds import Seeds
+from bench.robustness.targets import Targets
 from sysid_node.cli.main import main as sysid
 
 LONGEST, MEMORY = 60.0, 4 * 2**30  # s and bytes of one case
+SLOW_LONGEST, SLOW_MEMORY = 600.0, 16 * 2**30  # the same of one that compiles; JAX reserves much that it never uses
+WITHOUT_QUIET = ("check",)
+PRELOADED = ("sysid_node.api.identification", "sysid_node.api.fleet_run", "sysid_node.view.recording", "rerun", "jax")
 KEPT = 3  # cases of each kind of break
+SLOW_EVERY = 40  # rounds between cases of the slow kinds
 
 
 class Outcome(NamedTuple):
@@ -54,11 +60,11 @@ class Outcome(NamedTuple):
         return "exit 0 with lines on stderr" if self.code == 0 and lines else ""
 
 
-def outcome_of(words: Sequence[str], place: Path, longest: float = LONGEST) -> Outcome:
-    """How a command ends in a process of its own, which works in ``place``."""
+def outcome_of(words: Sequence[str], place: Path, longest: float = LONGEST, memory: int = MEMORY) -> Outcome:
+    """How a command ends in a process of its own, which works in ``place`` for at most so long (s), with so much."""
     process = os.fork()
     if not process:
-        _work(words, place)
+        _work(words, place, memory)
     end = time.monotonic() + longest
     while time.monotonic() < end:
         done, status = os.waitpid(process, os.WNOHANG)
@@ -71,14 +77,14 @@ def outcome_of(words: Sequence[str], place: Path, longest: float = LONGEST) -> O
     return Outcome(None, (place / "stderr").read_text(errors="replace"))
 
 
-def _work(words: Sequence[str], place: Path) -> None:
+def _work(words: Sequence[str], place: Path, memory: int) -> None:
     """The command, in the child."""
     code = 1
     try:
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         for name, stream in (("stdout", 1), ("stderr", 2)):
             os.dup2(os.open(place / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
-        code = sysid([*words, "--quiet"])
+        code = sysid(list(words) if words[0] in WITHOUT_QUIET else [*words, "--quiet"])
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 1
     except BaseException:
@@ -87,24 +93,34 @@ def _work(words: Sequence[str], place: Path) -> None:
         os._exit(code)
 
 
+def preload() -> None:
+    """Import what commands import when they need it, so that each case need not; nothing that starts threads."""
+    for name in PRELOADED:
+        importlib.import_module(name)
+
+
 def hunt(
     seeds: Seeds, seconds: float, rounds: int, seed: int, out: Path
 ) -> tuple[Counter[str], Counter[tuple[str, str]]]:
     """Cases tried by kind, and breaks by kind and what was wrong; the first of each are kept under ``out``.
 
-    A round has one case of each kind; the hunt ends after ``rounds`` or ``seconds``.
+    A round has one case of each quick kind, and one round in ``SLOW_EVERY``, beginning with the last of so many, of
+    each slow one; the hunt ends after ``rounds`` or ``seconds``.
     """
     rng = random.Random(seed)
-    kinds = seeds.cases()
+    targets = Targets(seeds)
+    quick, slow = targets.quick(), targets.slow()
     tried: Counter[str] = Counter()
     broke: Counter[tuple[str, str]] = Counter()
     end = time.monotonic() + seconds
-    while time.monotonic() < end and rounds > 0:
-        rounds -= 1
-        for kind, case in kinds.items():
+    for number in range(1, rounds + 1):
+        if time.monotonic() > end:
+            break
+        for kind, case in {**quick, **(slow if number % SLOW_EVERY == 0 else {})}.items():
             place = Path(tempfile.mkdtemp(prefix="sysid-fuzz-"))
             words = case(place, rng)
-            found = outcome_of(words, place)
+            limits = (SLOW_LONGEST, SLOW_MEMORY) if kind in slow else (LONGEST, MEMORY)
+            found = outcome_of(words, place, *limits)
             tried[kind] += 1
             if found.broke:
                 broke[kind, found.broke] += 1
@@ -127,7 +143,7 @@ def again(folder: Path) -> Outcome:
     with tempfile.TemporaryDirectory() as name:
         place = Path(name, "case")
         shutil.copytree(folder, place)
-        for made in ("out", "converted", "model", "o"):
+        for made in ("out", "converted", "model", "o", "o.yaml"):
             shutil.rmtree(place / made, ignore_errors=True)
         words = json.loads((place / "case.json").read_text())["words"]
         return outcome_of([word.replace("{place}", str(place)) for word in words], place)
@@ -146,6 +162,7 @@ def main() -> None:
     if args.again:
         print(again(args.again))
         return
+    preload()
     with tempfile.TemporaryDirectory(prefix="sysid-seeds-") as folder:
         tried, broke = hunt(Seeds.made(Path(folder), args.logs), args.seconds, args.rounds, args.seed, args.out)
     print("| input | tried | broke |\n|---|---:|---:|")

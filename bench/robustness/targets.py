@@ -1,57 +1,44 @@
-"""Sound inputs to begin with, and the commands that each kind of damaged input is given to."""
+"""The commands that each kind of damaged input is given to."""
 
 from __future__ import annotations
 
 import random
 import shutil
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from bench.robustness.mutations import ODD_NUMBERS, damage_bytes, damage_text
-from sysid_node.aircraft.load import load_aircraft
+from bench.robustness.seeds import FORMATS, Seeds
 from sysid_node.batch.identify import METHODS
-from sysid_node.cli.main import main
-from sysid_node.flight.align import flight_record
-from sysid_node.flight.bag.reader import read_streams
-from sysid_node.flight.bag.writer import write_streams
-from sysid_node.flight.csv import write_csv
-from sysid_node.flight.streams import Streams
 
-ROOT = Path(__file__).resolve().parents[2]
 LOG_LIMIT = 3_000_000  # bytes of a log that are kept, so that a case is quick
+SETTINGS = ("window", "forgetting_time", "settle_time", "max_gap", "publish_rate", "valid_fraction", "use_prior")
+METHOD_SETTINGS = (
+    "low_pass",
+    "rate",
+    "segment",
+    "states",
+    "biases",
+    "use_prior",
+    "stepwise",
+    "max_gap",
+    "actuators",
+)
+SIMULATED = ("--seed", "--duration", "--airspeed", "--height", "--noise", "--rate", "--air-data-rate")
+DESIGNED = ("--rate", "--duration", "--airspeed")
 
 #: A case: writes the damaged input into a folder and gives the command's words.
 Case = Callable[[Path, random.Random], list[str]]
 
 
-@dataclass(frozen=True)
-class Seeds:
-    """Sound inputs, made once."""
+class Targets:
+    """Cases made of sound inputs."""
 
-    folder: Path
-    logs: Sequence[Path]
+    def __init__(self, seeds: Seeds) -> None:
+        self.seeds = seeds
 
-    @classmethod
-    def made(cls, folder: Path, logs: Path | None) -> Seeds:
-        """Six seconds of a bundled flight as bags, CSV and a replay's folder; the aircraft file; logs, if any."""
-        aircraft = load_aircraft("cdrw")
-        streams = _first(read_streams(ROOT / "bags" / "cdrw_multistep"), 6.0)
-        for storage in ("mcap", "sqlite3"):
-            write_streams(folder / storage, streams, storage)
-        record = flight_record(aircraft, streams, 0.2)
-        write_csv(folder / "log.csv", record)
-        shutil.copy(ROOT / "config" / "aircraft" / "cdrw.yaml", folder / "aircraft.yaml")
-        arguments = ["replay", str(folder / "mcap"), "--aircraft", "cdrw", "--out", str(folder / "run"), "--quiet"]
-        if main(arguments):
-            raise RuntimeError("a sound bag cannot be replayed")
-        found = sorted(logs.iterdir()) if logs else []
-        return cls(folder, [log for log in found if log.is_file() and log.suffix.lower() != ".md"])
-
-    def cases(self) -> dict[str, Case]:
-        """The kinds of cases, by name."""
+    def quick(self) -> dict[str, Case]:
+        """The kinds of cases that take less than a second or so, by name."""
         kinds: dict[str, Case] = {
             "bag, mcap": lambda place, rng: self._bag(place, rng, "mcap"),
             "bag, sqlite3": lambda place, rng: self._bag(place, rng, "sqlite3"),
@@ -59,123 +46,138 @@ class Seeds:
             "aircraft file": self._aircraft,
             "folder of a run": self._run_folder,
             "summary to export": self._summary,
+            "model to import": self._model,
+            "catalogue of a fleet": self._catalogue,
             "options": self._options,
         }
-        return {**kinds, "log": self._log} if self.logs else kinds
+        return {**kinds, "log": self._log} if self.seeds.logs else kinds
+
+    def slow(self) -> dict[str, Case]:
+        """The kinds of cases that compile or fit for seconds where the input passes."""
+        return {"simulate, excite": self._simulated, "gap": self._gap}
 
     def _bag(self, place: Path, rng: random.Random, storage: str) -> list[str]:
+        given, out = self._damaged_bag(place, rng, storage), str(place / "out")
+        words = [str(given), "--aircraft", "cdrw"]
+        return rng.choice(
+            [
+                ["replay", *words, "--out", out],
+                ["identify", *words, "--method", "equation_error", "--out", out],
+                ["convert", str(given), "--out", str(place / "converted")],
+                ["check", str(given)],
+                ["view", *words, "--save", str(place / "o")],
+            ]
+        )
+
+    def _damaged_bag(self, place: Path, rng: random.Random, storage: str) -> Path:
+        """A bag of which one file is damaged; one time in five the file alone."""
         bag = place / "bag"
-        shutil.copytree(self.folder / storage, bag)
+        shutil.copytree(self.seeds.folder / storage, bag)
         file = rng.choice([*bag.glob(f"{storage}.*"), *bag.glob(f"{storage}.*"), bag / "metadata.yaml"])
         if file.name == "metadata.yaml":
             file.write_bytes(damage_text(file.read_text(), rng))
         else:
             file.write_bytes(damage_bytes(file.read_bytes(), rng))
-        given = file if rng.random() < 0.2 and file.suffix != ".yaml" else bag
-        return rng.choice(
-            [
-                ["replay", str(given), "--aircraft", "cdrw", "--out", str(place / "out")],
-                [
-                    "identify",
-                    str(given),
-                    "--aircraft",
-                    "cdrw",
-                    "--method",
-                    "equation_error",
-                    "--out",
-                    str(place / "out"),
-                ],
-                ["convert", str(given), "--out", str(place / "converted")],
-            ]
-        )
+        return file if rng.random() < 0.2 and file.suffix != ".yaml" else bag
 
     def _sound(self, place: Path) -> str:
         """A sound bag, beside what is damaged."""
-        shutil.copytree(self.folder / "mcap", place / "sound")
+        shutil.copytree(self.seeds.folder / "mcap", place / "sound")
         return str(place / "sound")
 
+    def _damaged_text(self, place: Path, rng: random.Random, name: str, given: str = "") -> str:
+        """A damaged copy of one of the seeds' texts, under the name ``given``."""
+        file = place / (given or name)
+        file.write_bytes(damage_text((self.seeds.folder / name).read_text(encoding="utf-8"), rng))
+        return str(file)
+
     def _csv(self, place: Path, rng: random.Random) -> list[str]:
-        (place / "log.csv").write_bytes(damage_text((self.folder / "log.csv").read_text(), rng))
-        identify = ["identify", str(place / "log.csv"), "--aircraft", "cdrw", "--out", str(place / "out"), "--method"]
+        log = self._damaged_text(place, rng, "log.csv")
+        methods = ("equation_error", "frequency_equation_error", "recursive_least_squares")
+        identify = ["identify", log, "--aircraft", "cdrw", "--out", str(place / "out"), "--method"]
         return rng.choice(
             [
-                ["convert", str(place / "log.csv"), "--out", str(place / "converted")],
-                [*identify, rng.choice(("equation_error", "frequency_equation_error", "recursive_least_squares"))],
+                ["convert", log, "--out", str(place / "converted")],
+                ["check", log],
+                [*identify, rng.choice(methods)],
             ]
         )
 
     def _aircraft(self, place: Path, rng: random.Random) -> list[str]:
-        file = place / "aircraft.yaml"
-        file.write_bytes(damage_text((self.folder / "aircraft.yaml").read_text(), rng))
-        form = rng.choice(("jsbsim", "gazebo", "rosflight"))
-        bag = self._sound(place)
+        file, form = self._damaged_text(place, rng, "aircraft.yaml"), rng.choice(FORMATS)
+        words = [self._sound(place), "--aircraft", file, "--out", str(place / "out")]
         return rng.choice(
             [
-                ["export", str(file), "--format", form, "--out", str(place / "model")],
-                ["replay", bag, "--aircraft", str(file), "--out", str(place / "out")],
-                ["identify", bag, "--aircraft", str(file), "--method", "equation_error", "--out", str(place / "out")],
+                ["export", file, "--format", form, "--out", str(place / "model")],
+                ["replay", *words],
+                ["identify", *words, "--method", "equation_error"],
+                ["aircraft", file],
             ]
         )
 
     def _run_folder(self, place: Path, rng: random.Random) -> list[str]:
-        shutil.copytree(self.folder / "run", place / "run", ignore=shutil.ignore_patterns("estimates", "report.html"))
-        file = rng.choice(sorted((place / "run").iterdir()))
+        run = place / "run"
+        shutil.copytree(self.seeds.folder / "run", run, ignore=shutil.ignore_patterns("estimates", "report.html"))
+        file = rng.choice(sorted(run.iterdir()))
         file.write_bytes(damage_text(file.read_text(), rng))
-        return ["report", str(place / "run")]
+        return rng.choice([["report", str(run)], ["report", str(run)], ["view", str(run), "--save", str(place / "o")]])
 
     def _summary(self, place: Path, rng: random.Random) -> list[str]:
-        (place / "summary.json").write_bytes(damage_text((self.folder / "run" / "summary.json").read_text(), rng))
-        form = rng.choice(("jsbsim", "gazebo", "rosflight"))
-        return ["export", str(place / "summary.json"), "--format", form, "--out", str(place / "model")]
+        summary = self._damaged_text(place, rng, "run/summary.json", "summary.json")
+        return ["export", summary, "--format", rng.choice(FORMATS), "--out", str(place / "model")]
+
+    def _model(self, place: Path, rng: random.Random) -> list[str]:
+        form = rng.choice(FORMATS)
+        model = self._damaged_text(place, rng, form, "model.xml" if form == "jsbsim" else "model.sdf")
+        return ["import", model, "--format", form, "--out", str(place / "o.yaml")]
+
+    def _catalogue(self, place: Path, rng: random.Random) -> list[str]:
+        for storage in ("mcap", "sqlite3"):
+            (place / storage).symlink_to(self.seeds.folder / storage)
+        catalogue = self._damaged_text(place, rng, rng.choice(("fleet.csv", "fleet.yaml")))
+        return ["fleet", catalogue, "--out", str(place / "out"), "--workers", "1", "--dry-run"]
 
     def _options(self, place: Path, rng: random.Random) -> list[str]:
-        bag, out = (
-            str(self.folder / "mcap"),
-            str(place / ("x" * rng.choice((3, 3, 300)) if rng.random() < 0.1 else "o")),
-        )
-        common = ["--aircraft", rng.choice(("cdrw", "cdrw", "cdwr", "x" * 300, "/", ".", "")), "--out", out]
-        odd = lambda: rng.choice((*ODD_NUMBERS, "0.5", "3", "10"))  # noqa: E731
+        name = "x" * rng.choice((3, 3, 300)) if rng.random() < 0.1 else "o"
+        common = ["--aircraft", rng.choice(("cdrw", "cdrw", "cdwr", "x" * 300, "/", ".", "")), "--out"]
+        bag, common = str(self.seeds.folder / "mcap"), [*common, str(place / name)]
         if rng.random() < 0.5:
-            keys = (
-                "window",
-                "forgetting_time",
-                "settle_time",
-                "max_gap",
-                "publish_rate",
-                "valid_fraction",
-                "use_prior",
-            )
-            words = ["replay", bag, *common, "--set", f"{rng.choice(keys)}={odd()}"]
+            words = ["replay", bag, *common, "--set", f"{rng.choice(SETTINGS)}={_odd(rng)}"]
         else:
-            keys = ("low_pass", "rate", "segment", "states", "biases", "use_prior", "stepwise", "max_gap", "actuators")
-            method = rng.choice([name for name in METHODS if "equation" in name or "recursive" in name])
-            words = ["identify", bag, *common, "--method", method, "--set", f"{rng.choice(keys)}={odd()}"]
+            method = rng.choice([one for one in METHODS if "equation" in one or "recursive" in one])
+            setting = f"{rng.choice(METHOD_SETTINGS)}={_odd(rng)}"
+            words = ["identify", bag, *common, "--method", method, "--set", setting]
         if rng.random() < 0.4:
-            words += ["--frequencies", ":".join(odd() for _ in range(rng.choice((2, 3, 3, 3, 4))))]
+            words += ["--frequencies", ":".join(_odd(rng) for _ in range(rng.choice((2, 3, 3, 3, 4))))]
         if rng.random() < 0.1:
             words += ["--topic", rng.choice(("imu/data:=", "x:=y", ":=", "imu/data:=/air_data", "imu/data:=/\u00e4"))]
         return words
 
     def _log(self, place: Path, rng: random.Random) -> list[str]:
-        log = rng.choice(self.logs)
+        log = rng.choice(self.seeds.logs)
         file = place / log.name
         with log.open("rb") as stream:
             file.write_bytes(damage_bytes(stream.read(LOG_LIMIT), rng))
-        return ["convert", str(file), "--out", str(place / "converted")]
+        return rng.choice([["convert", str(file), "--out", str(place / "converted")], ["check", str(file)]])
+
+    def _simulated(self, place: Path, rng: random.Random) -> list[str]:
+        aircraft = self._damaged_text(place, rng, "aircraft.yaml") if rng.random() < 0.5 else "cdrw"
+        manoeuvre = damage_text(rng.choice(("3211", "doublet:elevator:amplitude=0.05", "multisine")), rng)
+        spec = rng.choice(("doublet", manoeuvre.decode("utf-8", "replace").replace("\x00", "")))
+        out, command = ["--out", str(place / "out")], rng.choice(("simulate", "excite"))
+        words = [command, "--aircraft", aircraft, "--manoeuvre", spec, "--duration", "5", *out]
+        if rng.random() < 0.5:
+            words += [rng.choice(SIMULATED if command == "simulate" else DESIGNED), _odd(rng)]
+        if rng.random() < 0.3:
+            added = rng.choice(("turbulence", "actuator_lag:tau=0.1", "icing:severity=", "x:y=1", ":="))
+            words += ["--effect", added] if command == "simulate" else ["--envelope", added]
+        return words
+
+    def _gap(self, place: Path, rng: random.Random) -> list[str]:
+        given = self._damaged_bag(place, rng, rng.choice(("mcap", "sqlite3")))
+        flight = rng.choice((str(given), self._damaged_text(place, rng, "log.csv")))
+        return ["gap", flight, "--aircraft", "cdrw", "--out", str(place / "out")]
 
 
-def _first(streams: Streams, seconds: float) -> Streams:
-    """The messages of the first seconds of a flight."""
-    end = int(streams.imu.arrival.log_ns[0]) + int(seconds * 1e9)
-    parts = {}
-    for name in ("imu", "air_data", "actuators"):
-        stream = getattr(streams, name)
-        kept = stream.arrival.log_ns < end
-        arrays = {
-            key: value[kept]
-            for key, value in vars(stream).items()
-            if isinstance(value, np.ndarray) and len(value) == kept.size
-        }
-        arrival = replace(stream.arrival, **{key: value[kept] for key, value in vars(stream.arrival).items()})
-        parts[name] = replace(stream, arrival=arrival, **arrays)
-    return replace(streams, **parts)
+def _odd(rng: random.Random) -> str:
+    return rng.choice((*ODD_NUMBERS, "0.5", "3", "10"))

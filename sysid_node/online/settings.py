@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
@@ -15,7 +14,7 @@ from sysid_node.suggestion import did_you_mean
 METHODS = ("sls_rft", "iv_rft")
 MOST_LINES = 1000
 LONGEST_GAP = 5.0  # s
-SHORTEST_MEMORY = 1.0  # s
+SHORTEST_MEMORY, LONGEST_MEMORY = 1.0, 1e6  # s
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,8 @@ class OnlineSettings:
             raise InputError(f"actuators {self.actuators!r}: expected one of {', '.join(CARRIED)}")
         for name in ("forgetting_time", "window", "settle_time"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(f"{name} {value}: expected seconds, zero or more")
+            if not 0.0 <= value <= LONGEST_MEMORY:
+                raise InputError(f"{name} {value}: expected seconds, zero or more and at most {LONGEST_MEMORY:g}")
         if 0.0 < self.forgetting_time < SHORTEST_MEMORY:
             raise InputError(f"forgetting_time {self.forgetting_time}: expected 0 or at least {SHORTEST_MEMORY:g} s")
         if self.forgetting_time and self.window:

@@ -40,7 +40,11 @@ def missing_arrows(
 
 
 def arrow_scale(vectors: Array, span: float) -> float:
-    """Metres of arrow per unit, for which the largest but the rarest of vectors (N, 3) are as long as shown best."""
+    """Metres of arrow per unit, for which the largest but the rarest of vectors (N, 3) are as long as shown best.
+
+    One where they are all zero, or too large for any scale.
+    """
     size = np.linalg.norm(np.nan_to_num(vectors), axis=1)
     large = float(np.percentile(size, 99.0)) if size.size else 0.0
-    return _LONGEST * span / large if large > 0.0 else 1.0
+    scale = _LONGEST * span / large if large > 0.0 else 1.0
+    return scale if 0.0 < scale < np.inf else 1.0

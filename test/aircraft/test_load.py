@@ -115,6 +115,8 @@ MISTAKES = [
     ("gyro: 0.002", "gyro: -0.002", ("noise.gyro: got -0.002",)),
     ("gyro: 0.002", "gyros: 0.002", ("noise.gyros: unknown key", "did you mean 'gyro'?")),
     ("tolerance: 0.05", "tolerance: -0.05", ("f.yaml:20: derivatives.Cm_alpha.tolerance: got -0.05",)),
+    ("tolerance: 0.05", "tolerance: 1e-300", ("derivatives.Cm_alpha.tolerance: got 1e-300, expected at least 1e-09",)),
+    ("max_thrust: 30.0", "max_thrust: 1e-300", ("throttle.max_thrust: got 1e-300, expected at least 0.001 (N)",)),
     ("value: -0.4, ", "", ("derivatives.Cm_alpha: key 'value' is missing",)),
     ("Cm_alpha:", "CM_alpha:", ("derivatives.CM_alpha:", "did you mean 'Cm_alpha'?")),
     ("Cm_df", "Cm_dg", ("derivatives.Cm_dg: 'dg' is none of 0, alpha",)),

@@ -53,6 +53,7 @@ def test_plain_values_come_back() -> None:
         ("forgetting_time", "nan", "zero or more"),
         ("forgetting_time", "0.01", "at least 1 s"),
         ("window", "inf", "zero or more"),
+        ("forgetting_time", "1e18", "at most 1e+06"),
         ("settle_time", "soon", "a float"),
         ("max_gap", "0", "more than 0"),
         ("max_gap", "60", "at most 5"),

@@ -11,7 +11,7 @@ import numpy as np
 from sysid_node.aircraft.document import Entry
 from sysid_node.aircraft.model import Control, Throttle
 from sysid_node.aircraft.names import CONTROL_SYMBOLS, RESERVED_SYMBOLS
-from sysid_node.aircraft.reading.quantities import Quantities, ReadNumber, angle, any_number, positive
+from sysid_node.aircraft.reading.quantities import Quantities, ReadNumber, angle, any_number
 from sysid_node.suggestion import did_you_mean
 
 
@@ -109,6 +109,10 @@ def _check_joints(entries: Mapping[str, Entry], controls: Mapping[str, Control],
             )
 
 
+def _thrust(entry: Entry) -> float:
+    return entry.number("at least 0.001 (N)", lambda x: x >= 1e-3)
+
+
 def _throttle(entry: Entry, quantities: Quantities) -> Throttle:
     meaning = {"joint": "the name of the joint that carries throttle or thrust"}
     fields = entry.fields(meaning, optional=("max_thrust", "unit", "inclination", "arm"))
@@ -122,7 +126,7 @@ def _throttle(entry: Entry, quantities: Quantities) -> Throttle:
 
     return Throttle(
         joint=fields["joint"].text("the joint's name"),
-        max_thrust=read("max_thrust", positive("N"), None),
+        max_thrust=read("max_thrust", _thrust, None),
         inclination=read("inclination", angle, 0.0) or 0.0,
         arm=read("arm", any_number("m"), 0.0) or 0.0,
     )

@@ -36,10 +36,14 @@ def _check_derivative_name(name: str, entry: Entry, symbols: set[str]) -> None:
         raise entry.error("the regressor k (CL^2) is for CD only")
 
 
+#: The smallest tolerance of a derivative: its inverse square is the weight of the stated value.
+_SMALLEST = 1e-9
+
+
 def _derivative(entry: Entry) -> Derivative:
     fields = entry.fields({"value": "the derivative, per radian"}, optional=("tolerance",))
     value = fields["value"].number("a number (per rad)")
     if "tolerance" not in fields:
         return Derivative(value)
-    expected = "a positive number, 1 sigma in the derivative's unit (leave it out where it is not known)"
-    return Derivative(value, fields["tolerance"].number(expected, lambda x: x > 0))
+    expected = f"at least {_SMALLEST:g}, 1 sigma in the derivative's unit (leave it out where it is not known)"
+    return Derivative(value, fields["tolerance"].number(expected, lambda x: x >= _SMALLEST))

@@ -33,7 +33,7 @@ def expanded(pattern: str, base: Path) -> list[str]:
         except Exception as error:  # every file system raises its own exceptions
             raise _unreadable(pattern, error) from error
     whole = base / Path(pattern).expanduser()
-    if whole.exists() or not _has_marks(pattern):
+    if exists(str(whole)) or not _has_marks(pattern):
         return [str(whole)]
     anchor = Path(whole.anchor)
     return sorted(str(path) for path in anchor.glob(str(whole.relative_to(anchor))))

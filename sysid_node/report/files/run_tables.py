@@ -157,9 +157,9 @@ def read_responses(path: Path) -> dict[str, Response]:
     """What ``write_responses`` wrote; empty where there is no such file."""
     units: dict[str, str] = {}
     values: dict[str, list[list[float]]] = {}
-    for name, unit, *cells in _read(path, RESPONSE_COLUMNS, lambda r: r):
+    for name, unit, numbers in _read(path, RESPONSE_COLUMNS, lambda r: (r[0], r[1], [_number(cell) for cell in r[2:]])):
         units[name] = unit
-        values.setdefault(name, []).append([_number(cell) for cell in cells])
+        values.setdefault(name, []).append(numbers)
     return {name: Response(units[name], *np.array(rows).T) for name, rows in values.items()}
 
 
@@ -200,10 +200,10 @@ def _read(path: Path, header: Sequence[str], parse: Callable[[list[str]], T]) ->
         return
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.reader(file)
-        found = next(reader, [])
+        found = next(_rows(path, reader), [])
         if tuple(found) != tuple(header):
             raise InputError(f"{path}: columns {','.join(found)!r}; expected {','.join(header)!r}")
-        for row in reader:
+        for row in _rows(path, reader):
             try:
                 if len(row) != len(header):
                     raise ValueError(f"{len(row)} cells, expected {len(header)}")
@@ -212,12 +212,20 @@ def _read(path: Path, header: Sequence[str], parse: Callable[[list[str]], T]) ->
                 raise InputError(f"{path}, line {reader.line_num}: {error}; run the command again") from None
 
 
+def _rows(path: Path, reader: Iterator[list[str]]) -> Iterator[list[str]]:
+    """The rows of a file. Raises InputError where it is no text."""
+    try:
+        yield from reader
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: is no table of text: {error}; run the command again") from None
+
+
 def read_columns(path: Path, axis: str) -> dict[str, Array]:
     """A table of numbers by column, the first being ``axis``; empty where there is no file or no row."""
     if not path.exists():
         return {}
     with path.open(newline="", encoding="utf-8") as file:
-        header = next(csv.reader(file), [])
+        header = next(_rows(path, csv.reader(file)), [])
     if header[:1] != [axis]:
         raise InputError(f"{path}: first column {header[:1]}; expected {axis!r}")
     rows = list(_read(path, header, lambda row: [_number(cell) for cell in row]))

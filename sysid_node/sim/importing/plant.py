@@ -179,6 +179,10 @@ def _speed_at(plant: Plant, lift: float) -> float:
     return float(np.sqrt(2.0 * plant.mass * GRAVITY / (plant.density * plant.geometry.S * lift)))
 
 
+#: Forces and moments that no aircraft near level flight has, in its weights, and in these times its chord.
+_LARGEST = 1e6
+
+
 def _balance(plant: Plant, speed: float) -> LevelFlight | None:
     """The level flight at an airspeed (a glide where there is no engine), without sideslip; None without one."""
     names = [n for n in ("elevator", "aileron", "rudder") if n in plant.controls]
@@ -204,5 +208,9 @@ def _balance(plant: Plant, speed: float) -> LevelFlight | None:
     lower = np.array([-0.25, -0.3, 0.0 if powered else -0.6, *(-x for x in limits)])
     upper = np.array([0.35, 0.3, 1.0 if powered else 0.5, *limits])
     start = np.array([0.06, 0.0, 0.4 if powered else 0.0, *(0.0 for _ in used)])
+    if not np.abs(residual(start)).max() < _LARGEST:  # nor where one is not finite
+        raise InputError(
+            f"model {plant.name!r}: at {speed:.1f} m/s its forces are over {_LARGEST:g} weights; correct it"
+        )
     found = least_squares(residual, start, bounds=(lower, upper), x_scale=0.1, xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return flight(found.x)[0] if np.abs(found.fun).max() < 1e-6 else None

@@ -6,7 +6,7 @@ import fsspec
 import pytest
 
 from sysid_node.errors import InputError
-from sysid_node.fleet.catalogue.locations import local_copy
+from sysid_node.fleet.catalogue.locations import exists, expanded, local_copy
 
 
 def test_a_remote_log_is_copied_once_and_again_when_it_changes(tmp_path: Path) -> None:
@@ -30,6 +30,12 @@ def test_a_folder_is_copied_with_its_files(tmp_path: Path) -> None:
 
 def test_a_path_of_this_machine_is_itself(tmp_path: Path) -> None:
     assert local_copy(str(tmp_path / "a.csv"), tmp_path) == tmp_path / "a.csv"
+
+
+def test_a_name_that_no_file_system_can_have_is_not_there(tmp_path: Path) -> None:
+    name = "x" * 5000
+    assert expanded(name, tmp_path) == [str(tmp_path / name)]
+    assert not exists(str(tmp_path / name))
 
 
 @pytest.mark.parametrize("location", ["none://x/y", "memory://nothing/there.csv"])

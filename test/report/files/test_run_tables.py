@@ -36,6 +36,15 @@ def test_history_reads_back_to_the_last_bit(tmp_path):
     assert tables.read_history(tmp_path / "estimates.csv", tmp_path / "fits.csv") == history
 
 
+@pytest.mark.parametrize(("damage", "said"), [(b"\xb8", "is no table of text"), (b"abc", "line 2: could not convert")])
+def test_a_damaged_response_is_one_line(tmp_path, damage, said):
+    path = tmp_path / "responses.csv"
+    tables.write_responses(path, {"CL": Response("1", *np.array([[0.25], [0.5], [0.75]]))})
+    path.write_bytes(path.read_bytes().replace(b"0.5", damage))
+    with pytest.raises(InputError, match=said):
+        tables.read_responses(path)
+
+
 def test_nan_is_an_empty_cell(tmp_path):
     path = tmp_path / "estimates.csv"
     unknown = estimate("Cm_q", *[math.nan] * 4, valid=False, status="not excited")

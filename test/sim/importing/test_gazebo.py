@@ -60,6 +60,13 @@ def small(folder):
     return path
 
 
+def test_numbers_that_no_aircraft_has_are_one_line(tmp_path):
+    path = small(tmp_path)
+    path.write_text(path.read_text().replace("<cp>-0.6 0 0.02</cp>", "<cp>0 0 1e300</cp>"))
+    with pytest.raises(InputError, match="its forces are over"):
+        read_gazebo(path, None)
+
+
 def numbers(element, tag, default):
     text = element.findtext(tag)
     values = [float(part) for part in text.split()] if text else [default] if np.isscalar(default) else list(default)

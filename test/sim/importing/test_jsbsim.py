@@ -1,5 +1,7 @@
 """JSBSim's models read in. Truth: JSBSim's own forces, numbers of its files, and the exporter's input."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -115,6 +117,17 @@ def test_what_cannot_be_read_is_one_line(model, airspeed, said):
     with pytest.raises(InputError, match=said) as error:
         read_jsbsim(model, airspeed)
     assert "\n" not in str(error.value)
+
+
+def test_a_property_that_is_not_there_is_one_line_and_no_abort(tmp_path):
+    """JSBSim throws when it runs, and again when the model is destroyed, at the end of the process."""
+    text = find_model("c172p").main.read_text()
+    (tmp_path / "c172p.xml").write_text(text.replace("<property>velocities/p-aero-rad_sec", "<property>velocities/xx"))
+    words = ["import", str(tmp_path / "c172p.xml"), "--format", "jsbsim", "--out", str(tmp_path / "o.yaml")]
+    program = f"import sys; from sysid_node.cli.main import main; sys.exit(main({words}))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert "velocities/xx does not exist" in done.stderr
 
 
 def test_aerodynamics_are_found_in_the_model():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import os
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -49,6 +51,20 @@ class Loads:
     alpha_rate: float  # rad/s, by which JSBSim computed its terms in the rate of alpha
 
 
+#: All programs that have not been destroyed.
+_ALIVE: weakref.WeakSet[Program] = weakref.WeakSet()
+
+
+def never_destroy_programs() -> None:
+    """Lets the programs that there are live until the process ends.
+
+    A model that reads a property which it lacks makes JSBSim throw when it runs, and again when it is destroyed; the
+    second would end the process.
+    """
+    for program in _ALIVE:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(program.fdm))
+
+
 class Program:
     """JSBSim with one model. Surfaces are properties that the caller sets, by name. Raises InputError if none loads."""
 
@@ -59,6 +75,7 @@ class Program:
 
         messages = collect_messages()
         self.fdm: Any = jsbsim.FGFDMExec(str(files.folder))
+        _ALIVE.add(self)
         self.fdm.set_debug_level(0)
         self._rate = rate
         self.fdm.set_dt(1.0 / rate)  # lags and delays freeze when the model is read

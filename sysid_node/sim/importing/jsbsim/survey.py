@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.actuators import Servo, chain_to, read_servo
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model, find_model, outputs_of, sections
-from sysid_node.sim.importing.jsbsim.program import Flight, Program
+from sysid_node.sim.importing.jsbsim.program import Flight, Program, never_destroy_programs
 from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, Surface, find_surfaces, gains_to
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, default_airspeeds, find_trim, no_trim
 
@@ -68,6 +68,7 @@ def surveyed(
     except (KeyError, ValueError, RuntimeError) as error:
         if isinstance(error, InputError):
             raise
+        never_destroy_programs()
         raise InputError(f"model {files.label}: JSBSim stops: {' '.join(str(error).split())}") from error
 
 
