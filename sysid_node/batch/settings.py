@@ -15,6 +15,7 @@ from sysid_node.suggestion import did_you_mean
 #: Hz; well above the short period of a small aircraft, well below its sensors' bandwidth.
 DEFAULT_LOW_PASS = 3.0
 LOWEST_LOW_PASS = 0.01  # Hz: a filter this slow leaves nothing of a flight's motion
+LONGEST_BRIDGED = 3600.0  # s: beyond it, it is another flight
 
 #: Hz: first line, step, last line.
 Frequencies = tuple[float, float, float]
@@ -50,8 +51,10 @@ class BatchSettings:
             raise InputError(f"setting low_pass = {self.low_pass}: expected 0 or at least {LOWEST_LOW_PASS:g} Hz")
         if self.actuators not in CARRIED:
             raise InputError(f"setting actuators = {self.actuators!r}: expected one of {', '.join(CARRIED)}")
-        if not (math.isfinite(self.max_gap) and self.max_gap > 0.0):
-            raise InputError(f"setting max_gap = {self.max_gap}: expected seconds, more than zero")
+        if not 0.0 < self.max_gap <= LONGEST_BRIDGED:
+            raise InputError(
+                f"setting max_gap = {self.max_gap}: expected seconds, more than zero and at most {LONGEST_BRIDGED:g}"
+            )
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> BatchSettings:

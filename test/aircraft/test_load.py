@@ -93,6 +93,7 @@ MISTAKES = [
     ("Ixz: 0.01", "Ixz: 0.3", ("inertia: no rigid body has Ixz^2 = 0.09 >= Ixx Izz = 0.06",)),
     ("Iyy: 0.15", "Iyy: 0.0", ("inertia.Iyy: got 0.0, expected a positive number",)),
     ("air_density: 1.2", "air_density: 1200", ("reference.air_density: got 1200",)),
+    ("air_density: 1.2", "air_density: 1e-300", ("reference.air_density: got 1e-300",)),
     ("limit: 0.35", "limit: 20", ("f.yaml:8: controls.elevator.limit: got 20", "degrees?")),
     ("offset: 0.01", "offset: 3.0", ("controls.aileron.offset: got 3.0", "degrees?")),
     ("{joint: rudder, scale: -1.0}", "{scale: -1.0}", ("controls.rudder: expected either joint", "joints")),

@@ -33,6 +33,7 @@ def test_texts_become_values():
         ({"frequencies": "1:2"}, "expected START:STEP:STOP in Hz"),
         ({"frequencies": "3:0.1:1"}, "expected 0 < start < stop"),
         ({"max_gap": "0"}, "setting max_gap = 0.0: expected seconds, more than zero"),
+        ({"max_gap": "1e300"}, "expected seconds, more than zero and at most 3600"),
     ],
 )
 def test_what_cannot_be_is_refused(values, said):

@@ -68,7 +68,7 @@ def read_reference(entry: Entry) -> Reference:
     fields = entry.fields({"airspeed": "the true airspeed in m/s", "air_density": "the air density in kg/m^3"})
     return Reference(
         airspeed=positive("m/s")(fields["airspeed"]),
-        air_density=fields["air_density"].number("an air density (0 to 2 kg/m^3)", lambda x: 0 < x < 2),
+        air_density=fields["air_density"].number("an air density (0.001 to 2 kg/m^3)", lambda x: 1e-3 <= x < 2),
     )
 
 

@@ -61,14 +61,14 @@ def read_references(path: Path) -> References:
     prior: dict[str, Prior] = {}
     truth: dict[str, float] = {}
     since: dict[str, float] = {}
-    for row in _read(path, ESTIMATE_COLUMNS + REFERENCE_COLUMNS, lambda r: r):
-        value, tolerance, true, time = (_number(cell) for cell in row[-4:])
+    columns = ESTIMATE_COLUMNS + REFERENCE_COLUMNS
+    for name, (value, tolerance, true, time) in _read(path, columns, lambda r: (r[0], [_number(c) for c in r[-4:]])):
         if not math.isnan(value):
-            prior[row[0]] = Prior(value, tolerance)
+            prior[name] = Prior(value, tolerance)
         if not math.isnan(true):
-            truth[row[0]] = true
+            truth[name] = true
         if not math.isnan(time):
-            since[row[0]] = time
+            since[name] = time
     return References(prior, truth, since)
 
 
