@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 #: ROSflight's letter of each control, and the sign of the aircraft file's: there, aileron rolls left.
 _CONTROLS = {"elevator": ("de", "e", 1.0), "aileron": ("da", "a", -1.0), "rudder": ("dr", "r", 1.0)}
+_LARGEST = 1e100  # of a number in a model, in any unit
 _ANGLE = "max_{}_deflection_angle"
 
 _ALPHA = np.deg2rad(np.arange(-20.0, 30.01, 0.5))
@@ -115,8 +116,8 @@ class _Getter:
         value = self._parameters[name]
         if isinstance(value, str) and _is_number(value):  # -.99 is a number to ROS, and text to YAML 1.1
             value = float(value)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"{self._path}: {name}: got {value!r}, expected a number")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
+            raise InputError(f"{self._path}: {name}: got {value!r:.60}, expected a number")
         return float(value)
 
     def or_else(self, name: str, default: float) -> float:

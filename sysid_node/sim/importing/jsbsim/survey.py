@@ -66,9 +66,9 @@ def surveyed(
         with tempfile.TemporaryDirectory(prefix="sysid-") as place:
             yield _survey(files, Path(place), airspeed, DEFAULT_ALTITUDE if altitude is None else altitude)
     except (KeyError, ValueError, RuntimeError) as error:
+        never_destroy_programs()
         if isinstance(error, InputError):
             raise
-        never_destroy_programs()
         raise InputError(f"model {files.label}: JSBSim stops: {' '.join(str(error).split())}") from error
 
 
