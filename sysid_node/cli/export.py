@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -84,12 +83,16 @@ def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]
     return replace(aircraft, derivatives=derivatives), left
 
 
+#: Beyond every estimate, in any unit.
+_LARGEST = 1e100
+
+
 def _number(name: str, key: str, value: object) -> float | None:
     """A number of an estimate; None where it is null. Raises InputError where it is neither, or not finite."""
     if value is None:
         return None
-    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        raise InputError(f"estimate of {name!r}: {key} is {value!r}, expected a finite number or null")
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _LARGEST:
+        raise InputError(f"estimate of {name!r}: {key} is {value!r:.60}, expected a finite number or null")
     return float(value)
 
 

@@ -90,6 +90,7 @@ MISTAKES = [
     ("b: 1.5", "b: 1500", ("geometry: S = 0.8", "check the units")),
     ("geometry: {S: 0.8, b: 1.5, cbar: 0.6}", "geometry: 1", ("geometry: got 1, expected a mapping with S, b, cbar",)),
     ("Izz: 0.3", "Izz: 0.9", ("f.yaml:4: inertia: no rigid body has Izz = 0.9 > Ixx + Iyy = 0.35",)),
+    ("Ixz: 0.01", "Ixz: 1e300", ("inertia: no rigid body has Ixz^2 = inf >= Ixx Izz",)),
     ("Ixz: 0.01", "Ixz: 0.3", ("inertia: no rigid body has Ixz^2 = 0.09 >= Ixx Izz = 0.06",)),
     ("Iyy: 0.15", "Iyy: 0.0", ("inertia.Iyy: got 0.0, expected a positive number",)),
     ("air_density: 1.2", "air_density: 1200", ("reference.air_density: got 1200",)),

@@ -44,10 +44,9 @@ def _check_inertia(entry: Entry, inertia: Inertia, *, ideal: bool) -> None:
             if not ideal:
                 raise problem
             warnings.warn(f"{problem}; they are taken as the simulator takes them", ModelWarning, stacklevel=2)
-    if inertia.Ixz**2 >= inertia.Ixx * inertia.Izz:
-        raise entry.error(
-            f"no rigid body has Ixz^2 = {inertia.Ixz**2:g} >= Ixx Izz = {inertia.Ixx * inertia.Izz:g}; check Ixz"
-        )
+    square = inertia.Ixz * inertia.Ixz  # infinite where it is too large; ``**`` would raise OverflowError
+    if square >= inertia.Ixx * inertia.Izz:
+        raise entry.error(f"no rigid body has Ixz^2 = {square:g} >= Ixx Izz = {inertia.Ixx * inertia.Izz:g}; check Ixz")
 
 
 def read_geometry(entry: Entry, quantities: Quantities) -> Geometry:

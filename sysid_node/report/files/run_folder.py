@@ -42,15 +42,21 @@ def write_run(folder: Path, run: RunResult) -> None:
 
 def rebuild_report(folder: Path) -> Path:
     """Draws ``report.html`` from the folder's other files and gives its path. Raises as ``read_run`` does."""
+    with _sound(folder):
+        _write_aside(folder, read_run(folder))
+    return folder / REPORT
+
+
+@contextmanager
+def _sound(folder: Path) -> Iterator[None]:
+    """A context that raises InputError where the files of a run have been damaged."""
     try:
-        run = read_run(folder)
-        _write_aside(folder, run)
+        yield
     except InputError:
         raise
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError, csv.Error) as error:
         words = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise InputError(f"{folder}: its files are damaged ({words}); run the command that wrote them again") from error
-    return folder / REPORT
 
 
 def _write_aside(folder: Path, run: RunResult) -> None:
@@ -66,7 +72,12 @@ def _write_aside(folder: Path, run: RunResult) -> None:
 
 def read_run(folder: Path) -> RunResult:
     """The run that ``write_run`` wrote. Raises InputError naming the file where something is missing or wrong."""
-    found = _read_summary(folder / SUMMARY)
+    with _sound(folder):
+        return _read(folder, _read_summary(folder / SUMMARY))
+
+
+def _read(folder: Path, found: Mapping[str, Any]) -> RunResult:
+    """The run of a summary and the tables beside it."""
     return RunResult(
         aircraft=found["aircraft"],
         method=found["method"],

@@ -88,6 +88,16 @@ def test_a_folder_that_holds_no_run_is_named(tmp_path, text, wrong):
     assert "\n" not in str(error.value)
 
 
+def test_a_summary_with_a_damaged_key_is_one_line(tmp_path):
+    run = synthetic.run(seconds=10.0)
+    write_run(tmp_path, run)
+    found = json.loads((tmp_path / "summary.json").read_text())
+    found["servos"] = {"elevator": {"value": 0.03, "sutats": "ok"}}
+    (tmp_path / "summary.json").write_text(json.dumps(found))
+    with pytest.raises(InputError, match="its files are damaged"):
+        read_run(tmp_path)
+
+
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
