@@ -6,7 +6,6 @@ Messages are written byte for byte, with the time at which they arrived.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import importlib
 import sys
 import time
@@ -14,7 +13,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from rclpy.executors import ExternalShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -24,7 +22,7 @@ from rosbags.rosbag2 import Writer
 
 from sysid_node.flight.bag.writer import STORAGES, add_topic, new_bag
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE, INPUT_TOPICS
-from sysid_node.ros.support.spin import run_program, serve
+from sysid_node.ros.support.spin import run_program, serve, until_shutdown
 
 JOINTS = "sensor_msgs/msg/JointState"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
@@ -89,7 +87,7 @@ def main() -> None:
         with new_bag(options.bag, options.storage) as writer:
             recorder = Recorder(writer, TOPICS)
             recorder.get_logger().info(f"records into {options.bag}")
-            with contextlib.suppress(ExternalShutdownException):  # the writer aborts on exceptions
+            with until_shutdown():  # the writer aborts on exceptions
                 serve(recorder)
         get_logger("recorder").info(f"{recorder.words()}, into {options.bag}")
 

@@ -6,7 +6,8 @@ import gc
 import signal
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,14 @@ from rclpy.node import Node
 
 from sysid_node.errors import InputError
 from sysid_node.parameter import Parameter
+
+#: What rclpy raises where ROS has been shut down.
+_AT_SHUTDOWN = (
+    ExternalShutdownException,
+    NotInitializedException,
+    rclpy_implementation.InvalidHandle,
+    rclpy_implementation.RCLError,
+)
 
 
 def run_node(make: Callable[[], Node], about: str, table: Sequence[Parameter] = ()) -> int:
@@ -62,20 +71,29 @@ def run_program(program: Callable[[], None]) -> int:
         rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
         return 2
     try:
-        program()
+        with until_shutdown():
+            program()
     except InputError as error:
         rclpy.logging.get_logger("sysid").fatal(str(error))
         return 2
-    except ExternalShutdownException:
-        pass
-    except (rclpy_implementation.RCLError, rclpy_implementation.InvalidHandle, NotInitializedException):
-        if rclpy.ok():
-            raise  # otherwise ROS was shutting down
     finally:
         rclpy.try_shutdown()
         for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
             signal.signal(one, signal.SIG_IGN)
     return 0
+
+
+@contextmanager
+def until_shutdown() -> Iterator[None]:
+    """A context that ends quietly where ROS is shut down in it, at whatever moment.
+
+    A call that finds ROS shut down raises one of several exceptions; while ROS is up, they are raised.
+    """
+    try:
+        yield
+    except _AT_SHUTDOWN:
+        if rclpy.ok():
+            raise
 
 
 def while_ros_is_up(node: Node, callback: Callable[..., Any]) -> Callable[..., Any]:

@@ -39,6 +39,22 @@ sys.exit(run_program(program))
 """
 
 
+STOPPED_BEFORE_SERVING = """
+import sys
+import rclpy
+from sysid_node.ros.support.spin import run_program, serve, until_shutdown
+
+def program():
+    with until_shutdown():
+        node = rclpy.create_node("early")
+        rclpy.shutdown()
+        serve(node)
+    print("and the rest")
+
+sys.exit(run_program(program))
+"""
+
+
 def ended(text: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", text, *arguments]
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
@@ -55,6 +71,11 @@ def test_what_ros_refuses_while_it_shuts_down_is_no_failure_and_everything_else_
     failed = ended(ASKED_TOO_LATE.format(before="pass"))
     assert failed.returncode == 1
     assert failed.stderr.endswith("ValueError: not reached where ROS is down\n")
+
+
+def test_what_comes_after_serving_is_done_wherever_ros_is_shut_down() -> None:
+    done = ended(STOPPED_BEFORE_SERVING)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "and the rest\n", "")
 
 
 def test_arguments_that_ros_cannot_read_are_one_line() -> None:
