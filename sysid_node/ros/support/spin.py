@@ -126,4 +126,7 @@ def serve(node: Node) -> None:
         while rclpy.ok():
             executor.spin_once(timeout_sec=0.1)
     finally:
+        # A collection in the middle of the destruction of rclpy's handles has ended a process by a segmentation fault
+        # (as in ros2/rclpy issue 1644); what is left to collect ends with the process.
+        gc.disable()
         node.destroy_node()
