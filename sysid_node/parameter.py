@@ -12,7 +12,7 @@ from sysid_node.errors import InputError
 
 
 @dataclass(frozen=True)
-class Parameter:
+class NodeParameter:
     """One parameter. ``lower`` and ``upper`` are inclusive; ``choices``, where given, are all allowed values."""
 
     name: str
@@ -43,12 +43,12 @@ class Parameter:
 
 def setting(
     defaults: object, ranges: Mapping[str, tuple[float, float]], name: str, unit: str, meaning: str, change: str
-) -> Parameter:
+) -> NodeParameter:
     """The parameter for the field ``name`` of a dataclass of settings, with the field's default and range."""
-    return Parameter(name, float(getattr(defaults, name)), unit, meaning, change, *ranges[name])
+    return NodeParameter(name, float(getattr(defaults, name)), unit, meaning, change, *ranges[name])
 
 
-def check_each(table: Sequence[Parameter], values: Mapping[str, Any]) -> None:
+def check_each(table: Sequence[NodeParameter], values: Mapping[str, Any]) -> None:
     """Check the value of every parameter of the table. Raises InputError that names the first wrong one."""
     for parameter in table:
         value = values[parameter.name]
@@ -57,7 +57,7 @@ def check_each(table: Sequence[Parameter], values: Mapping[str, Any]) -> None:
             raise InputError(f"parameter {parameter.name} = {value!r}: expected {parameter.expected}")
 
 
-def annotated_yaml(node: str, table: Sequence[Parameter], effect: str) -> str:
+def annotated_yaml(node: str, table: Sequence[NodeParameter], effect: str) -> str:
     """The text of config/<node>.yaml: every parameter with meaning, unit, default and when to change it.
 
     ``effect`` says when a change takes effect.

@@ -25,7 +25,7 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 
 FLIGHTS = {"plain": {}, "servos of 30 ms": {"actuator_lag": {"time_constant": 0.03}}}
 RATE = 1000.0  # Hz
@@ -43,7 +43,7 @@ def flown(name: str, seed: int) -> tuple[FlightRecord, dict[str, float]]:
     """A flight as aligned columns, and the true derivatives."""
     simulator = simulated()
     sortie = fly(simulator, FLIGHTS[name], "none", seed)
-    return flight_record(simulator.aircraft, Recorder().record(sortie), 0.2, "auto"), sortie.derivatives
+    return flight_record(simulator.aircraft, FlightSampler().record(sortie), 0.2, "auto"), sortie.derivatives
 
 
 def estimated(method: str, name: str, seed: int) -> dict[str, Any]:

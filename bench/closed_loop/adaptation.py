@@ -25,7 +25,7 @@ from bench.closed_loop.flights import EXCITATION, RATE, Flown, Sortie, aft, base
 from bench.pages import publish, table
 from sysid_node.online.settings import METHODS
 from sysid_node.sim.flying.live import LiveConditions
-from sysid_node.sim.pages.line_chart import Panel, draw
+from sysid_node.sim.pages.line_chart import LineChart, draw
 
 Array = NDArray[np.float64]
 
@@ -198,7 +198,7 @@ def picture(path: Path) -> None:
     for name, axis in (("elevator at 40 % of its effect", 0), ("aileron at 50 % of its effect", 1)):
         fixed, adapted = both(Sortie(FAILURES[name], ONSET, END, LiveConditions(seed=1)))
         off = [np.rad2deg((flown.attitude - flown.wanted)[:, axis]) for flown in (fixed, adapted)]
-        panels.append(Panel(f"{name}: {('pitch', 'roll')[axis]} error, deg", fixed.time, *off))
+        panels.append(LineChart(f"{name}: {('pitch', 'roll')[axis]} error, deg", fixed.time, *off))
     path.write_text(draw(panels, "tracking error, baseline grey, adapted blue"), encoding="utf-8")
 
 

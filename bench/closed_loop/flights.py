@@ -146,7 +146,7 @@ def _command(
     _, _, az, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
     if not excitation.events and now.time >= BEGIN:
         exciter.start(excitation, now.time)
-    extra = exciter.step(excitation, now.time, exciter.FlightCondition(phi, theta, V, -az / GRAVITY))
+    extra = exciter.step(excitation, now.time, exciter.LimitedQuantities(phi, theta, V, -az / GRAVITY))
     sensed = Measurements(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)
     command = controller.step(pilot, sensed, points, extra.tolist())
     wanted = pilot.law.wanted

@@ -33,7 +33,7 @@ from sysid_node.online.alignment.whole_record import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import Sortie, SortieConditions, fly_sortie
 
 MANOEUVRE, RATE, COMMAND_RATE = "3211:repeat=3", 1000.0, 100.0  # Hz, of the simulation and of the autopilot
@@ -125,7 +125,7 @@ def flown(simulator: Simulator, aircraft: Aircraft, number: int) -> dict[str, An
     """One line of the results: of each method the rows of derivatives and servos, and how many were valid without."""
     kind, effects = drawn(aircraft, number)
     sortie = fly(simulator, effects, kind["air"], number)
-    streams, file = Recorder().record(sortie), known(aircraft, kind, effects, number)
+    streams, file = FlightSampler().record(sortie), known(aircraft, kind, effects, number)
     truth, line = sortie.derivatives, {"number": number, **kind, "effects": effects}
     damping = effects["actuator_lag"].get("damping")
     late = {
@@ -136,7 +136,7 @@ def flown(simulator: Simulator, aircraft: Aircraft, number: int) -> dict[str, An
         derivatives, servos = estimated(method, file, streams, "auto")
         line[method] = {name: _row(d, truth[name]) for name, d in derivatives.items()}
         line[f"{method}_servos"] = {name: _row(d, late[name]) for name, d in servos.items()}
-    exact = Recorder(actuator_rate=200.0, surfaces="measured").record(fly(simulator, {}, kind["air"], number))
+    exact = FlightSampler(actuator_rate=200.0, surfaces="measured").record(fly(simulator, {}, kind["air"], number))
     ideal = replace(aircraft, ideal=True, noise_bias=dict.fromkeys(aircraft.noise_bias, 0.0))
     line["valid_exact"] = sum(d.valid for d in estimated("replay", ideal, exact, "positions")[0].values())
     return line

@@ -30,7 +30,7 @@ from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
 AIRCRAFT, AIRS = "cdrw", ("none", "light", "moderate")
@@ -84,15 +84,17 @@ class Pair:
         """Positions of a perfect aircraft."""
         bias = dict.fromkeys(self.aircraft.noise_bias, 0.0)
         ideal = replace(self.aircraft, ideal=True, noise_bias=bias)
-        return self._flown(ideal, manoeuvre, later, Recorder(actuator_rate=200.0, surfaces="measured"), "positions")
+        return self._flown(
+            ideal, manoeuvre, later, FlightSampler(actuator_rate=200.0, surfaces="measured"), "positions"
+        )
 
     def ordinary(self, manoeuvre: str, later: Effects) -> Flight:
         """Commands of an aircraft with everything a little off."""
         kind, effects = drawn(self.aircraft, self.number)
         file = known(self.aircraft, {**kind, "file": "wrong"}, effects, self.number)
-        return self._flown(file, manoeuvre, {**effects, **later}, Recorder(), "auto")
+        return self._flown(file, manoeuvre, {**effects, **later}, FlightSampler(), "auto")
 
-    def _flown(self, file: Aircraft, manoeuvre: str, effects: Effects, recorder: Recorder, carried: str) -> Flight:
+    def _flown(self, file: Aircraft, manoeuvre: str, effects: Effects, recorder: FlightSampler, carried: str) -> Flight:
         rate = None if carried == "positions" else COMMAND_RATE
         plan = parse_manoeuvre(manoeuvre, self.aircraft, RATE)
         moves = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])

@@ -28,7 +28,7 @@ from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import Sortie, SortieConditions, fly_sortie
 
 AIRCRAFT = "cdrw"
@@ -102,9 +102,9 @@ def row(name: str, flights: int, turbulence: str) -> list[str]:
     positions, commands = Count(), Count()
     for seed in range(1, flights + 1):
         sortie = fly(IMPERFECTIONS[name], seed, turbulence)
-        measured = Recorder(actuator_rate=POSITION_RATE, surfaces="measured").record(sortie)
+        measured = FlightSampler(actuator_rate=POSITION_RATE, surfaces="measured").record(sortie)
         positions.add(estimated(measured, "positions"), sortie.derivatives)
-        commands.add(estimated(Recorder().record(sortie), "auto"), sortie.derivatives)
+        commands.add(estimated(FlightSampler().record(sortie), "auto"), sortie.derivatives)
     cells = [name, *positions.cells(flights), *commands.cells(flights)]
     print(" | ".join(cells), file=sys.stderr, flush=True)  # a long bench says how far it is
     return cells

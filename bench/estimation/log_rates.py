@@ -23,7 +23,7 @@ from sysid_node.aircraft.model import Aircraft, UncertainValue
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commands import read_commands
 from sysid_node.flight.frames import quaternion_from_euler
-from sysid_node.flight.logs.autopilot_log import AutopilotLog, Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.fractions import between_commands
 from sysid_node.flight.logs.log_streams import flight_of_log
 from sysid_node.flight.record import Array
@@ -96,8 +96,8 @@ def logged(bag: Path, rates: Rates, *, vanes: bool) -> Streams:
         attitude=thinned(Signal("attitude", stamps, wxyz), rates.attitude),
         airspeed=thinned(Signal("airspeed", air.arrival.stamp_ns, air.values[:, :1]), rates.airspeed),
         density=thinned(Signal("air", air.arrival.stamp_ns, air.values[:, 3:]), 5.0),
-        controls=Commands(names, thinned(commands, rates.commands)),
-        outputs=Commands((), absent("outputs", 0)),
+        controls=LoggedCommands(names, thinned(commands, rates.commands)),
+        outputs=LoggedCommands((), absent("outputs", 0)),
         vanes=Signal("vanes", air.arrival.stamp_ns, air.values[:, 1:3]) if vanes else None,
     )
     made = flight_of_log(log).streams

@@ -24,7 +24,7 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying.autopilot import Autopilot, autopilot_for, fly_held
-from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight
+from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
@@ -125,7 +125,9 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     return Batch(plan.time, _samples(np.asarray(flights.outputs), np.asarray(flights.surfaces), flights.states))
 
 
-def _flown(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, pilot: Autopilot | None) -> SimulatedFlight:
+def _flown(
+    simulator: Simulator, theta: Array, trim: Trim, inputs: RolloutInputs, pilot: Autopilot | None
+) -> SimulatedFlight:
     """One flight from trim, in the autopilot's hands if there is one."""
     if pilot is None:
         return simulator.rollout(theta, trim.initial, inputs)
@@ -133,7 +135,12 @@ def _flown(simulator: Simulator, theta: Array, trim: Trim, inputs: Inputs, pilot
 
 
 def _flown_on(
-    simulator: Simulator, thetas: tuple[Array, Array], trim: Trim, inputs: Inputs, pilot: Autopilot | None, onset: int
+    simulator: Simulator,
+    thetas: tuple[Array, Array],
+    trim: Trim,
+    inputs: RolloutInputs,
+    pilot: Autopilot | None,
+    onset: int,
 ) -> SimulatedFlight:
     """One flight that goes on from sample ``onset`` as another aircraft, at what the autopilot's integrals were."""
     before = _flown(simulator, thetas[0], trim, jax.tree.map(lambda x: x[: onset + 1], inputs), pilot)

@@ -25,7 +25,7 @@ import numpy as np
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 from sysid_node.sim.simulator import Simulator
 
@@ -87,7 +87,7 @@ def _fly_one(simulator: Simulator, flight: dict[str, Any], truth: dict[str, Any]
     deflections = np.column_stack([manoeuvre.surfaces(), np.zeros(manoeuvre.time.size)])
     sortie = fly_sortie(simulator, deflections, conditions)
     unfinished = path.with_name(f".{path.name}")
-    write_streams(unfinished, Recorder(RATE, 100.0, 100.0, surfaces="measured").record(sortie), "mcap", "flu", {})
+    write_streams(unfinished, FlightSampler(RATE, 100.0, 100.0, surfaces="measured").record(sortie), "mcap", "flu", {})
     unfinished.rename(path)
 
 

@@ -32,7 +32,7 @@ from sysid_node.gap.estimation.candidates import UNOBSERVABLE
 from sysid_node.gap.flightdata.flow_angles import ANGLES
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.sim import EFFECTS, Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 from sysid_node.sim.pages.effects_page import AIRCRAFT, EXAMPLES
 
@@ -64,7 +64,7 @@ def fly(
     thrust = aircraft.throttle.max_thrust if aircraft.throttle else None
     deflections[:, -1] *= thrust or 1.0
     sortie = fly_sortie(simulator, deflections, SortieConditions(list(effects), seed=seed))
-    record = flight_record(belief, Recorder(RATE, RATE, RATE).record(sortie), 0.2)
+    record = flight_record(belief, FlightSampler(RATE, RATE, RATE).record(sortie), 0.2)
     unread = {} if vanes else {name: np.full(len(record), np.nan) for name in ANGLES}
     record = replace(record, columns={**record.columns, **unread})
     return completed_flight(belief, GapFlight(record, RATE, RATE, RATE, source=f"flight {seed}"))

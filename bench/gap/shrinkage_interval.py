@@ -31,7 +31,7 @@ from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
 Effects = Mapping[str, Mapping[str, float]]
@@ -81,7 +81,7 @@ def fly(aircraft: Aircraft, effects: Effects, seed: int, turbulence: str) -> Gap
     deflections = np.zeros((round(_DURATION * _IMU_RATE) + 1, len(simulator.commands)))
     deflections[:, :-1] = plan.surfaces()
     sortie = fly_sortie(simulator, deflections, SortieConditions(effects, turbulence=turbulence, seed=seed))
-    record = flight_record(aircraft, Recorder(_IMU_RATE, 100.0, 100.0).record(sortie), 0.2)
+    record = flight_record(aircraft, FlightSampler(_IMU_RATE, 100.0, 100.0).record(sortie), 0.2)
     return completed_flight(aircraft, GapFlight(record, _IMU_RATE, 100.0, 100.0, source=f"flight {seed}"))
 
 

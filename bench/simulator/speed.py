@@ -26,11 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.sim import Inputs, Simulator, trim_flight
+from sysid_node.sim import RolloutInputs, Simulator, trim_flight
 from sysid_node.sim.compiled.xla import PLAIN_VARIABLE
 from sysid_node.sim.export.jsbsim import jsbsim_model
 from sysid_node.sim.flying.rollout import rollout
-from sysid_node.sim.model.layout import Layout, Model
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout
 
 SAMPLES = 6001  # 60 s at 100 Hz
 BATCH, BATCH_SAMPLES = 256, 1001
@@ -105,7 +105,14 @@ def compile_times(aircraft: str) -> tuple[Times, Times]:
 
 
 @partial(jax.jit, static_argnums=0)
-def ends(layout: Layout, model: Model, thetas: jax.Array, initial: jax.Array, inputs: Inputs, step: float) -> jax.Array:
+def ends(
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    thetas: jax.Array,
+    initial: jax.Array,
+    inputs: RolloutInputs,
+    step: float,
+) -> jax.Array:
     """Last states (B, 13) of a flight for each parameter vector (B, P)."""
     fly = lambda theta: rollout(layout, model, theta, initial, inputs, step).states[-1]  # noqa: E731
     return jax.vmap(fly)(thetas)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from bench.withheld.mattering import coefficients
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.record import FlightRecord
 
@@ -190,7 +190,7 @@ def _without_derivatives(folder: Path, flight: Flight, records: Sequence[FlightR
         mass=float(own["mass"]),
         inertia=Inertia(**inertia),
         geometry=Geometry(**own["geometry"]),
-        reference=Reference(float(records[0]["V"].mean()), float(records[0]["rho"].mean())),
+        reference=ReferenceCondition(float(records[0]["V"].mean()), float(records[0]["rho"].mean())),
         controls={name: Control(name, _SURFACES[name], {name: 1.0}) for name in controls},
         derivatives={},
         throttle=Throttle("throttle"),

@@ -13,7 +13,7 @@ from sysid_node.suggestion import did_you_mean
 
 
 @dataclass(frozen=True)
-class Entry:
+class DocumentEntry:
     """One value of the file. ``key`` is its dotted path, empty at the top."""
 
     node: yaml.Node
@@ -61,28 +61,28 @@ class Entry:
             raise self.mismatch(expected)
         return str(self.node.value)
 
-    def items(self, expected: str) -> list[Entry]:
+    def items(self, expected: str) -> list[DocumentEntry]:
         """The entries of a list."""
         if not isinstance(self.node, yaml.SequenceNode):
             raise self.mismatch(expected)
-        return [Entry(node, f"{self.key}[{i}]", self.file) for i, node in enumerate(self.node.value)]
+        return [DocumentEntry(node, f"{self.key}[{i}]", self.file) for i, node in enumerate(self.node.value)]
 
-    def mapping(self, expected: str) -> dict[str, Entry]:
+    def mapping(self, expected: str) -> dict[str, DocumentEntry]:
         """The entries of a mapping with keys of any name; a key given twice is an error."""
         if not isinstance(self.node, yaml.MappingNode):
             raise self.mismatch(expected)
-        entries: dict[str, Entry] = {}
+        entries: dict[str, DocumentEntry] = {}
         for key_node, node in self.node.value:
             if not isinstance(key_node, yaml.ScalarNode):
-                raise Entry(key_node, self.key, self.file).mismatch("a name as key")
+                raise DocumentEntry(key_node, self.key, self.file).mismatch("a name as key")
             key = str(key_node.value)
-            entry = Entry(node, f"{self.key}.{key}" if self.key else key, self.file)
+            entry = DocumentEntry(node, f"{self.key}.{key}" if self.key else key, self.file)
             if key in entries:
-                raise Entry(key_node, entry.key, self.file).error("given twice; keep one")
+                raise DocumentEntry(key_node, entry.key, self.file).error("given twice; keep one")
             entries[key] = entry
         return entries
 
-    def fields(self, required: Mapping[str, str], optional: Collection[str] = ()) -> dict[str, Entry]:
+    def fields(self, required: Mapping[str, str], optional: Collection[str] = ()) -> dict[str, DocumentEntry]:
         """The entries of a mapping with known keys. ``required`` says of each needed key what it is."""
         known = (*required, *optional)
         entries = self.mapping(f"a mapping with {', '.join(known)}")
@@ -107,7 +107,7 @@ class Entry:
         return f"the text {self.node.value!r}"
 
 
-def parse_document(text: str, file: str) -> Entry:
+def parse_document(text: str, file: str) -> DocumentEntry:
     """The top-level entry of a YAML text. Raises InputError, with the line, where it is not YAML."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
@@ -118,4 +118,4 @@ def parse_document(text: str, file: str) -> Entry:
         raise InputError(f"{file}: not valid YAML: {str(error).splitlines()[0]}") from error
     if node is None:
         raise InputError(f"{file}: the file is empty")
-    return Entry(node, "", file)
+    return DocumentEntry(node, "", file)

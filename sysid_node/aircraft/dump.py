@@ -15,8 +15,8 @@ from sysid_node.aircraft.model import (
     Aircraft,
     Control,
     Derivative,
+    LookupTable,
     Sensors,
-    Table,
     Throttle,
     UncertainValue,
 )
@@ -142,7 +142,7 @@ def _effects(effects: Mapping[str, Mapping[str, UncertainValue]]) -> list[str]:
     return ["effects:  # what the simulator models beyond the derivatives", *rows] if rows else []
 
 
-def _table(table: Table) -> str:
+def _table(table: LookupTable) -> str:
     points = [f"{name}: {_list(x)}" for name, x in zip(table.over, table.points, strict=True)]
     over = ", ".join(table.over)
     parts = [f"coefficient: {table.coefficient}", f"over: [{over}]", *points, f"values: {_list(table.values)}"]

@@ -35,7 +35,7 @@ class Geometry:
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceCondition:
     """The flight condition for which the derivatives hold: true airspeed (m/s), air density (kg/m^3)."""
 
     airspeed: float
@@ -95,7 +95,7 @@ DELAY_EFFECTS: Mapping[str, str] = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class Table:
+class LookupTable:
     """A lookup table that is added to a coefficient: linear between its points, held beyond its ends.
 
     ``over`` names one or two of alpha, beta (rad), V (true airspeed, m/s), Mach, p, q, r (non-dimensional, as in the
@@ -135,7 +135,7 @@ class Aircraft:
     mass: float  # kg
     inertia: Inertia
     geometry: Geometry
-    reference: Reference
+    reference: ReferenceCondition
     controls: Mapping[str, Control]  # aerodynamic controls by name, in the file's order
     derivatives: Mapping[str, Derivative]  # by name, in the file's order
     throttle: Throttle | None = None
@@ -145,7 +145,7 @@ class Aircraft:
     ideal: bool = False  # the file is a simulator's: tolerances that it does not state are zero
     delays: Mapping[str, UncertainValue] = field(default_factory=lambda: dict(NO_DELAYS))  # s, by topic
     effects: Mapping[str, Mapping[str, UncertainValue]] = field(default_factory=dict)  # by effect and parameter
-    tables: tuple[Table, ...] = ()
+    tables: tuple[LookupTable, ...] = ()
     stated_tolerances: Mapping[str, float] = field(default_factory=dict)  # those of the file, by dotted key
     outputs: str = ""  # which output of an autopilot moves which joint, as in ``flight.autopilots.joints``
 

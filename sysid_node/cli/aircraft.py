@@ -65,7 +65,7 @@ def _show(book: Handbook) -> None:
         console.print(f"{text} [{finding.source}]", style="yellow", markup=False)
 
 
-def _print(console: Console, table: section.Table) -> None:
+def _print(console: Console, table: section.TextTable) -> None:
     console.print(f"\n{table.title}", style="bold", markup=False)
     shown = Table(box=None, header_style="bold", pad_edge=False)
     for i, heading in enumerate(table.headings):

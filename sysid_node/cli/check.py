@@ -12,7 +12,7 @@ from rich.table import Table
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.logs.rates import rate_text
-from sysid_node.flight.logs.survey import Survey, survey
+from sysid_node.flight.logs.survey import LogSurvey, survey
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> None:
         raise InputError("; ".join(unread))
 
 
-def _show(found: Survey) -> None:
+def _show(found: LogSurvey) -> None:
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"[bold]{found.name}[/bold]: {found.kind}, {found.seconds:.1f} s", markup=True)
     table = Table(box=None, header_style="bold", pad_edge=False)

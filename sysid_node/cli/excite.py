@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
     from sysid_node.excite.optimise import FlightEnvelope
     from sysid_node.excite.prediction import Predictor
-    from sysid_node.excite.segment import Segment
+    from sysid_node.excite.segment import ManoeuvreSegment
     from sysid_node.report.results.manoeuvre_result import ManoeuvreResult
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -79,7 +79,7 @@ def design(args: argparse.Namespace) -> ManoeuvreResult:
 def _optimised(
     args: argparse.Namespace,
     predictor: Predictor,
-    segments: Sequence[Segment],
+    segments: Sequence[ManoeuvreSegment],
     plan: Manoeuvre,
     envelope: FlightEnvelope,
     progress: Callable[[float, str], None],

@@ -25,7 +25,7 @@ from sysid_node.report.files.output_file import output_bag
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre
-    from sysid_node.sim.flying.recording import Recorder
+    from sysid_node.sim.flying.recording import FlightSampler
     from sysid_node.sim.flying.sortie import Sortie
     from sysid_node.sim.simulator import Simulator
 
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> None:
 
 def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStream]]:
     """The flight and its messages, with those of ``_beside``."""
-    from sysid_node.sim.flying.recording import Recorder  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.flying.recording import FlightSampler  # noqa: PLC0415  # JAX takes its time
     from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
@@ -93,7 +93,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         raise InputError(f"--height {args.height:g}: expected more than 0 and at most 20000 m above the ground")
     if not 0 <= args.seed < 2**63:
         raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
-    recorder = Recorder(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
+    recorder = FlightSampler(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     command_rate = args.actuator_rate if args.surfaces == "commanded" else None
     rate = max(_HELD_RATE if command_rate else _RATE, args.rate, command_rate or 0.0)
     simulator = Simulator(load_aircraft(args.aircraft), rate)
@@ -112,7 +112,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
     return sortie, recorder.record(sortie), _beside(recorder, sortie)
 
 
-def _beside(recorder: Recorder, sortie: Sortie) -> dict[str, JointStream]:
+def _beside(recorder: FlightSampler, sortie: Sortie) -> dict[str, JointStream]:
     """What the topic ``actuators`` does not carry, positions or commands, by its own topic."""
     if recorder.surfaces == "measured":
         return {COMMANDS: recorder.commands(sortie)}

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.control.axis import Axis
+from sysid_node.control.axis import ControlAxis
 from sysid_node.control.margins import margins
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import IdentifiedDerivative
@@ -66,7 +66,7 @@ class MarginCheck:
 class AxisAdaptation:
     """The state of the adaptation of one axis."""
 
-    axis: Axis
+    axis: ControlAxis
     flown: AxisParameters
     target: AxisParameters
     check: MarginCheck | None = None
@@ -80,7 +80,7 @@ class AxisAdaptation:
     fall_rate: float = 0.0  # 1/s, of the move to the baseline
 
 
-def init(axis: Axis) -> AxisAdaptation:
+def init(axis: ControlAxis) -> AxisAdaptation:
     """An axis that flies the baseline."""
     baseline = AxisParameters(axis.believed, axis.baseline)
     return AxisAdaptation(axis, baseline, baseline)
@@ -156,7 +156,7 @@ def _usable(estimate: IdentifiedDerivative, half: float, explained: float) -> bo
     return estimate.valid and tight and estimate.r_squared >= explained
 
 
-def interval_corners(axis: Axis, values: Array, half: Array) -> Array:
+def interval_corners(axis: ControlAxis, values: Array, half: Array) -> Array:
     """(N, D) the corners of the intervals with the largest effect, with all other derivatives at their values."""
     widest = np.argsort(-half * axis.signals)[:CORNERED]
     chosen = widest[half[widest] > 0.0]
@@ -180,7 +180,7 @@ def _check_corners(state: AxisAdaptation, check: MarginCheck, settings: Controll
         state.verdict = "adapted" if caution == 1.0 else f"adapted, caution {caution:g}"
 
 
-def _have_margins(axis: Axis, corners: Array, gains: Array, settings: ControllerSettings) -> bool:
+def _have_margins(axis: ControlAxis, corners: Array, gains: Array, settings: ControllerSettings) -> bool:
     if not np.isfinite(gains).all():
         return False
     found = margins(axis.model(corners), gains, axis.delay)
@@ -195,7 +195,7 @@ def _raise_caution(state: AxisAdaptation, check: MarginCheck) -> None:
     check.gains = _gains(state.axis, check.values, CAUTIONS[check.caution])
 
 
-def _gains(axis: Axis, values: Array, caution: float) -> Array:
+def _gains(axis: ControlAxis, values: Array, caution: float) -> Array:
     """The regulator's gains; NaN, which fails the check of margins, where it has none."""
     try:
         return axis.gains(values, caution)
@@ -203,7 +203,7 @@ def _gains(axis: Axis, values: Array, caution: float) -> Array:
         return np.full(axis.baseline.shape, np.nan)
 
 
-def _same_sense(axis: Axis, gains: Array) -> bool:
+def _same_sense(axis: ControlAxis, gains: Array) -> bool:
     """Whether the integral acts in the direction of the baseline's; NaN gains fail the check of margins anyway.
 
     The sign of its gain is that of the steady response to a deflection, a climb or a turn. Where it is reversed, an
@@ -216,14 +216,14 @@ def _between(start: AxisParameters, end: AxisParameters, share: float) -> AxisPa
     return AxisParameters(*(a + share * (b - a) for a, b in zip(start, end, strict=True)))
 
 
-def _distance(axis: Axis, start: AxisParameters, end: AxisParameters) -> float:
+def _distance(axis: ControlAxis, start: AxisParameters, end: AxisParameters) -> float:
     """The length of the way between two parameters, relative to the baseline's gains and the derivatives' sizes."""
     size = np.abs(axis.baseline).max(axis=0)  # (n,) the largest gain of each state
     gains = np.abs(end.gains - start.gains).max(axis=0) / np.maximum(size, 0.1 * size.max())
     return max(float(np.max(np.abs(end.values - start.values) / axis.sizes)), float(gains.max()))
 
 
-def _moved(axis: Axis, flown: AxisParameters, target: AxisParameters, most: float) -> AxisParameters:
+def _moved(axis: ControlAxis, flown: AxisParameters, target: AxisParameters, most: float) -> AxisParameters:
     """The parameters after a move to the target by at most ``most``; see ``_distance``."""
     length = _distance(axis, flown, target)
     return target if length <= most else _between(flown, target, most / length)

@@ -30,7 +30,7 @@ _LATERAL = (0.3, 2.0, 0.5, 0.3, 0.6)
 
 
 @dataclass(frozen=True)
-class Axis:
+class ControlAxis:
     """D derivatives, n states (motion, the integral of an attitude, the surfaces), m surfaces."""
 
     name: str
@@ -82,7 +82,7 @@ class Axis:
         return regulator.gains(self.model(values), self.Q, caution * self.weight * share.T @ share)
 
 
-def axes(aircraft: Aircraft, lag: float, delay: float) -> tuple[Axis, Axis]:
+def axes(aircraft: Aircraft, lag: float, delay: float) -> tuple[ControlAxis, ControlAxis]:
     """Pitch and lateral axis at the reference condition.
 
     Raises InputError where the file is incomplete or none is stable.
@@ -113,7 +113,7 @@ def _axis(
     allowed: tuple[float, ...],
     lag: float,
     delay: float,
-) -> Axis:
+) -> ControlAxis:
     known = tuple(d for d in derivatives if d in aircraft.derivatives)
     file = [aircraft.derivatives[d] for d in known]
     values = np.array([derivative.value for derivative in file])
@@ -123,7 +123,7 @@ def _axis(
     whole = plant.behind_actuators(model, lag)
     Q = np.zeros(whole.A.shape[-1])
     Q[: len(allowed)] = 1.0 / np.array(allowed) ** 2
-    return Axis(
+    return ControlAxis(
         name=name,
         derivatives=known,
         believed=values,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.control import reference
 from sysid_node.control.adaptation import AxisParameters
-from sysid_node.control.axis import Axis
+from sysid_node.control.axis import ControlAxis
 from sysid_node.control.reference import DelayedReference, ReferenceMotion, ReferenceState
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import Command, Measurements, SetPoints
@@ -76,7 +76,7 @@ def step(
     law: LawState,
     measured: Measurements,
     points: SetPoints,
-    flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]],
+    flown: tuple[tuple[ControlAxis, AxisParameters], tuple[ControlAxis, AxisParameters]],
     excitation: Sequence[float] | Array,
     step: float,
 ) -> Command:
@@ -173,7 +173,9 @@ def _errors(law: LawState, measured: Measurements, late: ReferenceMotion, level:
 
 
 def _transfer_bumplessly(
-    law: LawState, errors: tuple[Array, Array], flown: tuple[tuple[Axis, AxisParameters], tuple[Axis, AxisParameters]]
+    law: LawState,
+    errors: tuple[Array, Array],
+    flown: tuple[tuple[ControlAxis, AxisParameters], tuple[ControlAxis, AxisParameters]],
 ) -> None:
     """Set the integrals, also in ``errors``, so that a change of gains does not move the surfaces (bumpless transfer).
 

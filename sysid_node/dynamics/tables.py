@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Table
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.dynamics.atmosphere import speed_of_sound
 from sysid_node.dynamics.coefficients import rate_regressors
 from sysid_node.dynamics.vector import Namespace, Real, Triple
@@ -26,12 +26,12 @@ Lookup = Callable[[Sequence[Any]], Any]
 TableSum = Callable[[Mapping[str, Any]], dict[str, Any]]
 
 
-def scalar_tables(tables: Sequence[Table]) -> TableSum:
+def scalar_tables(tables: Sequence[LookupTable]) -> TableSum:
     """Function from the variables as numbers to what the tables add to each coefficient."""
     return _summed(tables, _number)
 
 
-def array_tables(tables: Sequence[Table]) -> TableSum:
+def array_tables(tables: Sequence[LookupTable]) -> TableSum:
     """As ``scalar_tables`` for columns (N,)."""
     return _summed(tables, _column)
 
@@ -55,12 +55,12 @@ def mach_number(airspeed: Real, density: Real, xp: Namespace) -> Real:
     return airspeed / speed_of_sound(density, xp)
 
 
-def need_mach(tables: Sequence[Table]) -> bool:
+def need_mach(tables: Sequence[LookupTable]) -> bool:
     """Whether a table is over the Mach number."""
     return any("Mach" in table.over for table in tables)
 
 
-def _summed(tables: Sequence[Table], form: Callable[[Table], Lookup]) -> TableSum:
+def _summed(tables: Sequence[LookupTable], form: Callable[[LookupTable], Lookup]) -> TableSum:
     lookups = [(table.coefficient, table.over, form(table)) for table in tables]
 
     def added(variables: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def _summed(tables: Sequence[Table], form: Callable[[Table], Lookup]) -> TableSu
     return added
 
 
-def _number(table: Table) -> Lookup:
+def _number(table: LookupTable) -> Lookup:
     points, values = table.points, table.values
 
     def of_one(at: Sequence[float]) -> float:
@@ -99,7 +99,7 @@ def _interval(points: Sequence[float], x: float) -> tuple[int, float]:
     return i, 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
 
 
-def _column(table: Table) -> Lookup:
+def _column(table: LookupTable) -> Lookup:
     points, values = [np.array(axis, dtype=float) for axis in table.points], np.array(table.values, dtype=float)
 
     def of_one(at: Sequence[Array]) -> Array:

@@ -37,7 +37,7 @@ LEAST_BETWEEN_RESETS = 15.0  # s, so that estimates have the time to become vali
 EVENTS = 1000  # number of events that are kept
 
 
-class FlightCondition(NamedTuple):
+class LimitedQuantities(NamedTuple):
     """The quantities that have limits; NaN = not measured."""
 
     roll: float  # rad
@@ -174,7 +174,7 @@ def _begin_again(state: ExciterState, time: float, why: str) -> None:
     _log(state, time, f"begun again: {why}")
 
 
-def step(state: ExciterState, time: float, flight: FlightCondition) -> Array:
+def step(state: ExciterState, time: float, flight: LimitedQuantities) -> Array:
     """The deflections (controls,) rad to be added to the commands at a time (s)."""
     if state.active:
         exceeded = _exceeded_limit(state, flight)
@@ -189,7 +189,7 @@ def step(state: ExciterState, time: float, flight: FlightCondition) -> Array:
     return row
 
 
-def _exceeded_limit(state: ExciterState, flight: FlightCondition) -> str:
+def _exceeded_limit(state: ExciterState, flight: LimitedQuantities) -> str:
     """The limit that is exceeded or the sensor that is silent, in words; empty where there is none."""
     s, reference = state.settings, state.aircraft.reference.airspeed
     limits = {

@@ -19,7 +19,7 @@ from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation
 from sysid_node.excite.prediction import Prediction, Predictor, tolerances_of
 from sysid_node.excite.search_space import SearchSpace
-from sysid_node.excite.segment import Segment
+from sysid_node.excite.segment import ManoeuvreSegment
 from sysid_node.flight.record import FlightRecord
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def posterior_to_prior_ratios(information: FisherInformation, tolerances: Array)
 
 def optimise(
     predictor: Predictor,
-    segments: Sequence[Segment],
+    segments: Sequence[ManoeuvreSegment],
     duration: float,
     envelope: FlightEnvelope | None = None,
     evaluations: int = 200,
@@ -107,7 +107,7 @@ class _Search:
     def __init__(
         self,
         predictor: Predictor,
-        segments: Sequence[Segment],
+        segments: Sequence[ManoeuvreSegment],
         duration: float,
         envelope: FlightEnvelope,
         start: Prediction,

@@ -18,15 +18,15 @@ from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation, eliminate, fisher
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
-from sysid_node.excite.segment import Segment, draw_manoeuvre
+from sysid_node.excite.segment import ManoeuvreSegment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
-from sysid_node.sim import Inputs, SimulatedFlight, Simulator
+from sysid_node.sim import RolloutInputs, SimulatedFlight, Simulator
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
 from sysid_node.sim.flying.lengths import padded
 from sysid_node.sim.flying.rollout import rollout
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model import parameters
-from sysid_node.sim.model.layout import OUTPUTS, Layout, Model
+from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class Predictor:
         throttle = self.aircraft.throttle
         return 1.0 if throttle is None or throttle.max_thrust is None else throttle.max_thrust
 
-    def draw(self, segments: Sequence[Segment], duration: float | None = None) -> Manoeuvre:
+    def draw(self, segments: Sequence[ManoeuvreSegment], duration: float | None = None) -> Manoeuvre:
         """Segments as a manoeuvre at the predictor's rate, ``duration`` s long."""
         return draw_manoeuvre(segments, self.aircraft, self.simulator.rate, duration)
 
@@ -130,8 +130,8 @@ class Predictor:
 
 
 def outputs_of(
-    layout: Layout,
-    model: Model,
+    layout: ParameterLayout,
+    model: AircraftNumbers,
     unknowns: jax.Array,
     initial: jax.Array,
     commands: jax.Array,
@@ -148,7 +148,7 @@ def outputs_of(
     theta = jnp.asarray(nominal).at[index].add(unknowns[: index.size])
     start = jnp.asarray(initial).at[jnp.array(_INITIAL)].add(unknowns[index.size :])
     calm = jnp.zeros((commands.shape[0], 6))
-    inputs = Inputs(commands, calm, calm, jnp.zeros((commands.shape[0], len(OUTPUTS))))
+    inputs = RolloutInputs(commands, calm, calm, jnp.zeros((commands.shape[0], len(OUTPUTS))))
     return rollout(layout, model, theta, start, inputs, jnp.asarray(step)).outputs
 
 

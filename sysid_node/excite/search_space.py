@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.excite.manoeuvre import THROTTLE, control_limits
 from sysid_node.excite.prediction import Predictor
-from sysid_node.excite.segment import Segment
+from sysid_node.excite.segment import ManoeuvreSegment
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class SearchSpace:
     """Amplitudes, beginnings and, of steps, widths of ``segments``, flown by ``predictor`` within ``duration`` (s)."""
 
     predictor: Predictor
-    segments: Sequence[Segment]
+    segments: Sequence[ManoeuvreSegment]
     duration: float
 
     @property
@@ -49,7 +49,7 @@ class SearchSpace:
                 room[name] = limit - abs(trim[name]) if np.isfinite(limit) else 0.5
         return room
 
-    def encode(self, segments: Sequence[Segment]) -> Array:
+    def encode(self, segments: Sequence[ManoeuvreSegment]) -> Array:
         """The point (size,) of these segments."""
         travel = self.travel
         point: list[float] = []
@@ -61,10 +61,10 @@ class SearchSpace:
             point.append((segment.values["start"] - _LEAD) / max(self._room(segment), 1e-9))
         return np.clip(point, 0.0, 1.0)
 
-    def decode(self, point: Array) -> list[Segment]:
+    def decode(self, point: Array) -> list[ManoeuvreSegment]:
         """The segments of a point. Their numbers have four decimals, so that the spec in text is what is flown."""
         values, travel = iter(np.clip(point, 0.0, 1.0).tolist()), self.travel
-        found: list[Segment] = []
+        found: list[ManoeuvreSegment] = []
         for segment in self.segments:
             shares = [_value(next(values), *_SHARES) for _ in segment.controls]
             amplitude = tuple(
@@ -79,11 +79,11 @@ class SearchSpace:
             found.append(replace(moved, values=changed))
         return found
 
-    def _room(self, segment: Segment) -> float:
+    def _room(self, segment: ManoeuvreSegment) -> float:
         """The latest start of the segment (s after the lead) with which it still ends in time."""
         return max(self.duration - _span(segment) - _LEAD, 0.0)
 
-    def _widths(self, segment: Segment) -> tuple[float, float]:
+    def _widths(self, segment: ManoeuvreSegment) -> tuple[float, float]:
         """Shortest and longest width (s) of a segment of steps that ends in time; its span is linear in the width."""
         shortest, longest = _WIDTHS
         first, second = (_span(replace(segment, values={**segment.values, "width": w})) for w in _WIDTHS)
@@ -92,7 +92,7 @@ class SearchSpace:
         return shortest, min(max(fitting, 1.01 * shortest), longest)
 
 
-def _span(segment: Segment) -> float:
+def _span(segment: ManoeuvreSegment) -> float:
     """Seconds from the start of the first repetition to the end of the last."""
     return segment.end - segment.values["start"]
 

@@ -23,7 +23,7 @@ _MOST_SAMPLES = 5_000_000
 
 
 @dataclass(frozen=True)
-class Segment:
+class ManoeuvreSegment:
     """One term of a spec: a kind on some controls, with an amplitude each and its other numbers."""
 
     kind: str
@@ -65,13 +65,13 @@ class Segment:
         return ":".join([self.kind, ",".join(self.controls), f"amplitude={amplitude}", *rest])
 
 
-def moved(segment: Segment, start: float) -> Segment:
+def moved(segment: ManoeuvreSegment, start: float) -> ManoeuvreSegment:
     """The same segment at another time (s)."""
     return replace(segment, values={**segment.values, "start": start})
 
 
 def draw_manoeuvre(
-    segments: Sequence[Segment], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
+    segments: Sequence[ManoeuvreSegment], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
 ) -> Manoeuvre:
     """The segments as one manoeuvre, sampled at ``rate`` (Hz) for ``duration`` (s); see ``parse_manoeuvre``.
 
@@ -88,7 +88,7 @@ def draw_manoeuvre(
     return manoeuvre
 
 
-def _time_base(spec: str, segments: Sequence[Segment], rate: float, duration: float | None) -> Array:
+def _time_base(spec: str, segments: Sequence[ManoeuvreSegment], rate: float, duration: float | None) -> Array:
     end = max(segment.end for segment in segments)
     total = end + TAIL if duration is None else duration
     if total < end - 1e-9:

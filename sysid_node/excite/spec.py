@@ -14,7 +14,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite.kinds import COMMON_KEYS, KINDS, ManoeuvreKey
 from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, control_limits
-from sysid_node.excite.segment import Segment, draw_manoeuvre
+from sysid_node.excite.segment import ManoeuvreSegment, draw_manoeuvre
 from sysid_node.suggestion import did_you_mean
 
 Array = NDArray[np.float64]
@@ -39,14 +39,14 @@ def parse_manoeuvre(
     return draw_manoeuvre(parse_segments(spec, aircraft), aircraft, rate, duration)
 
 
-def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[Segment, ...]:
+def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[ManoeuvreSegment, ...]:
     """The segments of a spec or of several, checked. Raises InputError."""
     texts = [spec] if isinstance(spec, str) else list(spec)
     parts = (part.strip() for text in texts for part in _JOIN.split(text))
     return tuple(segment for part in parts for segment in _term(part, aircraft))
 
 
-def _term(text: str, aircraft: Aircraft) -> list[Segment]:
+def _term(text: str, aircraft: Aircraft) -> list[ManoeuvreSegment]:
     """The segments of one term; without controls it moves all surfaces, in turn unless its inputs are orthogonal."""
     kind, _, rest = text.partition(":")
     kind = kind.strip()
@@ -57,7 +57,7 @@ def _term(text: str, aircraft: Aircraft) -> list[Segment]:
     return [segment] if names or KINDS[kind].orthogonal else _in_turn(segment)
 
 
-def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, aircraft: Aircraft) -> Segment:
+def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, aircraft: Aircraft) -> ManoeuvreSegment:
     given = _settings(text, settings)
     known = {**KINDS[kind].keys, **COMMON_KEYS}
     expected = dict.fromkeys(("amplitude", *known))
@@ -66,10 +66,10 @@ def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, air
             raise _error(text, f"{key!r} is no key of {kind}; expected {', '.join(expected)}", key, expected)
     values = {key: _number(text, key, given.get(key), default) for key, default in known.items()}
     _check(text, values)
-    return Segment(kind, controls, _amplitude(text, given.get("amplitude"), controls, aircraft), values)
+    return ManoeuvreSegment(kind, controls, _amplitude(text, given.get("amplitude"), controls, aircraft), values)
 
 
-def _in_turn(segment: Segment) -> list[Segment]:
+def _in_turn(segment: ManoeuvreSegment) -> list[ManoeuvreSegment]:
     """A segment for each control, one after the other; all come before the first is repeated."""
     step = segment.length + PAUSE
     every = segment.values["every"] or step * len(segment.controls)

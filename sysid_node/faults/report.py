@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysid_node.faults.hypotheses.bayes_factors import Weighed
 from sysid_node.faults.hypotheses.catalogue import Hypothesis
 from sysid_node.faults.model.terms import Terms
-from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, Change, Fault
+from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, DerivativeChange, Fault
 
 Array = NDArray[np.float64]
 
@@ -49,13 +49,13 @@ def _reported_size(kind: str, size: float) -> float:
     return -size if kind == VANE_OFFSET else size
 
 
-def _changes(hypothesis: Hypothesis, weighed: Weighed, terms: Terms) -> tuple[Change, ...]:
+def _changes(hypothesis: Hypothesis, weighed: Weighed, terms: Terms) -> tuple[DerivativeChange, ...]:
     """The derivatives with a significant change, most significant first."""
     errors = np.sqrt(np.diag(weighed.covariance))
     which = np.flatnonzero(hypothesis.shift.free.any(axis=1))
     sureness = np.abs(weighed.size) / errors
     return tuple(
-        Change(terms.names[which[i]], float(size), float(size - WIDE * error), float(size + WIDE * error))
+        DerivativeChange(terms.names[which[i]], float(size), float(size - WIDE * error), float(size + WIDE * error))
         for i in np.argsort(-sureness).tolist()
         for size, error in [(weighed.size[i], errors[i])]
         if sureness[i] > SURE

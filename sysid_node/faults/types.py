@@ -15,7 +15,7 @@ DAMAGE = "structural damage"
 FORCES, POSITION, ARRIVAL, ESTIMATES = "forces", "position", "arrival", "estimates"
 
 
-class Change(NamedTuple):
+class DerivativeChange(NamedTuple):
     """The change of a derivative, with its 95 % interval."""
 
     name: str
@@ -37,7 +37,9 @@ class Fault:
     since: float
     found: float  # s, when it was found
     probability: float  # among all hypotheses
-    changes: tuple[Change, ...] = ()  # for damage: the derivatives with a significant change, most significant first
+    changes: tuple[
+        DerivativeChange, ...
+    ] = ()  # for damage: the derivatives with a significant change, most significant first
     source: str = FORCES
 
     @property

@@ -18,7 +18,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
 from sysid_node.faults.hypotheses import servo_check as servos
 from sysid_node.faults.hypotheses import servo_times
-from sysid_node.faults.hypotheses.servo_check import ServoState
+from sysid_node.faults.hypotheses.servo_check import ServoCheckState
 from sysid_node.faults.hypotheses.servo_times import ServoTimes
 from sysid_node.faults.model import blocks, servo_follower
 from sysid_node.faults.model.reference_model import IdentifierEstimates
@@ -42,7 +42,7 @@ class MessageWatch:
     """The state of the complete monitor."""
 
     state: MonitorState
-    servos: ServoState
+    servos: ServoCheckState
     intake: AlignmentState
     follower: ServoFollower
     stale_after: float  # s

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sysid_node.fleet.catalogue.catalogue import CatalogueFlight
 from sysid_node.fleet.plan import Plan
 from sysid_node.fleet.results import FleetResults, FlightResult, Refusal
-from sysid_node.fleet.state.store import Entry, FleetState
+from sysid_node.fleet.state.store import FleetState, FlightEntry
 
 NO_DATE = "the catalogue gives no date and the log's clock says none; write its date into the catalogue"
 NO_TAIL = "the catalogue gives no tail and the log names no vehicle; write its tail into the catalogue"
@@ -29,7 +29,7 @@ def assembled(plan: Plan, state: FleetState) -> FleetResults:
     return FleetResults(tuple(flights), tuple(refusals), plan.catalogue.maintenance)
 
 
-def _result(plan: Plan, flight: CatalogueFlight, entry: Entry | None) -> FlightResult | Refusal:
+def _result(plan: Plan, flight: CatalogueFlight, entry: FlightEntry | None) -> FlightResult | Refusal:
     outcome = entry.outcome if entry is not None else None
     tail = flight.tail or (outcome.vehicle if outcome is not None else "") or flight.fallback_tail
     date = flight.date or (outcome.date if outcome is not None else None)

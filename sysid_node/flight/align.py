@@ -24,7 +24,7 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.checks import DUPLICATE, OUT_OF_ORDER, UNSTAMPED, air_data_faults, gap, imu_faults
 from sysid_node.flight.commanded import (
     AROUND,
-    Commands,
+    RecordedCommands,
     commands_of,
     deflections,
     known_from,
@@ -186,7 +186,7 @@ def align(
 
 
 def _actuated(
-    commands: Commands | None, messages: ScreenedMessages, right: NDArray[np.intp], at: Stamps
+    commands: RecordedCommands | None, messages: ScreenedMessages, right: NDArray[np.intp], at: Stamps
 ) -> tuple[Array, int]:
     """Thrust and deflections at the stamps ``at`` (n,), and the place from which commands make them.
 

@@ -88,7 +88,7 @@ def known_from(stamps: Stamps, controls: Array) -> int | None:
 
 
 @dataclass(slots=True)
-class Commands:
+class RecordedCommands:
     """The commands of a flight and what they make the servos do.
 
     ``since``: epoch and stamp (ns) after which samples take their deflections from commands; None = from none so far.
@@ -105,7 +105,7 @@ class Commands:
     )  # stamps, values
 
 
-def commands_of(aircraft: Aircraft, carried: str, *, servos: bool = True) -> Commands | None:
+def commands_of(aircraft: Aircraft, carried: str, *, servos: bool = True) -> RecordedCommands | None:
     """What follows the commands of an aircraft; None where the topic carries positions.
 
     Without ``servos`` deflections are the commands themselves, held.
@@ -114,7 +114,7 @@ def commands_of(aircraft: Aircraft, carried: str, *, servos: bool = True) -> Com
         return None
     models = servos_of(aircraft) if servos else (Servo(),) * (1 + len(aircraft.controls))
     is_commanded = carried == "commands"
-    return Commands(models, is_commanded, (-1, 0) if is_commanded else None)
+    return RecordedCommands(models, is_commanded, (-1, 0) if is_commanded else None)
 
 
 def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool) -> str:
@@ -135,7 +135,7 @@ _UNSAID = (
 )
 
 
-def take_command(state: Commands, epoch: int, stamp: int, values: Sequence[float]) -> None:
+def take_command(state: RecordedCommands, epoch: int, stamp: int, values: Sequence[float]) -> None:
     """Take thrust (N) and controls (rad) of the next message, stamped at ``stamp`` (ns) in an epoch of its clock."""
     if epoch != state.epoch:
         state.epoch, state.counter = epoch, JumpCounter(jumps=state.counter.jumps)
@@ -153,17 +153,17 @@ def take_command(state: Commands, epoch: int, stamp: int, values: Sequence[float
             _give_all(state, one, command)
 
 
-def _give_all(state: Commands, stamp: int, values: Sequence[float]) -> None:
+def _give_all(state: RecordedCommands, stamp: int, values: Sequence[float]) -> None:
     for servo, value in zip(state.servos, values, strict=True):
         give(servo, stamp, value)
 
 
-def follows(state: Commands, epoch: int, stamp: int) -> bool:
+def follows(state: RecordedCommands, epoch: int, stamp: int) -> bool:
     """Whether the deflections at a stamp (ns) of an epoch follow from commands."""
     return state.since is not None and (epoch, stamp) > state.since
 
 
-def deflections(state: Commands, epoch: int, stamp: int, held: Sequence[float]) -> list[float]:
+def deflections(state: RecordedCommands, epoch: int, stamp: int, held: Sequence[float]) -> list[float]:
     """Thrust and deflections at ``stamp`` (ns), increasing, then the deflections' excess (``servos.move``).
 
     Where the servos are already in another epoch of the clock, the last message before it, ``held``, stands in.

@@ -26,7 +26,7 @@ from sysid_node.gap.validation.holdout import Check, validate
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.verdict import localisation
 from sysid_node.gap.verdict.decision import Decision, VerdictScores, decide
-from sysid_node.gap.verdict.localisation import Shape
+from sysid_node.gap.verdict.localisation import BinnedCoefficient
 from sysid_node.gap.verdict.measurement import measure
 from sysid_node.gap.verdict.next_flight import advice
 from sysid_node.sim import Simulator
@@ -43,7 +43,7 @@ class Diagnosis:
     check: Check  # on flight not fitted
     held_out: bool  # whether that is a flight of its own; else parts of the same flights
     where: list[dict[str, Any]]
-    shape: Shape | None
+    shape: BinnedCoefficient | None
     confusion: Confusion
     next_flight: str
     air_motion: float  # rms of the air's motion across the flight path, m/s

@@ -11,19 +11,19 @@ from typing import Any
 
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.online.settings import METHODS, OnlineSettings
-from sysid_node.parameter import Parameter, annotated_yaml, check_each
+from sysid_node.parameter import NodeParameter, annotated_yaml, check_each
 
 _ESTIMATOR = OnlineSettings()
 
 PARAMETERS = (
-    Parameter(
+    NodeParameter(
         "aircraft",
         "",
         "",
         "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
         "For every aircraft.",
     ),
-    Parameter(
+    NodeParameter(
         "body_frame",
         "flu",
         "",
@@ -31,7 +31,7 @@ PARAMETERS = (
         "Where the autopilot's driver publishes the IMU in forward-right-down axes.",
         choices=("flu", "frd"),
     ),
-    Parameter(
+    NodeParameter(
         "publish_rate",
         20.0,
         "Hz",
@@ -40,7 +40,7 @@ PARAMETERS = (
         lower=0.01,
         upper=1000.0,
     ),
-    Parameter(
+    NodeParameter(
         "stale_after",
         0.5,
         "s",
@@ -49,28 +49,28 @@ PARAMETERS = (
         lower=0.01,
         upper=3600.0,
     ),
-    Parameter(
+    NodeParameter(
         "save_directory",
         ".",
         "",
         "Folder that ~/save writes estimates into; made where it is missing. May change at any time.",
         "To keep estimates where they survive the flight.",
     ),
-    Parameter(
+    NodeParameter(
         "autostart",
         True,
         "",
         "Configure and activate at the start; an unusable parameter then ends the process. false: wait for requests.",
         "false where a lifecycle manager starts the nodes in order.",
     ),
-    Parameter(
+    NodeParameter(
         "frequencies",
         list(_ESTIMATOR.frequencies),
         "Hz",
         "Lines of the Fourier transform: first, step, last. Motion outside this band is left out.",
         "Last: above short period and Dutch roll, below structural modes and noise. First: above slow drift.",
     ),
-    Parameter(
+    NodeParameter(
         "method",
         _ESTIMATOR.method,
         "",
@@ -78,7 +78,7 @@ PARAMETERS = (
         "iv_rft where vanes are noisy beside the motion or the air is turbulent; sls_rft where neither is.",
         choices=METHODS,
     ),
-    Parameter(
+    NodeParameter(
         "forgetting_time",
         _ESTIMATOR.forgetting_time,
         "s",
@@ -87,7 +87,7 @@ PARAMETERS = (
         lower=0.0,
         upper=86400.0,
     ),
-    Parameter(
+    NodeParameter(
         "window",
         _ESTIMATOR.window,
         "s",
@@ -96,7 +96,7 @@ PARAMETERS = (
         lower=0.0,
         upper=86400.0,
     ),
-    Parameter(
+    NodeParameter(
         "settle_time",
         _ESTIMATOR.settle_time,
         "s",
@@ -105,7 +105,7 @@ PARAMETERS = (
         lower=0.0,
         upper=3600.0,
     ),
-    Parameter(
+    NodeParameter(
         "max_gap",
         _ESTIMATOR.max_gap,
         "s",
@@ -114,7 +114,7 @@ PARAMETERS = (
         lower=0.001,
         upper=5.0,
     ),
-    Parameter(
+    NodeParameter(
         "actuators",
         _ESTIMATOR.actuators,
         "",
@@ -123,21 +123,21 @@ PARAMETERS = (
         "commands or positions where it is known: auto begins anew when it finds commands.",
         choices=CARRIED,
     ),
-    Parameter(
+    NodeParameter(
         "use_prior",
         _ESTIMATOR.use_prior,
         "",
         "Whether the aircraft file's derivatives count as measurements, each by its tolerance.",
         "true where early estimates matter and the file is trusted.",
     ),
-    Parameter(
+    NodeParameter(
         "detect_changes",
         _ESTIMATOR.detect_changes,
         "",
         "Whether to look for abrupt changes of the aircraft, and to forget what was before.",
         "false to average over the whole flight whatever happens.",
     ),
-    Parameter(
+    NodeParameter(
         "valid_fraction",
         _ESTIMATOR.valid_fraction,
         "",

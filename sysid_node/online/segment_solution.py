@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.alignment import flow_angle_errors
-from sysid_node.online.changes.score_test import Reference
+from sysid_node.online.changes.score_test import ReferenceEstimates
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import (
     actuator_lag_test,
@@ -113,7 +113,7 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
         tests=ModelTests(*_lag_test(state, solution, spread, gram, systematic), none, none),
         systematic=systematic,
     )
-    state.changes.monitor.references.append(Reference(now, equations, solution, spread))
+    state.changes.monitor.references.append(ReferenceEstimates(now, equations, solution, spread))
 
 
 def _systematic(

@@ -14,7 +14,7 @@ from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
 from sysid_node.online.changes.detection import ChangeMonitor
 from sysid_node.online.changes.excited_segments import ExcitedSegments
 from sysid_node.online.frequency import sampled_transform
-from sysid_node.online.frequency.regression_signals import Layout, MomentumGain, ScalarSignals
+from sysid_node.online.frequency.regression_signals import MomentumGain, ScalarSignals, SignalLayout
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression.actuator_lag_test import LagTest
 from sysid_node.online.regression.derivative_index import DerivativeIndex
@@ -40,7 +40,7 @@ class EstimatorModel:
 
     aircraft: Aircraft
     settings: OnlineSettings
-    layout: Layout
+    layout: SignalLayout
     equations: NormalEquations
     table: DerivativeIndex
     vocabulary: Vocabulary
@@ -155,7 +155,7 @@ class ChangeWatch:
 
 
 @dataclass
-class Inputs:
+class EstimatorInputs:
     """What the samples so far say of the instruments. Times in s."""
 
     begin: float = math.nan  # time from which samples count
@@ -178,7 +178,7 @@ class EstimatorState:
     servo_states: ServoStates | None  # None where no control is late
     finished: FinishedSegments
     changes: ChangeWatch
-    inputs: Inputs = field(default_factory=Inputs)
+    inputs: EstimatorInputs = field(default_factory=EstimatorInputs)
     segment: PresentSegment = field(default_factory=PresentSegment)
     latest: SegmentSolution | None = None
 

@@ -33,10 +33,10 @@ from sysid_node.flight.autopilots.known import ADAPTERS
 from sysid_node.flight.live.conditions import Conditions
 from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import Parameter, annotated_yaml, check_each
+from sysid_node.parameter import NodeParameter, annotated_yaml, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
-from sysid_node.ros.support.diagnostics import Source
+from sysid_node.ros.support.diagnostics import DiagnosticSource
 from sysid_node.ros.support.loop_node import UNHEARD, full_name, say
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
@@ -46,8 +46,8 @@ INPUT_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DEFAULT = AdapterSettings()
 
 PARAMETERS = (
-    Parameter("autopilot", "", "", f"Whose topics: {', '.join(ADAPTERS)}. Needed.", "For every autopilot."),
-    Parameter(
+    NodeParameter("autopilot", "", "", f"Whose topics: {', '.join(ADAPTERS)}. Needed.", "For every autopilot."),
+    NodeParameter(
         "joints",
         _DEFAULT.joints,
         "",
@@ -55,7 +55,7 @@ PARAMETERS = (
         "SCALE (rad per unit of the output) times the output less TRIM; see docs/how-to/autopilots.md. Needed.",
         "For every aircraft: measure the surfaces at both ends of their travel.",
     ),
-    Parameter(
+    NodeParameter(
         "air_temperature",
         _DEFAULT.air_temperature,
         "degC",
@@ -63,7 +63,7 @@ PARAMETERS = (
         "Before every flight: 3 degC are 1 % of the density.",
         *RANGES["air_temperature"],
     ),
-    Parameter(
+    NodeParameter(
         "air_data_delay",
         _DEFAULT.air_data_delay,
         "s",
@@ -71,7 +71,7 @@ PARAMETERS = (
         "To the link's latency where docs/how-to/autopilots.md says that stamps are times of arrival.",
         *RANGES["air_data_delay"],
     ),
-    Parameter(
+    NodeParameter(
         "stale_after",
         0.5,
         "s",
@@ -139,7 +139,7 @@ class AdapterNode(Node):
             if monitor.waited() > UNHEARD
         }
         say(self, self._conditions.update(present))
-        status = Source(full_name(self), self._name).input(self._monitors, {}, self._stale_after)
+        status = DiagnosticSource(full_name(self), self._name).input(self._monitors, {}, self._stale_after)
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)

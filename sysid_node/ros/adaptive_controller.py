@@ -27,7 +27,7 @@ from sysid_node.flight.live.arrivals import Arrivals
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import Parameter, setting
+from sysid_node.parameter import NodeParameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.conversion import NANOSECONDS, stamp_ns
 from sysid_node.ros.support.loop_node import (
@@ -50,7 +50,7 @@ _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,
-    Parameter(
+    NodeParameter(
         "adapt",
         True,
         "",

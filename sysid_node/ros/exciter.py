@@ -17,14 +17,14 @@ from sysid_msgs.msg import AirData, DerivativeEstimates
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.excite import exciter
-from sysid_node.excite.exciter import FlightCondition
+from sysid_node.excite.exciter import LimitedQuantities
 from sysid_node.excite.exciter_settings import RANGES, ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
 from sysid_node.faults.types import DAMAGE, HARD_OVER, LOSS, NOT_FOLLOWING, SHIFTED, STUCK
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.topics import AIR_DATA, IMU
-from sysid_node.parameter import Parameter, setting
+from sysid_node.parameter import NodeParameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, named
 from sysid_node.ros.support.spin import run_node
@@ -34,21 +34,21 @@ _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,
-    Parameter(
+    NodeParameter(
         "manoeuvre",
         "+".join(_DEFAULT.manoeuvre),
         "",
         "What is flown, over and over: multisines, 3-2-1-1, doublets; several joined by + (docs: Manoeuvres).",
         "Amplitude up in rough air, down near the ground.",
     ),
-    Parameter(
+    NodeParameter(
         "derivatives",
         " ".join(_DEFAULT.derivatives),
         "",
         "What is to be known, names with a space between.",
         "To those that you fly for.",
     ),
-    Parameter(
+    NodeParameter(
         "watch",
         _DEFAULT.watch,
         "",
@@ -131,7 +131,7 @@ class Exciter(LoopNode):
             roll = pitch = load = math.nan
         if now - air_time > STALE:
             airspeed = math.nan
-        moved = exciter.step(self._state, self._now, FlightCondition(roll, pitch, airspeed, load))
+        moved = exciter.step(self._state, self._now, LimitedQuantities(roll, pitch, airspeed, load))
         stamp = self.get_clock().now().nanoseconds
         self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
         self._log_events()

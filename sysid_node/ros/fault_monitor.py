@@ -21,7 +21,7 @@ from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import Parameter, setting
+from sysid_node.parameter import NodeParameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
 from sysid_node.ros.support.spin import run_node
@@ -47,7 +47,7 @@ PARAMETERS = (
         "Between a surface's measured position and where its command should have taken it.",
         "To what the servos do in sound flight.",
     ),
-    Parameter(
+    NodeParameter(
         "stale_after",
         STALE_AFTER,
         "s",

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from rclpy.node import Node
 
 from sysid_node.errors import InputError
-from sysid_node.parameter import Parameter
+from sysid_node.parameter import NodeParameter
 from sysid_node.ros.support.spin import run_node
 
 
@@ -22,7 +22,7 @@ def main() -> None:
     sys.exit(run_node(_make, about, _table() if {"-h", "--help"} & set(sys.argv[1:]) else ()))
 
 
-def _table() -> Sequence[Parameter]:
+def _table() -> Sequence[NodeParameter]:
     if find_spec("jax") is None:
         return ()
     from sysid_node.ros.support.simulated_flight import PARAMETERS  # noqa: PLC0415  # JAX may be missing

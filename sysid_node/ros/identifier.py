@@ -37,7 +37,7 @@ from sysid_node.online.session import Due, Session
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, refusal, values_of
-from sysid_node.ros.support.diagnostics import Source, lag_level, lag_words, rejections
+from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_words, rejections
 from sysid_node.ros.support.lifecycle import CarefulNode
 from sysid_node.ros.support.loop_node import SENSOR_QOS, UNHEARD, expected_joints, full_name, say
 from sysid_node.ros.support.message_types import fields_of
@@ -207,7 +207,7 @@ class Identifier(CarefulNode):
     def _report(self, due: Due | None = None) -> None:
         """Publish diagnostics; ``due`` are the estimates of this moment, where they were just made."""
         self._reported = time.monotonic()
-        source = Source(full_name(self), self._session.aircraft.name if self._session else "")
+        source = DiagnosticSource(full_name(self), self._session.aircraft.name if self._session else "")
         message = DiagnosticArray(status=[source.state(self.state_label, self.fault, self.faults)])
         message.header.stamp = self.get_clock().now().to_msg()
         self.guarded(self._report_flight)(message, due)
@@ -217,7 +217,10 @@ class Identifier(CarefulNode):
         session = self._session
         if session is None:
             return
-        source, stale_after = Source(full_name(self), session.aircraft.name), self.get_parameter("stale_after").value
+        source, stale_after = (
+            DiagnosticSource(full_name(self), session.aircraft.name),
+            self.get_parameter("stale_after").value,
+        )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
         message.status.append(source.input(monitors, rejected, stale_after, recent))

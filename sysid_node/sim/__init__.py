@@ -26,8 +26,8 @@ from sysid_node.sim.compiled import xla
 
 xla.configure()
 
-from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter  # noqa: E402
-from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight  # noqa: E402
+from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, SimulationParameter  # noqa: E402
+from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight  # noqa: E402
 from sysid_node.sim.flying.trim import Trim, trim_flight  # noqa: E402
 from sysid_node.sim.simulator import Simulator  # noqa: E402
 
@@ -35,9 +35,9 @@ __all__ = [
     "EFFECTS",
     "STATIONS",
     "Effect",
-    "Inputs",
-    "Parameter",
+    "RolloutInputs",
     "SimulatedFlight",
+    "SimulationParameter",
     "Simulator",
     "Trim",
     "trim_flight",

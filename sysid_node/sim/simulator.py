@@ -16,11 +16,11 @@ from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.dynamics.attitude import quaternion
 from sysid_node.errors import InputError
-from sysid_node.sim.effects import Parameter
+from sysid_node.sim.effects import SimulationParameter
 from sysid_node.sim.flying.lengths import cut, padded
-from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight, rollout
+from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight, rollout
 from sysid_node.sim.model import parameters
-from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar, layout_of, model_of
+from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar, layout_of, model_of
 from sysid_node.sim.model.state import STATES
 
 Array = NDArray[np.float64]
@@ -38,7 +38,9 @@ _rollout = jax.jit(rollout, static_argnums=0)
 
 
 @partial(jax.jit, static_argnums=0)
-def _jacobian(layout: Layout, model: Model, theta: Scalar, initial: Scalar, inputs: Inputs, step: Scalar) -> Scalar:
+def _jacobian(
+    layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, initial: Scalar, inputs: RolloutInputs, step: Scalar
+) -> Scalar:
     slopes: Scalar = jax.jacfwd(lambda t: _rollout(layout, model, t, initial, inputs, step).outputs)(theta)
     return slopes
 
@@ -58,12 +60,12 @@ class Simulator:
             raise InputError(f"rate {self.rate:g} Hz: expected 10 to 10000 Hz")
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> ParameterLayout:
         """The names of controls and derivatives, which shape the compiled program."""
         return layout_of(self.aircraft)
 
     @cached_property
-    def model(self) -> Model:
+    def model(self) -> AircraftNumbers:
         """The aircraft's numbers."""
         return model_of(self.aircraft)
 
@@ -84,11 +86,11 @@ class Simulator:
 
     @property
     def commands(self) -> tuple[str, ...]:
-        """Columns of ``Inputs.commands``: the aerodynamic controls (rad), then thrust (N)."""
+        """Columns of ``RolloutInputs.commands``: the aerodynamic controls (rad), then thrust (N)."""
         return self.layout.commands
 
     @property
-    def parameters(self) -> tuple[tuple[str, Parameter], ...]:
+    def parameters(self) -> tuple[tuple[str, SimulationParameter], ...]:
         """(effect, parameter) of each entry of the vector."""
         return parameters.table(self.layout)
 
@@ -172,15 +174,17 @@ class Simulator:
         gusts: Scalar | Array | None = None,
         turbulence: Scalar | Array | None = None,
         noise: Scalar | Array | None = None,
-    ) -> Inputs:
+    ) -> RolloutInputs:
         """Inputs of N samples from commands (N, controls + 1), rad and N; the other series default to zero."""
 
         def filled(given: Scalar | Array | None, columns: int) -> Scalar:
             return jnp.zeros((commands.shape[0], columns)) if given is None else jnp.asarray(given)
 
-        return Inputs(jnp.asarray(commands), filled(gusts, 6), filled(turbulence, 6), filled(noise, len(OUTPUTS)))
+        return RolloutInputs(
+            jnp.asarray(commands), filled(gusts, 6), filled(turbulence, 6), filled(noise, len(OUTPUTS))
+        )
 
-    def rollout(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> SimulatedFlight:
+    def rollout(self, theta: Scalar | Array, initial: Scalar | Array, inputs: RolloutInputs) -> SimulatedFlight:
         """The open-loop flight of parameters (P,) from a state (13,): pure and compiled.
 
         ``jax.vmap`` and ``jax.jacfwd`` may transform it. A flight that diverges is not finite; ``check`` raises then.
@@ -193,7 +197,7 @@ class Simulator:
         flight = _rollout(*fixed, padded(inputs), self.step, samples)
         return cut(flight, samples)
 
-    def jacobian(self, theta: Scalar | Array, initial: Scalar | Array, inputs: Inputs) -> Scalar:
+    def jacobian(self, theta: Scalar | Array, initial: Scalar | Array, inputs: RolloutInputs) -> Scalar:
         """d outputs / d theta, (N, 12, P), exact (forward mode)."""
         slopes: Scalar = _jacobian(self.layout, self.model, theta, initial, inputs, self.step)
         return slopes

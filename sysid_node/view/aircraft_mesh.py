@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
-from sysid_node.view.scene import Shape
+from sysid_node.view.scene import DrawnAircraft
 
 
 class Mesh(NamedTuple):
@@ -23,7 +23,7 @@ class Mesh(NamedTuple):
     normals: Array
 
 
-class Surface(NamedTuple):
+class MovingPart(NamedTuple):
     """A part that turns: ``hinge`` (3,) m in the body, unit ``axis`` (3,), ``sign`` of its turn, control's symbol.
 
     The mesh is about the hinge. A turn by a positive angle about ``axis`` moves the trailing edge down or left.
@@ -43,7 +43,7 @@ _WIDEST = 0.18  # drawn chord over span: a wing of low aspect ratio would hide t
 _TUBE_SIDES = 10
 
 
-def airframe(shape: Shape) -> Mesh:
+def airframe(shape: DrawnAircraft) -> Mesh:
     """Fuselage, wing, tailplane and fin."""
     b, c = shape.span, _drawn_chord(shape)
     length, width = 0.72 * b, 0.35 * c
@@ -57,7 +57,7 @@ def airframe(shape: Shape) -> Mesh:
     return _joined([tube, wing, _mirrored(wing), plane, _mirrored(plane), fin])
 
 
-def surfaces(shape: Shape) -> list[Surface]:
+def surfaces(shape: DrawnAircraft) -> list[MovingPart]:
     """Elevator, both ailerons and rudder, of the controls that ``shape`` names."""
     b, c, tail = shape.span, _drawn_chord(shape), -0.55 * 0.72 * shape.span
     flap = [(0.0, 0.0), (0.0, 0.15 * b), (-0.25 * c, 0.15 * b), (-0.25 * c, 0.0)]
@@ -66,15 +66,17 @@ def surfaces(shape: Shape) -> list[Surface]:
     rudder = _upright([(0.0, -0.01 * b), (0.0, -0.14 * b), (-0.35 * c, -0.14 * b), (-0.35 * c, -0.01 * b)], c)
     sign = dict(shape.signs)
     every = (
-        Surface("elevator", "de", np.array([tail - 0.15 * c, 0.0, 0.0]), _RIGHT, 1.0, _joined([half, _mirrored(half)])),
-        Surface("right_aileron", "da", np.array([-0.47 * c, 0.32 * b, 0.0]), _RIGHT, 1.0, aileron),
-        Surface("left_aileron", "da", np.array([-0.47 * c, -0.32 * b, 0.0]), _RIGHT, -1.0, _mirrored(aileron)),
-        Surface("rudder", "dr", np.array([tail - 0.15 * c, 0.0, 0.0]), _DOWN, 1.0, rudder),
+        MovingPart(
+            "elevator", "de", np.array([tail - 0.15 * c, 0.0, 0.0]), _RIGHT, 1.0, _joined([half, _mirrored(half)])
+        ),
+        MovingPart("right_aileron", "da", np.array([-0.47 * c, 0.32 * b, 0.0]), _RIGHT, 1.0, aileron),
+        MovingPart("left_aileron", "da", np.array([-0.47 * c, -0.32 * b, 0.0]), _RIGHT, -1.0, _mirrored(aileron)),
+        MovingPart("rudder", "dr", np.array([tail - 0.15 * c, 0.0, 0.0]), _DOWN, 1.0, rudder),
     )
     return [part._replace(sign=part.sign * sign[part.symbol]) for part in every if part.symbol in sign]
 
 
-def shape_of(span: float, chord: float, derivatives: Mapping[str, float]) -> Shape:
+def shape_of(span: float, chord: float, derivatives: Mapping[str, float]) -> DrawnAircraft:
     """The shape of an aircraft; each control turns as its derivative says, for signs differ between aircraft files.
 
     An elevator's trailing edge moves down where ``Cm_de`` is negative, the right aileron's where ``Cl_da`` is negative,
@@ -82,10 +84,10 @@ def shape_of(span: float, chord: float, derivatives: Mapping[str, float]) -> Sha
     """
     decisive = {"de": "Cm_de", "da": "Cl_da", "dr": "Cn_dr"}
     signs = {symbol: 1.0 if derivatives.get(name, -1.0) < 0.0 else -1.0 for symbol, name in decisive.items()}
-    return Shape(span, chord, signs)
+    return DrawnAircraft(span, chord, signs)
 
 
-def _drawn_chord(shape: Shape) -> float:
+def _drawn_chord(shape: DrawnAircraft) -> float:
     return min(shape.chord, _WIDEST * shape.span)
 
 

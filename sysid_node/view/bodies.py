@@ -13,7 +13,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.view.aircraft_mesh import shape_of
 from sysid_node.view.flight_path import poses
-from sysid_node.view.scene import GREY, Arrow, Body, Colour, Shape
+from sysid_node.view.scene import GREY, Arrow, Body, Colour, DrawnAircraft
 
 #: Poses a second that are enough for the eye.
 _RATE = 50.0
@@ -33,10 +33,10 @@ def body_of_record(
     )  # fmt: skip
 
 
-def shape_of_aircraft(aircraft: Aircraft | None) -> Shape:
+def shape_of_aircraft(aircraft: Aircraft | None) -> DrawnAircraft:
     """The shape with the file's span, chord and signs; a common one without a file."""
     if aircraft is None:
-        return Shape()
+        return DrawnAircraft()
     values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
     return shape_of(aircraft.geometry.b, aircraft.geometry.cbar, values)
 

@@ -8,7 +8,7 @@ from math import ceil, sqrt
 import rerun.blueprint as rrb
 
 from sysid_node.view.entities import ABOUT, LANES, NOTES, TIMELINE, WORLD, curve_path, place_path
-from sysid_node.view.scene import Panel, Scene
+from sysid_node.view.scene import PlotPanel, Scene
 
 #: Panels of a tab up to which each has a legend; more are too small for one, and alike.
 _WITH_LEGENDS = 8
@@ -60,13 +60,13 @@ def _space(scene: Scene) -> rrb.Spatial3DView:
     )
 
 
-def _tab(title: str, panels: Sequence[Panel]) -> rrb.Grid:
+def _tab(title: str, panels: Sequence[PlotPanel]) -> rrb.Grid:
     columns = 1 if len(panels) < 3 else ceil(sqrt(len(panels))) if len(panels) > 8 else 2
     legend = len(panels) <= _WITH_LEGENDS
     return rrb.Grid(*(_plot(title, panel, legend) for panel in panels), grid_columns=columns, name=title)
 
 
-def _plot(tab: str, panel: Panel, legend: bool) -> rrb.TimeSeriesView:
+def _plot(tab: str, panel: PlotPanel, legend: bool) -> rrb.TimeSeriesView:
     axis = None if panel.span is None else rrb.ScalarAxis(range=panel.span, zoom_lock=False)
     return rrb.TimeSeriesView(
         origin=curve_path(tab, panel.title, "x").rpartition("/")[0],

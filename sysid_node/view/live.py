@@ -15,7 +15,7 @@ from sysid_node.online.types import Estimates
 from sysid_node.report.results.run_result import References, prior_of
 from sysid_node.view.bodies import body_of_record, shape_of_aircraft
 from sysid_node.view.panels import MOVING_SHARE, SURFACES, derivative_tabs, estimate_notes, motion_panels
-from sysid_node.view.scene import NOTHING, PALE, VERMILION, Body, Change, Lane, Note, Panel, Scene
+from sysid_node.view.scene import NOTHING, PALE, VERMILION, Body, Lane, LaneChange, Note, PlotPanel, Scene
 
 _IMU = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi")
 _AIR = ("V", "alpha", "beta", "rho")
@@ -54,7 +54,7 @@ class LiveScene:
         )
         tabs = {**self._derivatives([unknown]), "Flight": [_emptied(p) for p in motion_panels(record)]}
         body = Body("measured", PALE, none, np.zeros((0, 3)), np.zeros((0, 4)))
-        lanes = [Lane(SURFACES.get(s, s), [Change(0.0, "moves")]) for s in self._aircraft.control_symbols]
+        lanes = [Lane(SURFACES.get(s, s), [LaneChange(0.0, "moves")]) for s in self._aircraft.control_symbols]
         return Scene(
             f"{self._aircraft.name}, live", self.words(unknown), shape_of_aircraft(self._aircraft), [body], tabs, lanes,
             [Note(0.0, "listening")],
@@ -102,7 +102,7 @@ class LiveScene:
                 lines.append(f"**Move the {control}**: {', '.join(f'{n} ({known[n].status})' for n in names)}.")
         return "\n\n".join(lines if len(lines) > 1 else [*lines, "Nothing that a control excites is missing."])
 
-    def _derivatives(self, estimates: Sequence[Estimates]) -> dict[str, list[Panel]]:
+    def _derivatives(self, estimates: Sequence[Estimates]) -> dict[str, list[PlotPanel]]:
         names = self._aircraft.derivatives
         return derivative_tabs(estimates, self._references, names)
 
@@ -166,7 +166,7 @@ class LiveScene:
         if self._states.get(name, "") == state:
             return []
         self._states[name] = state
-        lane = Lane(name, [Change(float(time), state)])
+        lane = Lane(name, [LaneChange(float(time), state)])
         return [lane if colour is None else replace(lane, colour=colour)]
 
 
@@ -176,7 +176,7 @@ def _again(note: Note, seen: set[str]) -> bool:
     return rest.startswith("valid") and name in seen
 
 
-def _emptied(panel: Panel) -> Panel:
+def _emptied(panel: PlotPanel) -> PlotPanel:
     none = np.zeros(0)
     return replace(panel, curves=[replace(curve, time=none, values=none) for curve in panel.curves])
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler, turn_vectors
 from sysid_node.flight.record import Array
-from sysid_node.view.aircraft_mesh import Surface, airframe, surfaces
-from sysid_node.view.scene import Body, Shape
+from sysid_node.view.aircraft_mesh import MovingPart, airframe, surfaces
+from sysid_node.view.scene import Body, DrawnAircraft
 
 #: Seconds of the way behind the aircraft that are drawn, and the time between two of its points.
 TRAIL, _SPACING = 30.0, 0.1
@@ -46,17 +46,17 @@ def pose_of(body: Body) -> Pose:
     return Pose(np.array([east, north, -down]), quaternion_from_euler(euler, "flu")[0])
 
 
-def fixed_parts(shape: Shape) -> Triangles:
+def fixed_parts(shape: DrawnAircraft) -> Triangles:
     """Fuselage, wing, tailplane and fin."""
     return Triangles("airframe", turn_vectors(airframe(shape).corners, "flu"), SAME)
 
 
-def moving_parts(shape: Shape, deflections: Mapping[str, float]) -> list[Triangles]:
+def moving_parts(shape: DrawnAircraft, deflections: Mapping[str, float]) -> list[Triangles]:
     """The controls that the shape has, at these deflections (rad by symbol); zero where none is known."""
     return [_turned(surface, deflections.get(surface.symbol, 0.0)) for surface in surfaces(shape)]
 
 
-def _turned(surface: Surface, deflection: float) -> Triangles:
+def _turned(surface: MovingPart, deflection: float) -> Triangles:
     half = 0.5 * surface.sign * float(np.nan_to_num(deflection))
     axis = turn_vectors(surface.axis, "flu")
     pose = Pose(turn_vectors(surface.hinge, "flu"), np.append(np.sin(half) * axis, np.cos(half)))

@@ -21,11 +21,11 @@ from sysid_node.view.scene import (
     PURPLE,
     SKY,
     VERMILION,
-    Change,
-    Curve,
     Lane,
+    LaneChange,
     Note,
-    Panel,
+    PlotCurve,
+    PlotPanel,
 )
 
 DEGREES = 180.0 / np.pi
@@ -51,7 +51,7 @@ _EDGES = 0.85
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
 
-def motion_panels(record: FlightRecord) -> list[Panel]:
+def motion_panels(record: FlightRecord) -> list[PlotPanel]:
     """Deflections, then the motion, of the columns that were measured."""
     surfaces = {c: SURFACES.get(c, c) for c in record.columns if c in SURFACES or c not in COLUMNS}
     groups = (("Controls", "deg", DEGREES, surfaces), *MOTION)
@@ -59,10 +59,10 @@ def motion_panels(record: FlightRecord) -> list[Panel]:
     for title, unit, factor, columns in groups:
         measured = [c for c in columns if record.measured(c)]
         curves = [
-            Curve(columns[c], record.time, factor * record[c], colour)
+            PlotCurve(columns[c], record.time, factor * record[c], colour)
             for c, colour in zip(measured, _COLOURS * 3, strict=False)
         ]
-        panels += [Panel(title, unit, curves)] if curves else []
+        panels += [PlotPanel(title, unit, curves)] if curves else []
     return panels
 
 
@@ -76,50 +76,50 @@ def control_lanes(record: FlightRecord) -> list[Lane]:
     return lanes
 
 
-def moving(time: Array, values: Array, state: str) -> list[Change]:
+def moving(time: Array, values: Array, state: str) -> list[LaneChange]:
     """The changes between ``state`` and none, of values (N,) at times (N,) that cover a share of their range."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     whole = float(np.ptp(values)) if values.size else 0.0
     if values.size < 2 or not whole > 0.0:
-        return [Change(float(time[0]) if time.size else 0.0, NOTHING)]
+        return [LaneChange(float(time[0]) if time.size else 0.0, NOTHING)]
     size = max(round(_WITHIN / float(np.median(np.diff(time)))), 2)
     near = (maximum_filter1d(values, size) - minimum_filter1d(values, size)) > MOVING_SHARE * whole
     moves = minimum_filter1d(near, round(_EDGES * size))  # a window reaches out by half its length at either end
     edges = np.flatnonzero(np.diff(moves.astype(np.int8), prepend=0))
-    changes = [Change(float(time[i]), state if moves[i] else NOTHING) for i in edges]
-    return changes if changes and changes[0].time == time[0] else [Change(float(time[0]), NOTHING), *changes]
+    changes = [LaneChange(float(time[i]), state if moves[i] else NOTHING) for i in edges]
+    return changes if changes and changes[0].time == time[0] else [LaneChange(float(time[0]), NOTHING), *changes]
 
 
 def derivative_tabs(
     history: Sequence[Estimates], references: References, names: Iterable[str] = ()
-) -> dict[str, list[Panel]]:
+) -> dict[str, list[PlotPanel]]:
     """A tab of panels for each half of the model: estimates with their 95 % intervals, the file's value, the truth.
 
     ``names``: the derivatives; by default those that were estimated.
     """
     names = list(names) or list(dict.fromkeys(name for e in history for name in e.derivatives))
-    tabs: dict[str, list[Panel]] = {}
+    tabs: dict[str, list[PlotPanel]] = {}
     for name in names:
         tab = "Pitch" if name.partition("_")[0] in ("CL", "CD", "Cm") else "Roll and yaw"
         tabs.setdefault(f"Derivatives, {tab.lower()}", []).append(derivative_panel(name, history, references))
     return tabs
 
 
-def derivative_panel(name: str, history: Sequence[Estimates], references: References) -> Panel:
+def derivative_panel(name: str, history: Sequence[Estimates], references: References) -> PlotPanel:
     """One derivative against time."""
     rows = [(e.time, e.derivatives[name]) for e in history if name in e.derivatives]
     time = np.array([t for t, _ in rows])
     value, lower, upper = (np.array([getattr(d, key) for _, d in rows]) for key in ("value", "lower", "upper"))
     valid = np.array([d.valid for _, d in rows], dtype=bool)
     curves = [
-        Curve("not valid", time, np.where(valid, np.nan, value), PALE, 1.5),
-        Curve("lower 95 %", time, lower, SKY, 1.0),
-        Curve("upper 95 %", time, upper, SKY, 1.0),
-        Curve("estimate", time, np.where(valid, value, np.nan), BLUE, 2.5),
+        PlotCurve("not valid", time, np.where(valid, np.nan, value), PALE, 1.5),
+        PlotCurve("lower 95 %", time, lower, SKY, 1.0),
+        PlotCurve("upper 95 %", time, upper, SKY, 1.0),
+        PlotCurve("estimate", time, np.where(valid, value, np.nan), BLUE, 2.5),
         *_reference_curves(name, time, references),
     ]
-    return Panel(name, short_meaning(name), curves, _span(value, lower, upper, valid, name, references))
+    return PlotPanel(name, short_meaning(name), curves, _span(value, lower, upper, valid, name, references))
 
 
 def estimate_notes(history: Sequence[Estimates]) -> list[Note]:
@@ -136,15 +136,15 @@ def estimate_notes(history: Sequence[Estimates]) -> list[Note]:
     return notes
 
 
-def _reference_curves(name: str, time: Array, references: References) -> list[Curve]:
+def _reference_curves(name: str, time: Array, references: References) -> list[PlotCurve]:
     """The file's value and the truth, as lines over the estimates' time."""
     ends, curves = time[[0, -1]] if time.size else np.zeros(2), []
     if name in references.prior:
-        curves.append(Curve("aircraft file", ends, np.full(2, references.prior[name].value), VERMILION, 1.0))
+        curves.append(PlotCurve("aircraft file", ends, np.full(2, references.prior[name].value), VERMILION, 1.0))
     if name in references.truth:
         since = references.truth_since.get(name)
         begin = ends if since is None else np.array([since, max(since, ends[1])])
-        curves.append(Curve("true", begin, np.full(2, references.truth[name]), GREEN, 1.5))
+        curves.append(PlotCurve("true", begin, np.full(2, references.truth[name]), GREEN, 1.5))
     return curves
 
 
@@ -169,13 +169,13 @@ def _span(
     return low - margin, high + margin
 
 
-def residual_panels(responses: Mapping[str, tuple[Array, Array, Array]], titles: Mapping[str, str]) -> list[Panel]:
+def residual_panels(responses: Mapping[str, tuple[Array, Array, Array]], titles: Mapping[str, str]) -> list[PlotPanel]:
     """Measured and modelled coefficients or readings, and their difference: name -> time, measured, modelled (N,)."""
     return [
-        Panel(titles.get(name, name), "", [
-            Curve("measured", time, measured, GREY, 2.5),
-            Curve("modelled", time, modelled, BLUE, 1.5),
-            Curve("measured minus modelled", time, measured - modelled, VERMILION, 1.0),
+        PlotPanel(titles.get(name, name), "", [
+            PlotCurve("measured", time, measured, GREY, 2.5),
+            PlotCurve("modelled", time, modelled, BLUE, 1.5),
+            PlotCurve("measured minus modelled", time, measured - modelled, VERMILION, 1.0),
         ])
         for name, (time, measured, modelled) in responses.items()
     ]  # fmt: skip

@@ -21,9 +21,9 @@ import numpy as np
 
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
-from sysid_node.view.aircraft_mesh import Surface, airframe, surfaces
+from sysid_node.view.aircraft_mesh import MovingPart, airframe, surfaces
 from sysid_node.view.entities import ABOUT, APPLICATION, NOTES, TIMELINE, WORLD, curve_path, lane_path, part, place_path
-from sysid_node.view.scene import GREY, NOTHING, Arrow, Body, Curve, Scene, Shape
+from sysid_node.view.scene import GREY, NOTHING, Arrow, Body, DrawnAircraft, PlotCurve, Scene
 
 if TYPE_CHECKING:
     import rerun
@@ -185,7 +185,7 @@ def _at(stream: rerun.RecordingStream, time: float) -> None:
     stream.set_time(TIMELINE, duration=time)
 
 
-def _declare_body(stream: rerun.RecordingStream, body: Body, shape: Shape) -> None:
+def _declare_body(stream: rerun.RecordingStream, body: Body, shape: DrawnAircraft) -> None:
     rr, root = require_rerun(), f"{place_path(body.name)}/body"
     parts = {"airframe": airframe(shape)} | {f"{s.name}/flap": s.mesh for s in surfaces(shape)}
     for name, mesh in parts.items():
@@ -196,7 +196,7 @@ def _declare_body(stream: rerun.RecordingStream, body: Body, shape: Shape) -> No
         _static(stream, f"{root}/{surface.name}", rr.Transform3D(translation=surface.hinge))
 
 
-def _append_body(stream: rerun.RecordingStream, body: Body, parts: list[Surface]) -> None:
+def _append_body(stream: rerun.RecordingStream, body: Body, parts: list[MovingPart]) -> None:
     rr, place = require_rerun(), place_path(body.name)
     root = f"{place}/body"
     if body.time.size:
@@ -227,7 +227,7 @@ def _append_arrow(stream: rerun.RecordingStream, path: str, arrow: Arrow) -> Non
     _send(stream, path, arrow.time, rr.Arrows3D.columns(vectors=drawn))
 
 
-def _append_curve(stream: rerun.RecordingStream, path: str, curve: Curve) -> None:
+def _append_curve(stream: rerun.RecordingStream, path: str, curve: PlotCurve) -> None:
     if curve.time.size:
         _send(stream, path, curve.time, require_rerun().Scalars.columns(scalars=curve.values))
 

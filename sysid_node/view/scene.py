@@ -19,7 +19,7 @@ ORANGE, SKY, GREY, PALE = (230, 159, 0), (86, 180, 233), (138, 148, 160), (188, 
 
 
 @dataclass(frozen=True)
-class Curve:
+class PlotCurve:
     """One line of a plot: ``values`` (N,) at ``time`` (N,) s, in the panel's unit; NaN is a gap."""
 
     name: str
@@ -30,12 +30,12 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Panel:
+class PlotPanel:
     """One plot. ``span`` is the range of values that is shown at first; None: all of them."""
 
     title: str
     unit: str
-    curves: Sequence[Curve]
+    curves: Sequence[PlotCurve]
     span: tuple[float, float] | None = None
 
 
@@ -51,7 +51,7 @@ class Arrow:
     metres_per_unit: float
 
 
-class Shape(NamedTuple):
+class DrawnAircraft(NamedTuple):
     """The measures of the drawn aircraft: span and chord, m, and which way its controls move.
 
     ``signs``: control symbol -> +1 or -1. +1 is a trailing edge that moves down (elevator, right aileron) or left
@@ -84,7 +84,7 @@ class Body:
 NOTHING = "nothing"
 
 
-class Change(NamedTuple):
+class LaneChange(NamedTuple):
     """From ``time`` (s) on a lane shows ``state``; ``NOTHING`` is a gap."""
 
     time: float
@@ -96,7 +96,7 @@ class Lane:
     """States over time, such as which control moves or which part has failed."""
 
     name: str
-    changes: Sequence[Change]
+    changes: Sequence[LaneChange]
     colour: Colour = ORANGE
 
 
@@ -114,8 +114,8 @@ class Scene:
 
     title: str
     about: str
-    shape: Shape = field(default_factory=Shape)
+    shape: DrawnAircraft = field(default_factory=DrawnAircraft)
     bodies: Sequence[Body] = ()
-    tabs: Mapping[str, Sequence[Panel]] = field(default_factory=dict)
+    tabs: Mapping[str, Sequence[PlotPanel]] = field(default_factory=dict)
     lanes: Sequence[Lane] = ()
     notes: Sequence[Note] = ()

@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.default_tolerances import DEFAULT_NOISE_BIAS, DEFAULT_TOLERANCES, UNKNOWN_SERVO_LAG
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft, parse_aircraft
-from sysid_node.aircraft.model import Table, UncertainValue
+from sysid_node.aircraft.model import LookupTable, UncertainValue
 from sysid_node.errors import InputError, ModelWarning
 
 GOOD = """\
@@ -119,7 +119,7 @@ def test_effect_values_hold_the_delays():
 
 def test_tables():
     one, two = parse_aircraft(GOOD).tables
-    assert one == Table("CL", ("alpha",), ((-0.2, 0.0, 0.2, 0.35),), (0.0, 0.0, 0.01, -0.2))
+    assert one == LookupTable("CL", ("alpha",), ((-0.2, 0.0, 0.2, 0.35),), (0.0, 0.0, 0.01, -0.2))
     assert (two.over, two.points[1], two.values[1]) == (("alpha", "df"), (-0.3, 0.0, 0.3), (0.1, 0.0, -0.1))
 
 

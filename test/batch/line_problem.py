@@ -5,7 +5,7 @@ from made_models import SHORT_PERIOD, flown, noisy, short_period_model
 
 from sysid_node.batch.likelihood.problem import LikelihoodProblem
 from sysid_node.batch.likelihood.unknowns import Unknowns
-from sysid_node.batch.models.model import Parameter
+from sysid_node.batch.models.model import ModelParameter
 from sysid_node.batch.results.response import ModelResponse
 
 
@@ -14,7 +14,8 @@ class LineProblem(LikelihoodProblem):
 
     def __init__(self):
         parameters = tuple(
-            Parameter(name, value, prior=(value, 0.5) if name == "Mq" else None) for name, value in SHORT_PERIOD.items()
+            ModelParameter(name, value, prior=(value, 0.5) if name == "Mq" else None)
+            for name, value in SHORT_PERIOD.items()
         )
         model = short_period_model().changed(parameters=parameters)
         self.manoeuvre = noisy(flown(model), np.random.default_rng(1))

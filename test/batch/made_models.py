@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from sysid_node.batch.likelihood import rollout
 from sysid_node.batch.models.manoeuvre import ManoeuvreData
-from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.batch.models.model import ModelParameter, Scalars, StateSpaceModel
 from sysid_node.flight.record import Array
 
 #: Short period of a small aircraft at 18 m/s, dimensional: alpha' = q + Za alpha + Zd de, q' = Ma alpha + Mq q + Md de.
@@ -33,7 +33,7 @@ def short_period_model(start: dict[str, float] | None = None, **parameter: objec
         states=("alpha", "q"),
         inputs=("de",),
         outputs=("alpha", "q", "az"),
-        parameters=tuple(Parameter(name, value, **parameter) for name, value in values.items()),  # type: ignore[arg-type]
+        parameters=tuple(ModelParameter(name, value, **parameter) for name, value in values.items()),  # type: ignore[arg-type]
         derivative=derivative,
         output=output,
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
 from sysid_node.batch.models.lateral_rates import lateral_rates
 from sysid_node.batch.models.manoeuvre import ManoeuvreData
 from sysid_node.batch.models.manoeuvres import manoeuvre_data, with_forces_at_cg
@@ -106,7 +106,7 @@ def hfb_320(
         mass=mass,
         inertia=Inertia(np.nan, Iyy, np.nan),
         geometry=Geometry(S, 14.5, chord),
-        reference=Reference(V0, 0.792),
+        reference=ReferenceCondition(V0, 0.792),
         controls=ELEVATOR,
         derivatives={name: Derivative(value) for name, value in HFB_START.items()},
         throttle=Throttle("throttle", inclination=0.0524, arm=-7.0153e-6 * Iyy),
@@ -143,7 +143,7 @@ def attas_lateral(flights: Path, cutoff: float = 4.0) -> ReferenceCase:
     model = lateral_rates({**ATTAS_START, **dict.fromkeys(("L_0", "N_0"), 0.02)})
     aircraft = Aircraft(
         "attas", "", 17631.0, Inertia(133367.0, 252687.0, 359593.0, 11442.0), Geometry(64.0, 21.5, 3.159),
-        Reference(130.0, 0.73), {}, {},
+        ReferenceCondition(130.0, 0.73), {}, {},
     )  # fmt: skip
     return ReferenceCase(model, manoeuvre_data(model, record, {"p": 0.0, "r": 0.0}), aircraft, record)
 
@@ -157,7 +157,7 @@ def twin_otter(flights: Path) -> ReferenceCase:
         mass=4944.0,
         inertia=Inertia(28353.0, 32910.0, 52168.0, 1528.0),
         geometry=Geometry(39.25, 19.81, 1.98),
-        reference=Reference(72.0, 1.029),
+        reference=ReferenceCondition(72.0, 1.029),
         controls=ELEVATOR,
         derivatives={name: Derivative(0.0) for name in names},
         throttle=Throttle("throttle"),

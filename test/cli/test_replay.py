@@ -13,7 +13,7 @@ from rosbags.rosbag2 import Reader
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Table, UncertainValue
+from sysid_node.aircraft.model import LookupTable, UncertainValue
 from sysid_node.api import load, replay
 from sysid_node.api.replaying import replay_settings
 from sysid_node.cli.main import main
@@ -326,9 +326,9 @@ def test_derivatives_are_estimated_on_top_of_the_files_tables(tmp_path):
     """A flight of ``sysid simulate`` without noise; without the tables these are 20 % off and more."""
     plain = load_aircraft("cdrw")
     bends = (-0.1, 0.05, 0.1, 0.3)
-    lift = Table("CL", ("alpha",), (bends,), (0.2, 0.0, -0.05, -0.4))
+    lift = LookupTable("CL", ("alpha",), (bends,), (0.2, 0.0, -0.05, -0.4))
     both = ((-0.05, -0.02, -0.1), (0.0, 0.0, -0.05), (0.03, 0.0, -0.06), (0.2, 0.1, 0.0))
-    pitch = Table("Cm", ("alpha", "de"), (bends, (-0.3, 0.0, 0.3)), both)
+    pitch = LookupTable("Cm", ("alpha", "de"), (bends, (-0.3, 0.0, 0.3)), both)
     bent = tmp_path / "bent.yaml"
     bent.write_text(dump_aircraft(dataclasses.replace(plain, tables=(lift, pitch))))
     flown = ["--noise", "0", "--rate", "100", "--duration", "11", "--manoeuvre", "3211:elevator:amplitude=0.05:start=1"]

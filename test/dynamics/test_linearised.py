@@ -5,15 +5,15 @@ from dataclasses import replace
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Table
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.dynamics.linearised import linear_derivatives, table_derivatives, trimmed
 
 AIRCRAFT = load_aircraft("kestrel")
 FILE = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
 
 
-def linear(coefficient: str, over: str, slope: float) -> Table:
-    return Table(coefficient, (over,), ((-1.0, 0.0, 1.0),), (-slope, 0.0, slope))
+def linear(coefficient: str, over: str, slope: float) -> LookupTable:
+    return LookupTable(coefficient, (over,), ((-1.0, 0.0, 1.0),), (-slope, 0.0, slope))
 
 
 def test_without_tables_they_are_the_files() -> None:
@@ -35,7 +35,9 @@ def test_a_derivative_may_as_well_be_a_table() -> None:
 def test_a_bent_table_counts_with_its_slope_in_level_flight() -> None:
     """Both equations of the trim hold on the table, and on the linear model at the trim's angle of attack."""
     bend = trimmed(AIRCRAFT)[0] - 0.02
-    aircraft = replace(AIRCRAFT, tables=(Table("Cm", ("alpha",), ((bend - 1.0, bend, bend + 1.0),), (0.0, 0.0, -0.8)),))
+    aircraft = replace(
+        AIRCRAFT, tables=(LookupTable("Cm", ("alpha",), ((bend - 1.0, bend, bend + 1.0),), (0.0, 0.0, -0.8)),)
+    )
     alpha, elevator = trimmed(aircraft)
     assert alpha > bend
     pitching = FILE["Cm_0"] + FILE["Cm_alpha"] * alpha + FILE["Cm_de"] * elevator - 0.8 * (alpha - bend)

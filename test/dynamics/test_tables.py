@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from sysid_node.aircraft.model import Table
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.dynamics import scalar
 from sysid_node.dynamics.tables import array_tables, scalar_tables, table_variables
 
 X, Y = (-0.2, 0.0, 0.05, 0.35), (-0.3, 0.1, 0.4)
 RANDOM = np.random.default_rng(7)
-ONE = Table("CL", ("alpha",), (X,), tuple(RANDOM.standard_normal(len(X)).tolist()))
-TWO = Table("CL", ("alpha", "de"), (X, Y), tuple(map(tuple, RANDOM.standard_normal((len(X), len(Y))).tolist())))
-ROLL = Table("Cl", ("p",), (Y,), (0.3, -0.1, 0.2))
+ONE = LookupTable("CL", ("alpha",), (X,), tuple(RANDOM.standard_normal(len(X)).tolist()))
+TWO = LookupTable("CL", ("alpha", "de"), (X, Y), tuple(map(tuple, RANDOM.standard_normal((len(X), len(Y))).tolist())))
+ROLL = LookupTable("Cl", ("p",), (Y,), (0.3, -0.1, 0.2))
 AT = {
     name: np.concatenate([RANDOM.uniform(-0.6, 0.6, 300), corners])
     for name, corners in (("alpha", [*X, *X]), ("de", [*Y, *Y, -0.0, 9.0]), ("p", [*Y, *Y, 0.0, -9.0]))

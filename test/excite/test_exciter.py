@@ -8,11 +8,11 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.excite import exciter
-from sysid_node.excite.exciter import FlightCondition
+from sysid_node.excite.exciter import LimitedQuantities
 from sysid_node.excite.exciter_settings import ExcitationSettings
 
 AIRCRAFT = load_aircraft("cdrw")
-LEVEL = FlightCondition(0.0, 0.08, 18.0, 1.0)
+LEVEL = LimitedQuantities(0.0, 0.08, 18.0, 1.0)
 KNOWN = dict.fromkeys(ExcitationSettings().derivatives, 0.01)
 UNKNOWN = dict.fromkeys(ExcitationSettings().derivatives, math.inf)
 
@@ -57,7 +57,7 @@ def test_it_flies_the_manoeuvre_and_stops_when_enough_is_known(state: exciter.Ex
         (LEVEL._replace(airspeed=math.nan), "airspeed not measured"),
     ],
 )
-def test_a_limit_or_a_silent_sensor_ends_it_at_once_for_good(flight: FlightCondition, words: str) -> None:
+def test_a_limit_or_a_silent_sensor_ends_it_at_once_for_good(flight: LimitedQuantities, words: str) -> None:
     state = exciter.init(AIRCRAFT, ExcitationSettings(watch=True))
     exciter.start(state, 0.0)
     assert exciter.step(state, 1.0, LEVEL).any()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys.store import Typestore
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
 
 JOINTS = ("throttle", "elevator", "left", "right", "rudder", "flap")
@@ -21,7 +21,7 @@ def made_aircraft() -> Aircraft:
         mass=2.0,
         inertia=Inertia(0.1, 0.15, 0.2, 0.01),
         geometry=Geometry(0.4, 1.5, 0.28),
-        reference=Reference(18.0, 1.19),
+        reference=ReferenceCondition(18.0, 1.19),
         controls={
             "elevator": Control("elevator", "de", {"elevator": 1.1}, 0.013),
             "aileron": Control("aileron", "da", {"left": -0.45, "right": 0.55}),

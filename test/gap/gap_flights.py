@@ -9,7 +9,7 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
 RATE = 100.0
@@ -35,5 +35,5 @@ def fly(
         plan = parse_manoeuvre(STEPS if manoeuvre is None else manoeuvre, aircraft, RATE, duration)
         deflections[:, :3] = plan.surfaces()
     sortie = fly_sortie(simulator, deflections, SortieConditions(effects, turbulence=turbulence, seed=seed))
-    record = flight_record(aircraft, Recorder(100.0, 100.0, 100.0).record(sortie), 0.2)
+    record = flight_record(aircraft, FlightSampler(100.0, 100.0, 100.0).record(sortie), 0.2)
     return completed_flight(aircraft, GapFlight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, Information, nothing
 from sysid_node.online.regression.normal_equations import NormalEquations
@@ -21,8 +21,8 @@ INSTRUMENTED = ("alpha", "q", "beta", "p")
 ROWS = 120  # 20 in each band
 
 
-def layout(instrumented: tuple[str, ...] = ()) -> Layout:
-    return Layout(("alpha", "q", "beta", "p", "de", "dr"), ("de", "dr"), instrumented)
+def layout(instrumented: tuple[str, ...] = ()) -> SignalLayout:
+    return SignalLayout(("alpha", "q", "beta", "p", "de", "dr"), ("de", "dr"), instrumented)
 
 
 def made(equations: NormalEquations, seed: int = 0, noise: float = 0.3) -> tuple[Array, dict[str, Array]]:

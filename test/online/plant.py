@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -43,7 +43,7 @@ def made_aircraft(derivatives: Mapping[str, float] = TRUTH, **changes: object) -
         mass=3.5,
         inertia=Inertia(0.16, 0.22, 0.36, 0.01),
         geometry=Geometry(0.55, 1.4, 0.45),
-        reference=Reference(18.0, 1.2),
+        reference=ReferenceCondition(18.0, 1.2),
         controls={name: Control(name, symbol, {name: 1.0}) for name, symbol in surfaces.items()},
         derivatives={name: Derivative(value, max(0.1 * abs(value), 0.01)) for name, value in derivatives.items()},
         throttle=Throttle("throttle", 30.0),

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Sensors, Throttle
+from sysid_node.aircraft.model import (
+    Aircraft,
+    Control,
+    Derivative,
+    Geometry,
+    Inertia,
+    ReferenceCondition,
+    Sensors,
+    Throttle,
+)
 
 DERIVATIVES = {
     "CL_0": 0.02, "CL_alpha": 4.2, "CL_q": 5.0, "CL_de": 0.5,
@@ -24,7 +33,7 @@ def make_aircraft(derivatives: dict[str, float] | None = None, **changes: object
         "mass": 4.0,
         "inertia": Inertia(0.3, 0.35, 0.6, 0.02),
         "geometry": Geometry(0.5, 1.8, 0.28),
-        "reference": Reference(18.0, 1.2),
+        "reference": ReferenceCondition(18.0, 1.2),
         "controls": {name: Control(name, symbol, {name: 1.0}, limit=0.4) for name, symbol in surfaces.items()},
         "derivatives": {name: Derivative(value, 0.1 * abs(value) + 0.01) for name, value in values.items()},
         "throttle": Throttle("throttle", 30.0),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sysid_node.dynamics.atmosphere import air_density
-from sysid_node.sim import Inputs, SimulatedFlight, Simulator, Trim
+from sysid_node.sim import RolloutInputs, SimulatedFlight, Simulator, Trim
 from sysid_node.sim.prediction.signals import MeasuredSignals
 
 SAMPLES = 601
@@ -20,7 +20,7 @@ def signals_from(flight: SimulatedFlight, commands: np.ndarray) -> MeasuredSigna
     )
 
 
-def smooth_inputs(simulator: Simulator, trim: Trim) -> Inputs:
+def smooth_inputs(simulator: Simulator, trim: Trim) -> RolloutInputs:
     """Deflections without edges, so that differences of rates are exact enough."""
     time = np.arange(SAMPLES) * simulator.step
     waves = [0.04 * np.sin(4 * time), 0.05 * np.sin(5 * time + 1), 0.08 * np.sin(3 * time + 2), np.sin(2 * time)]

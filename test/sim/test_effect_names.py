@@ -6,9 +6,9 @@ import pytest
 
 from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.sim import EFFECTS
-from sysid_node.sim.model.layout import Layout
+from sysid_node.sim.model.layout import ParameterLayout
 
-LAYOUT = Layout(("elevator", "aileron", "flap"), ("de", "da", "df"), ("CL_0", "Cm_alpha"))
+LAYOUT = ParameterLayout(("elevator", "aileron", "flap"), ("de", "da", "df"), ("CL_0", "Cm_alpha"))
 
 
 def test_every_effect_is_listed_in_the_order_of_the_chain():

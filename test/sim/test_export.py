@@ -9,7 +9,7 @@ import pytest
 import yaml
 from plain import DERIVATIVES, make_aircraft, steps
 
-from sysid_node.aircraft.model import Table
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.errors import InputError
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.export.gazebo import gazebo_plugin
@@ -32,9 +32,9 @@ CASES = {
 }
 
 TABLES = (
-    Table("CL", ("alpha",), ((-0.2, 0.05, 0.08, 0.4),), (-0.05, 0.0, 0.02, -0.1)),
-    Table("Cm", ("alpha", "de"), ((0.0, 0.1), (-0.2, 0.0, 0.2)), ((0.01, 0.0, 0.01), (-0.01, -0.02, 0.02))),
-    Table("CD", ("V",), ((10.0, 18.0, 25.0),), (0.01, 0.0, 0.02)),
+    LookupTable("CL", ("alpha",), ((-0.2, 0.05, 0.08, 0.4),), (-0.05, 0.0, 0.02, -0.1)),
+    LookupTable("Cm", ("alpha", "de"), ((0.0, 0.1), (-0.2, 0.0, 0.2)), ((0.01, 0.0, 0.01), (-0.01, -0.02, 0.02))),
+    LookupTable("CD", ("V",), ((10.0, 18.0, 25.0),), (0.01, 0.0, 0.02)),
 )
 
 

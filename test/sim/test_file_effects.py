@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from sysid_node.aircraft.model import Table, UncertainValue
+from sysid_node.aircraft.model import LookupTable, UncertainValue
 from sysid_node.dynamics.atmosphere import speed_of_sound
 from sysid_node.sim import Simulator
 from sysid_node.sim.effects import actuator_lag
@@ -70,8 +70,10 @@ def flown(aircraft, effects=()):
 def test_a_straight_table_is_a_derivative(aircraft):
     """A table that is linear over the flight's range adds its slope to the derivative."""
     alpha, de = np.array([-0.5, 0.0, 0.8]), np.array([-0.5, 0.5])
-    one = Table("Cm", ("alpha",), (tuple(alpha),), tuple(-0.05 * alpha))
-    two = Table("CL", ("alpha", "de"), (tuple(alpha), tuple(de)), tuple(map(tuple, 0.2 * alpha[:, None] + 0.1 * de)))
+    one = LookupTable("Cm", ("alpha",), (tuple(alpha),), tuple(-0.05 * alpha))
+    two = LookupTable(
+        "CL", ("alpha", "de"), (tuple(alpha), tuple(de)), tuple(map(tuple, 0.2 * alpha[:, None] + 0.1 * de))
+    )
     tabled = flown(replace(aircraft, tables=(one, two)))
     error = "derivative_error:Cm_alpha=-0.05:CL_alpha=0.2:CL_de=0.1"
     direct = flown(aircraft, [error])
@@ -82,8 +84,8 @@ def test_tables_over_airspeed_and_mach_agree(aircraft):
     sound = float(speed_of_sound(aircraft.reference.air_density, np))
     speeds = np.array([10.0, 18.0, 30.0])
     values = (0.0, 0.01, 0.05)
-    by_speed = flown(replace(aircraft, tables=(Table("CD", ("V",), (tuple(speeds),), values),)))
-    by_mach = flown(replace(aircraft, tables=(Table("CD", ("Mach",), (tuple(speeds / sound),), values),)))
+    by_speed = flown(replace(aircraft, tables=(LookupTable("CD", ("V",), (tuple(speeds),), values),)))
+    by_mach = flown(replace(aircraft, tables=(LookupTable("CD", ("Mach",), (tuple(speeds / sound),), values),)))
     assert np.abs(by_speed.flight.coefficients - flown(aircraft).flight.coefficients)[:, 1].max() > 0.005
     np.testing.assert_allclose(by_speed.flight.coefficients, by_mach.flight.coefficients, atol=2e-4)
     assert sound == pytest.approx(340.3, rel=0.01)

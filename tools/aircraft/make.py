@@ -16,7 +16,7 @@ from scipy.optimize import fsolve
 from vortex_lattice import Array, Flow, Point, Section, VortexLattice
 
 from sysid_node.aircraft.dump import dump_aircraft
-from sysid_node.aircraft.model import Aircraft, Derivative, Geometry, Inertia, Reference, Sensors
+from sysid_node.aircraft.model import Aircraft, Derivative, Geometry, Inertia, ReferenceCondition, Sensors
 from sysid_node.aircraft.names import STANDARD_DERIVATIVES, split_derivative
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -156,7 +156,7 @@ def build(design: Design) -> Aircraft:
         mass=_round(mass),
         inertia=inertia,
         geometry=Geometry(_round(design.S), design.b, _round(design.cbar)),
-        reference=Reference(design.airspeed, design.density),
+        reference=ReferenceCondition(design.airspeed, design.density),
         controls=design.controls,
         derivatives={name: Derivative(_round(value), _tolerance(name, value)) for name, value in values.items()},
         throttle=design.throttle,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import yaml
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
 from sysid_node.aircraft.reading.body import default_noise_bias
 
 CONTROLS = {"elevator": "de", "aileron": "da", "rudder": "dr"}
@@ -21,7 +21,7 @@ def twin_otter(folder: Path) -> Aircraft:
     """Longitudinal model of SIDPAC's example."""
     beliefs = _of("CL", {"0": 0.4, "alpha": 6.0, "q": 18.0, "de": 0.6}) | _of("CD", {"0": 0.06, "alpha": 0.1})
     beliefs |= _of("Cm", {"0": 0.05, "alpha": -1.5, "q": -37.0, "de": -1.9})
-    return _aircraft(folder, "twin_otter", Reference(72.0, 1.03), ["elevator"], beliefs, Throttle("throttle"))
+    return _aircraft(folder, "twin_otter", ReferenceCondition(72.0, 1.03), ["elevator"], beliefs, Throttle("throttle"))
 
 
 def attas(folder: Path) -> Aircraft:
@@ -29,7 +29,7 @@ def attas(folder: Path) -> Aircraft:
     beliefs = _of("CY", {"0": 0.01, "beta": -1.0, "p": 0.2, "r": 0.6, "da": 0.01, "dr": 0.2})
     beliefs |= _of("Cl", {"0": 0.01, "beta": -0.06, "p": -0.4, "r": 0.2, "da": -0.1, "dr": 0.02})
     beliefs |= _of("Cn", {"0": 0.01, "beta": 0.13, "p": -0.05, "r": -0.2, "da": -0.01, "dr": -0.07})
-    return _aircraft(folder, "attas", Reference(131.0, 0.73), ["aileron", "rudder"], beliefs)
+    return _aircraft(folder, "attas", ReferenceCondition(131.0, 0.73), ["aileron", "rudder"], beliefs)
 
 
 def hfb320(folder: Path) -> Aircraft:
@@ -38,7 +38,7 @@ def hfb320(folder: Path) -> Aircraft:
     beliefs |= _of("Cm", {"0": 0.1, "V": 0.01, "alpha": -1.0, "q": -35.0, "de": -1.5})
     Iyy = _numbers(folder)["hfb320"]["inertia"]["Iyy"]
     engines = Throttle("throttle", inclination=0.0524, arm=-7.0153e-6 * Iyy)
-    return _aircraft(folder, "hfb320", Reference(104.67, 0.792), ["elevator"], beliefs, engines)
+    return _aircraft(folder, "hfb320", ReferenceCondition(104.67, 0.792), ["elevator"], beliefs, engines)
 
 
 def thor(folder: Path) -> Aircraft:
@@ -52,7 +52,7 @@ def thor(folder: Path) -> Aircraft:
     beliefs |= _of("CY", {"0": 0.0, "beta": -0.4889, "p": -0.0375, "r": 0.15, "dr": 0.1913})
     beliefs |= _of("Cl", {"0": 0.0, "beta": -0.0545, "p": -0.4496, "r": 0.1086, "da": -0.1646, "dr": 0.0115})
     beliefs |= _of("Cn", {"0": 0.0, "beta": 0.0723, "p": 0.118, "r": -0.1833, "da": 0.0574, "dr": -0.1811})
-    return _aircraft(folder, "thor", Reference(17.0, 1.2), list(CONTROLS), beliefs, Throttle("throttle"))
+    return _aircraft(folder, "thor", ReferenceCondition(17.0, 1.2), list(CONTROLS), beliefs, Throttle("throttle"))
 
 
 def _of(coefficient: str, values: Mapping[str, float]) -> dict[str, Derivative]:
@@ -68,7 +68,7 @@ def _numbers(folder: Path) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
 def _aircraft(
     folder: Path,
     name: str,
-    reference: Reference,
+    reference: ReferenceCondition,
     controls: Sequence[str],
     beliefs: Mapping[str, Derivative],
     throttle: Throttle | None = None,

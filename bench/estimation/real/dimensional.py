@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.frequency.fourier_transform import Lines
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression import information, least_squares, normal_equations
 from sysid_node.online.regression.information import Information, Spectrum
 
@@ -44,7 +44,7 @@ def regress(
 
     ``rates``: the left sides are the signals' rates of change. ``breaks`` (s): where the record begins anew.
     """
-    layout = Layout(tuple(regressors))
+    layout = SignalLayout(tuple(regressors))
     plan = normal_equations.normal_equations(dict.fromkeys(COEFFICIENTS[: len(left)], tuple(regressors)), layout)
     grid = fourier_transform.lines(*frequencies)
     lines = information.spectrum(grid.omega, np.inf)
@@ -68,7 +68,7 @@ def _parts(time: Array, breaks: Sequence[float]) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(edges)]
 
 
-def _columns(layout: Layout, time: Array, regressors: Mapping[str, Array]) -> Array:
+def _columns(layout: SignalLayout, time: Array, regressors: Mapping[str, Array]) -> Array:
     """(N, W) signals, the left sides still zero; nothing is weighed by the dynamic pressure."""
     columns = np.zeros((time.size, layout.transformed))
     columns[:, OFFSET] = columns[:, OFFSET + 1] = 1.0

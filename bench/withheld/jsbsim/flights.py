@@ -13,7 +13,7 @@ from bench.withheld.plants.pilot import Pilot
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.sim.importing.jsbsim.survey import Survey
+from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
 RATE, LOOK = 400.0, 2  # Hz, and steps between two looks at the motion
@@ -24,7 +24,7 @@ MANOEUVRES = ("3211:repeat=2", "multisine")
 
 
 def write_flights(
-    folder: Path, survey: Survey, aircraft: Aircraft, withheld: Withheld, turbulence: str, seed: int
+    folder: Path, survey: ModelSurvey, aircraft: Aircraft, withheld: Withheld, turbulence: str, seed: int
 ) -> None:
     """Bags ``fitted`` and ``held`` of two flights. Raises DivergedError."""
     for place, name in enumerate(("fitted", "held")):
@@ -36,7 +36,12 @@ def write_flights(
 
 
 def flown(
-    survey: Survey, aircraft: Aircraft, withheld: Withheld, turbulence: str, manoeuvre: str, random: np.random.Generator
+    survey: ModelSurvey,
+    aircraft: Aircraft,
+    withheld: Withheld,
+    turbulence: str,
+    manoeuvre: str,
+    random: np.random.Generator,
 ) -> Log:
     """One flight at ``RATE``. Raises DivergedError."""
     reality = Reality(survey, aircraft, withheld, RATE)

@@ -17,7 +17,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model
 from sysid_node.sim.importing.jsbsim.program import FOOT, POUND, SLUG, Program
 from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS
-from sysid_node.sim.importing.jsbsim.survey import Survey
+from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 from sysid_node.sim.importing.jsbsim.trim import find_trim
 
 #: A withheld effect: by name, its numbers. ``servo``: control, lag (s), delay (s), rate (rad/s), play (rad), bias
@@ -35,7 +35,7 @@ _STATES = {
 }
 
 
-def edited(survey: Survey, folder: Path, withheld: Withheld) -> ModelFiles:
+def edited(survey: ModelSurvey, folder: Path, withheld: Withheld) -> ModelFiles:
     """A copy of the model with what of the effects its XML holds."""
     files = copy_model(survey.files, folder, ())
     tree = ElementTree.parse(files.main)
@@ -120,7 +120,7 @@ class Servo:
 class Reality:
     """The aircraft in flight, at a rate in Hz."""
 
-    def __init__(self, survey: Survey, aircraft: Aircraft, withheld: Withheld, rate: float) -> None:
+    def __init__(self, survey: ModelSurvey, aircraft: Aircraft, withheld: Withheld, rate: float) -> None:
         self._survey, self._withheld, self._rate = survey, withheld, rate
         self.controls = tuple(aircraft.controls)
         with tempfile.TemporaryDirectory() as place:

@@ -20,7 +20,16 @@ from scipy.optimize import least_squares
 
 from bench.withheld.plants.aerodynamics import additions
 from bench.withheld.plants.motion import DivergedError, Effects, Flow, Instant, Triple, flow_angles
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Sensors, Throttle
+from sysid_node.aircraft.model import (
+    Aircraft,
+    Control,
+    Derivative,
+    Geometry,
+    Inertia,
+    ReferenceCondition,
+    Sensors,
+    Throttle,
+)
 
 _FT, _LBF, _SLUG, _INCH = 0.3048, 4.4482216, 14.593903, 0.0254
 _INERTIA = _SLUG * _FT * _FT
@@ -251,7 +260,7 @@ def aircraft() -> Aircraft:
         mass=fdm["inertia/mass-slugs"] * _SLUG,
         inertia=inertia,
         geometry=geometry,
-        reference=Reference(_SPEED, density),
+        reference=ReferenceCondition(_SPEED, density),
         controls={n: Control(n, symbols[n], {n: 1.0}, limit=limits[n]) for n in _SURFACES},
         derivatives={n: Derivative(v, max(_SHARE * abs(v), _LEAST[n[:2]])) for n, v in values.items()},
         throttle=Throttle("throttle", None, 0.0, arm),

@@ -6,13 +6,13 @@ import math
 import warnings
 
 from sysid_node.aircraft.default_tolerances import DEFAULT_NOISE_BIAS
-from sysid_node.aircraft.document import Entry
-from sysid_node.aircraft.model import DEFAULT_NOISE, Geometry, Inertia, Reference, Sensors, Vector3
+from sysid_node.aircraft.document import DocumentEntry
+from sysid_node.aircraft.model import DEFAULT_NOISE, Geometry, Inertia, ReferenceCondition, Sensors, Vector3
 from sysid_node.aircraft.reading.quantities import Quantities, any_number, positive
 from sysid_node.errors import ModelWarning
 
 
-def read_inertia(entry: Entry | None, quantities: Quantities, *, ideal: bool) -> Inertia:
+def read_inertia(entry: DocumentEntry | None, quantities: Quantities, *, ideal: bool) -> Inertia:
     """The inertia. A moment that is left out is NaN (unknown); Ixz is then zero, as in a symmetric aircraft.
 
     Raises InputError; warns instead where an ``ideal`` file's moments are those of no rigid body, because a simulator
@@ -31,7 +31,7 @@ def read_inertia(entry: Entry | None, quantities: Quantities, *, ideal: bool) ->
     return inertia
 
 
-def _check_inertia(entry: Entry, inertia: Inertia, *, ideal: bool) -> None:
+def _check_inertia(entry: DocumentEntry, inertia: Inertia, *, ideal: bool) -> None:
     """Raise an error where no rigid body has these moments. Unknown moments (NaN) are not checked."""
     moments = {"Ixx": inertia.Ixx, "Iyy": inertia.Iyy, "Izz": inertia.Izz}
     for name, moment in moments.items():
@@ -49,7 +49,7 @@ def _check_inertia(entry: Entry, inertia: Inertia, *, ideal: bool) -> None:
         raise entry.error(f"no rigid body has Ixz^2 = {square:g} >= Ixx Izz = {inertia.Ixx * inertia.Izz:g}; check Ixz")
 
 
-def read_geometry(entry: Entry, quantities: Quantities) -> Geometry:
+def read_geometry(entry: DocumentEntry, quantities: Quantities) -> Geometry:
     """The reference area, span and chord. Raises InputError."""
     fields = entry.fields({"S": "the reference area in m^2", "b": "the span in m", "cbar": "the mean chord in m"})
     S, b, cbar = (
@@ -62,22 +62,22 @@ def read_geometry(entry: Entry, quantities: Quantities) -> Geometry:
     return Geometry(S, b, cbar)
 
 
-def read_reference(entry: Entry) -> Reference:
+def read_reference(entry: DocumentEntry) -> ReferenceCondition:
     """The flight condition of the derivatives. Raises InputError."""
     fields = entry.fields({"airspeed": "the true airspeed in m/s", "air_density": "the air density in kg/m^3"})
-    return Reference(
+    return ReferenceCondition(
         airspeed=positive("m/s")(fields["airspeed"]),
         air_density=fields["air_density"].number("an air density (0.001 to 2 kg/m^3)", lambda x: 1e-3 <= x < 2),
     )
 
 
-def read_sensors(entry: Entry | None, quantities: Quantities) -> Sensors:
+def read_sensors(entry: DocumentEntry | None, quantities: Quantities) -> Sensors:
     """The places of the sensors. Raises InputError."""
     fields = entry.fields({}, optional=("imu", "air_data")) if entry is not None else {}
     return Sensors(**{name: _place(item, f"sensors.{name}", quantities) for name, item in fields.items()})
 
 
-def _place(entry: Entry, key: str, quantities: Quantities) -> Vector3:
+def _place(entry: DocumentEntry, key: str, quantities: Quantities) -> Vector3:
     expected = "three numbers [x, y, z] in m from the CG, forward, right, down"
     items = entry.items(expected)
     if len(items) != 3:
@@ -86,17 +86,17 @@ def _place(entry: Entry, key: str, quantities: Quantities) -> Vector3:
     return x, y, z
 
 
-def _sigma(entry: Entry) -> float:
+def _sigma(entry: DocumentEntry) -> float:
     return entry.number("a number, 1 sigma, not negative", lambda x: x >= 0)
 
 
-def read_noise(entry: Entry | None) -> dict[str, float]:
+def read_noise(entry: DocumentEntry | None) -> dict[str, float]:
     """1 sigma of each sensor's noise; the default where it is left out. Raises InputError."""
     fields = entry.fields({}, optional=(*DEFAULT_NOISE, "bias")) if entry is not None else {}
     return {**DEFAULT_NOISE, **{name: _sigma(item) for name, item in fields.items() if name != "bias"}}
 
 
-def read_noise_bias(entry: Entry | None, *, ideal: bool) -> dict[str, float]:
+def read_noise_bias(entry: DocumentEntry | None, *, ideal: bool) -> dict[str, float]:
     """1 sigma of what stays constant in a flight; where it is left out the default, or zero where ``ideal``."""
     bias = entry.mapping("a mapping").get("bias") if entry is not None else None
     fields = bias.fields({}, optional=tuple(DEFAULT_NOISE_BIAS)) if bias is not None else {}

@@ -8,14 +8,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sysid_node.aircraft.document import Entry
+from sysid_node.aircraft.document import DocumentEntry
 from sysid_node.aircraft.model import Control, Throttle
 from sysid_node.aircraft.names import CONTROL_SYMBOLS, RESERVED_SYMBOLS
 from sysid_node.aircraft.reading.quantities import Quantities, ReadNumber, angle, any_number
 from sysid_node.suggestion import did_you_mean
 
 
-def read_controls(entry: Entry, quantities: Quantities) -> tuple[dict[str, Control], Throttle | None]:
+def read_controls(entry: DocumentEntry, quantities: Quantities) -> tuple[dict[str, Control], Throttle | None]:
     """The controls by name, and the throttle. Raises InputError."""
     entries = entry.mapping("a mapping from control to its joints, e.g. elevator: {joint: elevator}")
     throttle = _throttle(entries.pop("throttle"), quantities) if "throttle" in entries else None
@@ -25,7 +25,7 @@ def read_controls(entry: Entry, quantities: Quantities) -> tuple[dict[str, Contr
     return controls, throttle
 
 
-def _control(name: str, entry: Entry, quantities: Quantities) -> Control:
+def _control(name: str, entry: DocumentEntry, quantities: Quantities) -> Control:
     fields = entry.fields({}, optional=("joint", "scale", "joints", "offset", "limit", "full_deflection", "symbol"))
     key = f"controls.{name}"
     return Control(
@@ -38,16 +38,16 @@ def _control(name: str, entry: Entry, quantities: Quantities) -> Control:
     )
 
 
-def _full_deflection(entry: Entry) -> float:
+def _full_deflection(entry: DocumentEntry) -> float:
     expected = "an angle in rad other than zero, at most pi/2 (is it in degrees?)"
     return entry.number(expected, lambda x: 0 < abs(x) <= math.pi / 2)
 
 
-def _limit(entry: Entry) -> float:
+def _limit(entry: DocumentEntry) -> float:
     return entry.number("a positive angle in rad, at most pi/2 (is it in degrees?)", lambda x: 0 < x <= math.pi / 2)
 
 
-def _symbol(name: str, control: Entry, symbol: Entry | None) -> str:
+def _symbol(name: str, control: DocumentEntry, symbol: DocumentEntry | None) -> str:
     standard = CONTROL_SYMBOLS.get(name)
     if symbol is None:
         if standard is None:
@@ -63,11 +63,13 @@ def _symbol(name: str, control: Entry, symbol: Entry | None) -> str:
     return text
 
 
-def _scale(entry: Entry) -> float:
+def _scale(entry: DocumentEntry) -> float:
     return entry.number("a number other than zero (rad of control per rad of joint)", lambda x: x != 0)
 
 
-def _joints(entry: Entry, fields: Mapping[str, Entry], key: str, quantities: Quantities) -> dict[str, float]:
+def _joints(
+    entry: DocumentEntry, fields: Mapping[str, DocumentEntry], key: str, quantities: Quantities
+) -> dict[str, float]:
     """``joint`` with ``scale``, or ``joints`` with a scale each."""
     if ("joint" in fields) == ("joints" in fields):
         raise entry.error("expected either joint: NAME or joints: {NAME: SCALE, ...}")
@@ -84,7 +86,7 @@ def _joints(entry: Entry, fields: Mapping[str, Entry], key: str, quantities: Qua
     return {name: quantities.read(item, f"{key}.joints.{name}", _scale) for name, item in joints.items()}
 
 
-def _check_symbols(entries: Mapping[str, Entry], controls: Mapping[str, Control]) -> None:
+def _check_symbols(entries: Mapping[str, DocumentEntry], controls: Mapping[str, Control]) -> None:
     owner: dict[str, str] = {}
     for name, control in controls.items():
         if control.symbol in owner:
@@ -92,7 +94,9 @@ def _check_symbols(entries: Mapping[str, Entry], controls: Mapping[str, Control]
         owner[control.symbol] = name
 
 
-def _check_joints(entries: Mapping[str, Entry], controls: Mapping[str, Control], throttle: Throttle | None) -> None:
+def _check_joints(
+    entries: Mapping[str, DocumentEntry], controls: Mapping[str, Control], throttle: Throttle | None
+) -> None:
     """Raise an error where the controls are dependent combinations of joints: their derivatives would be collinear."""
     joints = sorted({joint for control in controls.values() for joint in control.joints})
     rows: list[list[float]] = []
@@ -109,11 +113,11 @@ def _check_joints(entries: Mapping[str, Entry], controls: Mapping[str, Control],
             )
 
 
-def _thrust(entry: Entry) -> float:
+def _thrust(entry: DocumentEntry) -> float:
     return entry.number("at least 0.001 (N)", lambda x: x >= 1e-3)
 
 
-def _throttle(entry: Entry, quantities: Quantities) -> Throttle:
+def _throttle(entry: DocumentEntry, quantities: Quantities) -> Throttle:
     meaning = {"joint": "the name of the joint that carries throttle or thrust"}
     fields = entry.fields(meaning, optional=("max_thrust", "unit", "inclination", "arm"))
     if ("max_thrust" in fields) == ("unit" in fields):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sysid_node.aircraft.document import Entry
+from sysid_node.aircraft.document import DocumentEntry
 from sysid_node.aircraft.model import Control, Derivative
 from sysid_node.aircraft.names import COEFFICIENTS, STATE_REGRESSORS, split_derivative
 from sysid_node.suggestion import did_you_mean
 
 
-def read_derivatives(entry: Entry, controls: Mapping[str, Control]) -> dict[str, Derivative]:
+def read_derivatives(entry: DocumentEntry, controls: Mapping[str, Control]) -> dict[str, Derivative]:
     """The derivatives by name. Raises InputError."""
     entries = entry.mapping("a mapping from derivative to {value: , tolerance: }")
     if not entries:
@@ -23,7 +23,7 @@ def read_derivatives(entry: Entry, controls: Mapping[str, Control]) -> dict[str,
     return {name: _derivative(item) for name, item in entries.items()}
 
 
-def _check_derivative_name(name: str, entry: Entry, symbols: set[str]) -> None:
+def _check_derivative_name(name: str, entry: DocumentEntry, symbols: set[str]) -> None:
     regressors = [*STATE_REGRESSORS, *sorted(symbols)]
     try:
         coefficient, regressor = split_derivative(name)
@@ -40,7 +40,7 @@ def _check_derivative_name(name: str, entry: Entry, symbols: set[str]) -> None:
 _SMALLEST = 1e-9
 
 
-def _derivative(entry: Entry) -> Derivative:
+def _derivative(entry: DocumentEntry) -> Derivative:
     fields = entry.fields({"value": "the derivative, per radian"}, optional=("tolerance",))
     value = fields["value"].number("a number (per rad)")
     if "tolerance" not in fields:

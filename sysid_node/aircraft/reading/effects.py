@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sysid_node.aircraft.document import Entry
+from sysid_node.aircraft.document import DocumentEntry
 from sysid_node.aircraft.effect_names import EFFECT_NAMES, EffectNames, EffectParameter
 from sysid_node.aircraft.model import DELAY_EFFECTS, NO_DELAYS, Control, Derivative, Throttle, UncertainValue
 from sysid_node.aircraft.reading.quantities import ReadNumber, uncertain
@@ -13,7 +13,7 @@ from sysid_node.suggestion import did_you_mean
 Effects = dict[str, dict[str, UncertainValue]]
 
 
-def read_delays(entry: Entry | None) -> dict[str, UncertainValue]:
+def read_delays(entry: DocumentEntry | None) -> dict[str, UncertainValue]:
     """How late each topic's stamps are, s. Raises InputError."""
     fields = entry.fields({}, optional=tuple(NO_DELAYS)) if entry is not None else {}
     expected = "a delay in s, at most 0.5 (is it in ms?)"
@@ -22,7 +22,7 @@ def read_delays(entry: Entry | None) -> dict[str, UncertainValue]:
 
 
 def read_effects(
-    entry: Entry | None,
+    entry: DocumentEntry | None,
     controls: Mapping[str, Control],
     throttle: Throttle | None,
     derivatives: Mapping[str, Derivative],
@@ -45,7 +45,9 @@ def read_effects(
     return effects
 
 
-def _parameters(entry: Entry, names: EffectNames, known: Mapping[str, EffectParameter]) -> dict[str, UncertainValue]:
+def _parameters(
+    entry: DocumentEntry, names: EffectNames, known: Mapping[str, EffectParameter]
+) -> dict[str, UncertainValue]:
     """The parameters of one effect."""
     shared = names.each[0] if names.each else next(iter(known.values())) if len(known) == 1 else None
     everyone = [key for key in known if key not in {p.name for p in names.fixed}] if names.each else list(known)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sysid_node.aircraft.document import Entry
+from sysid_node.aircraft.document import DocumentEntry
 from sysid_node.aircraft.model import UncertainValue
 
 #: Reads and checks the plain number of an entry.
-ReadNumber = Callable[[Entry], float]
+ReadNumber = Callable[[DocumentEntry], float]
 
 
 class Quantities:
@@ -18,7 +18,7 @@ class Quantities:
     def __init__(self) -> None:
         self.stated: dict[str, float] = {}
 
-    def read(self, entry: Entry, key: str, number: ReadNumber) -> float:
+    def read(self, entry: DocumentEntry, key: str, number: ReadNumber) -> float:
         """The number of an entry; its tolerance, if there is one, is stored under ``key``."""
         found = uncertain(entry, number)
         if found.tolerance is not None:
@@ -26,7 +26,7 @@ class Quantities:
         return found.value
 
 
-def uncertain(entry: Entry, number: ReadNumber) -> UncertainValue:
+def uncertain(entry: DocumentEntry, number: ReadNumber) -> UncertainValue:
     """The value of an entry, with its tolerance where it is given. Raises InputError."""
     if not entry.is_mapping:
         return UncertainValue(number(entry))
@@ -51,6 +51,6 @@ def any_number(unit: str) -> ReadNumber:
     return lambda entry: entry.number(f"a number ({unit})")
 
 
-def angle(entry: Entry) -> float:
+def angle(entry: DocumentEntry) -> float:
     """An angle in rad between -pi/2 and pi/2."""
     return entry.number("an angle in rad, at most pi/2 (is it in degrees?)", lambda x: abs(x) <= math.pi / 2)

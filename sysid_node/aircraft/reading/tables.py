@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from sysid_node.aircraft.document import Entry
-from sysid_node.aircraft.model import Control, Table
+from sysid_node.aircraft.document import DocumentEntry
+from sysid_node.aircraft.model import Control, LookupTable
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.suggestion import did_you_mean
 
@@ -23,7 +23,7 @@ TABLE_VARIABLES = {
 }
 
 
-def read_tables(entry: Entry | None, controls: Mapping[str, Control]) -> tuple[Table, ...]:
+def read_tables(entry: DocumentEntry | None, controls: Mapping[str, Control]) -> tuple[LookupTable, ...]:
     """The tables in the file's order. Raises InputError."""
     if entry is None:
         return ()
@@ -32,7 +32,7 @@ def read_tables(entry: Entry | None, controls: Mapping[str, Control]) -> tuple[T
     return tuple(_table(item, variables) for item in entry.items(example))
 
 
-def _table(entry: Entry, variables: Mapping[str, str]) -> Table:
+def _table(entry: DocumentEntry, variables: Mapping[str, str]) -> LookupTable:
     meanings = {
         "coefficient": f"one of {', '.join(COEFFICIENTS)}",
         "over": "the variables that it depends on, e.g. [alpha]",
@@ -47,10 +47,10 @@ def _table(entry: Entry, variables: Mapping[str, str]) -> Table:
             f"got {coefficient!r}, expected {meanings['coefficient']}{did_you_mean(coefficient, COEFFICIENTS)}"
         )
     points = tuple(_points(fields[name], name, variables[name]) for name in over)
-    return Table(coefficient, over, points, _values(fields["values"], over, points))
+    return LookupTable(coefficient, over, points, _values(fields["values"], over, points))
 
 
-def _over(entry: Entry, variables: Mapping[str, str]) -> tuple[str, ...]:
+def _over(entry: DocumentEntry, variables: Mapping[str, str]) -> tuple[str, ...]:
     expected = f"a list of one or two of {', '.join(variables)}"
     items = entry.items(expected)
     names = tuple(item.text("a variable's name") for item in items)
@@ -62,7 +62,7 @@ def _over(entry: Entry, variables: Mapping[str, str]) -> tuple[str, ...]:
     return names
 
 
-def _points(entry: Entry, name: str, unit: str) -> tuple[float, ...]:
+def _points(entry: DocumentEntry, name: str, unit: str) -> tuple[float, ...]:
     points = tuple(item.number(f"a number ({unit})") for item in entry.items(f"the points of {name} ({unit})"))
     if len(points) < 2:
         raise entry.error(f"got {len(points)} points, expected at least two")
@@ -75,7 +75,7 @@ def _points(entry: Entry, name: str, unit: str) -> tuple[float, ...]:
 
 
 def _values(
-    entry: Entry, over: Sequence[str], points: Sequence[Sequence[float]]
+    entry: DocumentEntry, over: Sequence[str], points: Sequence[Sequence[float]]
 ) -> tuple[float, ...] | tuple[tuple[float, ...], ...]:
     if len(over) == 1:
         return _row(entry, over[0], len(points[0]))
@@ -85,7 +85,7 @@ def _values(
     return tuple(_row(row, over[1], len(points[1])) for row in rows)
 
 
-def _row(entry: Entry, name: str, count: int) -> tuple[float, ...]:
+def _row(entry: DocumentEntry, name: str, count: int) -> tuple[float, ...]:
     items = entry.items(f"a list of {count} numbers, one for each point of {name}")
     if len(items) != count:
         raise entry.error(f"got {len(items)} values, expected {count}, one for each point of {name}")

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
-from sysid_node.batch.models.model import Parameter, Scalars
+from sysid_node.batch.models.model import ModelParameter, Scalars
 from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
 from sysid_node.dynamics.tables import mach_number
 
@@ -18,10 +18,12 @@ Signals = Mapping[str, jax.Array]
 Coefficients = Callable[[Signals, Scalars], dict[str, jax.Array]]
 
 
-def derivative_parameters(aircraft: Aircraft, coefficients: Sequence[str], use_prior: bool) -> tuple[Parameter, ...]:
+def derivative_parameters(
+    aircraft: Aircraft, coefficients: Sequence[str], use_prior: bool
+) -> tuple[ModelParameter, ...]:
     """The derivatives of these coefficients as parameters that start at the aircraft file's values."""
     return tuple(
-        Parameter(name, d.value, prior=(d.value, d.tolerance) if use_prior and d.tolerance is not None else None)
+        ModelParameter(name, d.value, prior=(d.value, d.tolerance) if use_prior and d.tolerance is not None else None)
         for name, d in aircraft.derivatives.items()
         if split_derivative(name)[0] in coefficients
     )

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.models.model import Parameter
+from sysid_node.batch.models.model import ModelParameter
 from sysid_node.dynamics.airflow import speed_of, velocity_of
 
 Signals = Mapping[str, jax.Array]
@@ -42,9 +42,9 @@ def gust_states(states: Sequence[str]) -> tuple[str, ...]:
     return tuple(gust for state in states for gust in GUSTS.get(state, ()))
 
 
-def gust_parameters(states: Sequence[str]) -> tuple[Parameter, ...]:
+def gust_parameters(states: Sequence[str]) -> tuple[ModelParameter, ...]:
     """The parameters of the air's rotation: 1 as in frozen turbulence, 0 none; not derivatives of the aircraft."""
-    return tuple(Parameter(name, 1.0, prior=(1.0, 1.0)) for state, name in _ROTATION.items() if state in states)
+    return tuple(ModelParameter(name, 1.0, prior=(1.0, 1.0)) for state, name in _ROTATION.items() if state in states)
 
 
 def air_relative(s: Signals, span: float) -> dict[str, jax.Array]:

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
-from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.batch.models.model import ModelParameter, Scalars, StateSpaceModel
 from sysid_node.dynamics.airflow import wind_axes_rates
 from sysid_node.dynamics.atmosphere import GRAVITY
 
@@ -70,7 +70,7 @@ def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> S
     """
     names = tuple(name for name in SENSOR_ERRORS if name.rpartition("_")[2] in (*_IMU, *outputs))
     parameters = tuple(
-        Parameter(
+        ModelParameter(
             name, 0.0, lower=-0.5 if name.startswith("scale") else float("-inf"), prior=(0.0, SENSOR_ERRORS[name])
         )
         for name in names

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 
-from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.batch.models.model import ModelParameter, Scalars, StateSpaceModel
 
 _REGRESSORS = ("p", "r", "da", "dr", "beta")
 _UNITS = {"L": "1/s", "N": "1/s", "Y": "m/s"}
@@ -26,7 +26,7 @@ def lateral_rates(start: Mapping[str, float]) -> StateSpaceModel:
     """
     names = [f"{axis}_{regressor}" for axis in "LNY" for regressor in _REGRESSORS]
     names += ["L_0", "N_0", *(f"bias_{output}" for output in ("pdot", "rdot", "ay", "p", "r"))]
-    parameters = tuple(Parameter(name, start.get(name, 0.0), unit=_UNITS.get(name[0], "")) for name in names)
+    parameters = tuple(ModelParameter(name, start.get(name, 0.0), unit=_UNITS.get(name[0], "")) for name in names)
 
     def acceleration(axis: int, x: Scalars, u: Scalars, theta: Scalars) -> jax.Array:
         slopes = theta[5 * axis : 5 * axis + 5]

@@ -28,7 +28,7 @@ class ModelEquations(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ModelParameter:
     """One parameter of a model: its start value, its bounds, and what is known of it beforehand.
 
     ``prior`` is a value known from elsewhere and its 1-sigma uncertainty (None: nothing is known); ``fixed`` keeps the
@@ -72,7 +72,7 @@ class StateSpaceModel:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ModelParameter, ...]
     derivative: EquationFunction
     output: EquationFunction
     units: dict[str, str] = field(default_factory=dict)  # of states and outputs, for tables
@@ -120,7 +120,7 @@ class StateSpaceModel:
         if unknown:
             raise InputError(f"model {self.name} has no parameter {', '.join(unknown)}; it has {', '.join(self.names)}")
 
-        def moved(parameter: Parameter) -> Parameter:
+        def moved(parameter: ModelParameter) -> ModelParameter:
             if parameter.name not in values:
                 return parameter
             return replace(parameter, start=float(np.clip(values[parameter.name], parameter.lower, parameter.upper)))

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.models.model import Parameter, Scalars, StateSpaceModel
+from sysid_node.batch.models.model import ModelParameter, Scalars, StateSpaceModel
 from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import GRAVITY
 
@@ -35,7 +35,7 @@ def short_period(aircraft: Aircraft, start: Mapping[str, float], alpha0: float, 
         states=("alpha", "q"),
         inputs=INPUTS,
         outputs=("alpha", "q", "az"),
-        parameters=tuple(Parameter(name, start.get(name, 0.0)) for name in PARAMETERS),
+        parameters=tuple(ModelParameter(name, start.get(name, 0.0)) for name in PARAMETERS),
         derivative=motion.derivative,
         output=motion.output,
         units={"alpha": "rad", "q": "rad/s", "az": "m/s^2"},

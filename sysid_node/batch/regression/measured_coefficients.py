@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft, Table
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.batch.regression.filtering import differentiate
 from sysid_node.dynamics import scalar
 from sysid_node.dynamics.airflow import speed_of
@@ -235,7 +235,7 @@ def _moments(
     return {name: value for name, value in moments.items() if not math.isnan(about[name])}, unknown
 
 
-def _tables(aircraft: Aircraft) -> list[Table]:
+def _tables(aircraft: Aircraft) -> list[LookupTable]:
     """The tables of those coefficients that the aircraft's model has derivatives of."""
     return [table for table in aircraft.tables if table.coefficient in aircraft.model_structure]
 

@@ -12,8 +12,8 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.atmosphere import dynamic_pressure
 from sysid_node.dynamics.handbook.equations import Equations
 from sysid_node.dynamics.handbook.modes import Mode, modes
-from sysid_node.dynamics.handbook.performance import Performance, Polar, performance, polar
-from sysid_node.dynamics.handbook.trim import Trim, level_trim
+from sysid_node.dynamics.handbook.performance import Performance, TrimmedPolar, performance, polar
+from sysid_node.dynamics.handbook.trim import LevelTrim, level_trim
 from sysid_node.dynamics.handbook.unusual import Finding, findings
 from sysid_node.errors import InputError
 
@@ -33,13 +33,13 @@ class Handbook:
     """An aircraft file in a handbook's terms."""
 
     aircraft: Aircraft
-    trim: Trim  # at the reference airspeed
-    trims: tuple[Trim, ...]  # over airspeed
+    trim: LevelTrim  # at the reference airspeed
+    trims: tuple[LevelTrim, ...]  # over airspeed
     slopes: Mapping[str, float]  # derivatives at that trim, tables and stall included
     static_margin: float  # share of the mean chord
     static_margin_error: float  # 1 sigma from the file's tolerances
     modes: tuple[Mode, ...]
-    polar: Polar
+    polar: TrimmedPolar
     performance: Performance
     power: ControlPower
     findings: tuple[Finding, ...]
@@ -74,7 +74,7 @@ def handbook(aircraft: Aircraft) -> Handbook:
     )
 
 
-def slopes_at(equations: Equations, trim: Trim) -> dict[str, float]:
+def slopes_at(equations: Equations, trim: LevelTrim) -> dict[str, float]:
     """Every derivative by name (``Cm_alpha``) at level flight, by central differences, tables and stall included."""
     symbols = equations.aircraft.control_symbols
     at = {"V": trim.airspeed, "alpha": trim.alpha, **dict.fromkeys(("beta", "p", "q", "r", *symbols), 0.0)}
@@ -89,7 +89,7 @@ def slopes_at(equations: Equations, trim: Trim) -> dict[str, float]:
     return slopes
 
 
-def _trims(equations: Equations, performed: Performance) -> tuple[Trim, ...]:
+def _trims(equations: Equations, performed: Performance) -> tuple[LevelTrim, ...]:
     """Level flight from just above the stall to 1.6 times the reference airspeed."""
     reference = equations.aircraft.reference.airspeed
     slow = performed.stall_speed if math.isfinite(performed.stall_speed) else 0.7 * reference

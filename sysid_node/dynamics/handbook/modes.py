@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.dynamics.handbook.equations import STATES, Array, Equations
-from sysid_node.dynamics.handbook.trim import Trim, pitch_control
+from sysid_node.dynamics.handbook.trim import LevelTrim, pitch_control
 
 LONGITUDINAL, LATERAL = ("V", "alpha", "q", "theta"), ("beta", "p", "r", "phi")
 
@@ -46,7 +46,7 @@ class Mode:
         return math.log(2.0) / abs(self.eigenvalue.real) if self.eigenvalue.real else math.inf
 
 
-def state_matrix(equations: Equations, trim: Trim) -> Array:
+def state_matrix(equations: Equations, trim: LevelTrim) -> Array:
     """A (8, 8) of d(state)/dt = A state, states ``equations.STATES``, by central differences about level flight."""
     at = np.zeros(len(STATES))
     at[:4] = trim.airspeed, trim.alpha, 0.0, trim.alpha
@@ -61,7 +61,7 @@ def state_matrix(equations: Equations, trim: Trim) -> Array:
     return np.column_stack(columns)
 
 
-def modes(equations: Equations, trim: Trim) -> tuple[Mode, ...]:
+def modes(equations: Equations, trim: LevelTrim) -> tuple[Mode, ...]:
     """The modes about level flight; those that need a moment of inertia that is not known are left out."""
     A, inertia = state_matrix(equations, trim), equations.aircraft.inertia
     found: list[Mode] = []

@@ -16,7 +16,7 @@ ASSUMED_ALPHA = (math.radians(-5.0), math.radians(15.0))
 
 
 @dataclass(frozen=True)
-class Polar:
+class TrimmedPolar:
     """Trimmed lift and drag over the angle of attack (N,), and where the range of angles is from."""
 
     alpha: Array  # rad
@@ -41,14 +41,14 @@ class Performance:
     climb_speed: float
 
 
-def polar(equations: Equations) -> Polar:
+def polar(equations: Equations) -> TrimmedPolar:
     """The trimmed polar over the angles of attack for which the file holds."""
     low, high, source = _alpha_range(equations)
     alpha = np.linspace(low, high, 161)
-    return Polar(alpha, *trimmed_polar(equations, alpha), source)
+    return TrimmedPolar(alpha, *trimmed_polar(equations, alpha), source)
 
 
-def performance(equations: Equations, curve: Polar) -> Performance:
+def performance(equations: Equations, curve: TrimmedPolar) -> Performance:
     """Stall, best glide and climb."""
     best = int(np.argmax(curve.lift))
     largest = float(curve.lift[best])
@@ -86,7 +86,7 @@ def _speed_of(equations: Equations, lift: float) -> float:
     return math.sqrt(2.0 * aircraft.mass * GRAVITY / (equations.density * aircraft.geometry.S * lift))
 
 
-def _best_glide(equations: Equations, curve: Polar) -> tuple[float, float, str]:
+def _best_glide(equations: Equations, curve: TrimmedPolar) -> tuple[float, float, str]:
     """Airspeed (m/s), lift over drag, and a remark."""
     usable = (curve.drag > 0.0) & (curve.lift > 0.0)
     if not usable.any():
@@ -104,7 +104,7 @@ def _best_glide(equations: Equations, curve: Polar) -> tuple[float, float, str]:
     return _speed_of(equations, float(curve.lift[best])), float(ratio[best]), "; ".join(notes)
 
 
-def _best_climb(equations: Equations, curve: Polar, stall: int) -> tuple[float, float]:
+def _best_climb(equations: Equations, curve: TrimmedPolar, stall: int) -> tuple[float, float]:
     """Largest rate of climb (m/s) and its airspeed, with the file's full thrust at every airspeed."""
     aircraft = equations.aircraft
     thrust = aircraft.throttle.max_thrust if aircraft.throttle else None

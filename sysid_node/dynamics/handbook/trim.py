@@ -13,7 +13,7 @@ from sysid_node.dynamics.handbook.equations import Array, Equations
 
 
 @dataclass(frozen=True)
-class Trim:
+class LevelTrim:
     """Level flight at one airspeed (m/s); ``elevator`` is NaN where the file has none that pitches."""
 
     airspeed: float
@@ -24,7 +24,7 @@ class Trim:
     drag: float  # CD
 
 
-def level_trim(equations: Equations, airspeed: float) -> Trim | None:
+def level_trim(equations: Equations, airspeed: float) -> LevelTrim | None:
     """Steady, level flight at an airspeed (m/s), or None where there is none: the forces or Cm do not balance."""
     aircraft, symbol = equations.aircraft, pitch_control(equations)
     inclination, arm = thrust_line(aircraft.throttle)
@@ -45,7 +45,7 @@ def level_trim(equations: Equations, airspeed: float) -> Trim | None:
     alpha, elevator, thrust = (float(value) for value in found.x)
     c = equations.coefficients(V=airspeed, alpha=alpha, **({symbol: elevator} if symbol else {}))
     trimmed = elevator if symbol else float("nan")
-    return Trim(airspeed, alpha, trimmed, thrust * weight, float(c.CL), float(c.CD))
+    return LevelTrim(airspeed, alpha, trimmed, thrust * weight, float(c.CL), float(c.CD))
 
 
 def pitch_control(equations: Equations) -> str:

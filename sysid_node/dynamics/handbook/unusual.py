@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.dynamics.handbook.modes import Mode
-from sysid_node.dynamics.handbook.trim import Trim
+from sysid_node.dynamics.handbook.trim import LevelTrim
 
 ROSKAM = "Roskam (2001), app. B; Beard & McLain (2012), app. E"
 KLEIN = "Klein & Morelli (2006), ch. 3"
@@ -77,7 +77,7 @@ _MODES: tuple[tuple[str, float, float, float, float], ...] = (
 
 
 def findings(
-    aircraft: Aircraft, slopes: Mapping[str, float], trim: Trim, margin: float, modes: Sequence[Mode]
+    aircraft: Aircraft, slopes: Mapping[str, float], trim: LevelTrim, margin: float, modes: Sequence[Mode]
 ) -> tuple[Finding, ...]:
     """Every check that the file allows, the unusual ones first.
 
@@ -101,7 +101,7 @@ def _derivatives(aircraft: Aircraft, slopes: Mapping[str, float]) -> Iterator[Fi
             yield Finding(name, slopes[name], low, high, "1/rad", meaning, source)
 
 
-def _flight(aircraft: Aircraft, trim: Trim, margin: float) -> Iterator[Finding]:
+def _flight(aircraft: Aircraft, trim: LevelTrim, margin: float) -> Iterator[Finding]:
     yield Finding("static margin", 100.0 * margin, 0.0, 50.0, "%", "unstable, or the nose is very heavy", ROSKAM)
     yield Finding(
         "CD in level flight", trim.drag, 0.008, 0.25, "1", "drag too large for gliding flight, or hardly any", CHOICE
@@ -145,7 +145,7 @@ def _body(aircraft: Aircraft) -> Iterator[Finding]:
     yield Finding("Izz over Ixx + Iyy", flat, 0.6, 1.0, "1", "above 1 is impossible; a flat body has 1", KLEIN)
 
 
-def _motions(aircraft: Aircraft, trim: Trim, modes: Sequence[Mode]) -> Iterator[Finding]:
+def _motions(aircraft: Aircraft, trim: LevelTrim, modes: Sequence[Mode]) -> Iterator[Finding]:
     """Modes, made comparable across sizes by the time sqrt(span / g)."""
     by_name, time = {mode.name: mode for mode in modes}, math.sqrt(aircraft.geometry.b / GRAVITY)
     for name, low, high, damped_low, damped_high in _MODES:

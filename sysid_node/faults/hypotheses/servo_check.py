@@ -31,7 +31,7 @@ COMMAND_AGE = 0.15  # s: older commands are not compared
 
 
 @dataclass
-class ServoState:
+class ServoCheckState:
     """The state of the check, for the controls in the aircraft file's order."""
 
     names: tuple[str, ...]
@@ -48,21 +48,21 @@ class ServoState:
     found: dict[str, Fault] = field(default_factory=dict)
 
 
-def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> ServoState:
+def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> ServoCheckState:
     """The state before the first message."""
     limits = np.array([control.limit or LIMIT for control in aircraft.controls.values()])
     never = np.full(limits.size, math.inf)
-    return ServoState(tuple(aircraft.controls), limits, settings, np.full(limits.size, math.nan), never, -never)
+    return ServoCheckState(tuple(aircraft.controls), limits, settings, np.full(limits.size, math.nan), never, -never)
 
 
-def command(state: ServoState, time: float, controls: Sequence[float]) -> None:
+def command(state: ServoCheckState, time: float, controls: Sequence[float]) -> None:
     """Take a command to the controls (rad) at a time (s, by the positions' clock)."""
     if state.pending and time < state.pending[-1][0]:
         state.pending.clear()  # the clock has stepped back
     state.pending.append((time, np.clip(controls, -state.limits, state.limits)))
 
 
-def position(state: ServoState, time: float, controls: Sequence[float]) -> list[Fault]:
+def position(state: ServoCheckState, time: float, controls: Sequence[float]) -> list[Fault]:
     """Take the positions of the controls (rad) at a time (s); returns the present faults.
 
     There are none while the commands of that time are missing, as they may arrive later.
@@ -94,13 +94,13 @@ def position(state: ServoState, time: float, controls: Sequence[float]) -> list[
     return list(state.found.values())
 
 
-def _forget(state: ServoState) -> None:
+def _forget(state: ServoCheckState) -> None:
     state.expected, state.off_since = None, np.full(state.limits.size, math.inf)
     state.recent.clear()
     state.found.clear()
 
 
-def _fault(state: ServoState, i: int, now: float, before: Fault | None) -> Fault:
+def _fault(state: ServoCheckState, i: int, now: float, before: Fault | None) -> Fault:
     """The fault of a control whose position differs from its command."""
     places = np.array([row[i] for _, row in state.recent])
     if np.ptp(places) > STILL:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.frequency import regression_signals as signals
-from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS, Layout, MomentumGain, ScalarSignals
+from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS, MomentumGain, ScalarSignals, SignalLayout
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ class Block(NamedTuple):
 class BlockAverager:
     """The state of the averaging."""
 
-    layout: Layout
+    layout: SignalLayout
     signals: ScalarSignals
     gain: MomentumGain
     area: Array

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.online.frequency import regression_signals
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Terms:
         return int(np.flatnonzero((self.output == output) & (self.column == OFFSET))[0])
 
 
-def terms(aircraft: Aircraft, layout: Layout) -> Terms:
+def terms(aircraft: Aircraft, layout: SignalLayout) -> Terms:
     """The terms of the coefficients whose equations can be formed."""
     unformed = regression_signals.unformed(aircraft)
     known = {c: regressors for c, regressors in aircraft.model_structure.items() if c not in unformed}

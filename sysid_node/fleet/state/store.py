@@ -39,7 +39,7 @@ DONE, REFUSED, LOST = "done", "refused", "lost"
 
 
 @dataclass(frozen=True)
-class Entry:
+class FlightEntry:
     """A flight in the state file: its ``outcome`` where it has one, else the ``reason`` in one line."""
 
     flight: str
@@ -154,13 +154,13 @@ class FleetState:
         with self._errors(), self._connection:
             self._connection.execute(f"REPLACE INTO flights VALUES ({', '.join('?' * len(row))})", row)
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[FlightEntry]:
         """Every flight in the file, one at a time."""
         with self._errors():
             for row in self._connection.execute("SELECT * FROM flights ORDER BY flight"):
                 yield self._entry(row)
 
-    def _entry(self, row: tuple[Any, ...]) -> Entry:
+    def _entry(self, row: tuple[Any, ...]) -> FlightEntry:
         flight, key, status, reason, aircraft, vehicle, date, seconds, names, valid, estimates, *rest = row
         covariance, statistical, gap, report, remarks, took, _ = rest
         when = None if date is None else datetime.datetime.fromisoformat(date)
@@ -180,7 +180,7 @@ class FleetState:
                 valid=np.frombuffer(valid, np.uint8).astype(bool),
             )
         told = tuple(json.loads(remarks))
-        return Entry(flight, key, status, reason, outcome, document, report, told, took)
+        return FlightEntry(flight, key, status, reason, outcome, document, report, told, took)
 
     @contextmanager
     def _errors(self) -> Iterator[None]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.flight.cdr.layout import Definitions, Layout, layout_of
+from sysid_node.flight.cdr.layout import Definitions, MessageLayout, layout_of
 
 #: Layouts that are searched for among the messages of one length. The rest are decoded one by one, each by a layout of
 #: its own: a search for every layout would take a time that grows with the square of their number.
@@ -24,7 +24,7 @@ _MAX_LAYOUTS = 16
 class DecodedMessages:
     """The fields of n messages that share their strings, by dotted path."""
 
-    layout: Layout
+    layout: MessageLayout
     records: NDArray[Any]  # (n,) structured
 
     def numbers(self, path: str) -> NDArray[Any]:

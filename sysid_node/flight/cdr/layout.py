@@ -66,7 +66,7 @@ STRUCT_CODES: Mapping[str, str] = {
 
 
 @dataclass(frozen=True)
-class Layout:
+class MessageLayout:
     """Where a message's numbers lie, by dotted path: ``header.stamp.sec``, ``derivatives.3.value``."""
 
     template: bytes  # the message that the layout was found in
@@ -85,7 +85,7 @@ class Layout:
         return same
 
 
-def layout_of(definitions: Definitions, msgtype: str, raw: bytes, spare: bool = False) -> Layout:
+def layout_of(definitions: Definitions, msgtype: str, raw: bytes, spare: bool = False) -> MessageLayout:
     """The layout of one message. Raises DamageError where it is no whole message of the type.
 
     ``spare``: ignore bytes after the message's end, as a buffer that is larger than the message has.
@@ -103,7 +103,7 @@ def layout_of(definitions: Definitions, msgtype: str, raw: bytes, spare: bool = 
     if len(raw) >= walk.position + 4:
         raise DamageError(f"{msgtype}: {len(raw)} bytes for a message of {walk.position}")
     spec: Any = {"names": walk.names, "formats": walk.formats, "offsets": walk.offsets, "itemsize": len(raw)}
-    return Layout(raw, np.dtype(spec), walk.strings, np.array(walk.fixed, np.intp))
+    return MessageLayout(raw, np.dtype(spec), walk.strings, np.array(walk.fixed, np.intp))
 
 
 @dataclass

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sysid_node.flight.cdr.layout import STRUCT_CODES, Definitions, Layout, layout_of
+from sysid_node.flight.cdr.layout import STRUCT_CODES, Definitions, MessageLayout, layout_of
 
 #: Layouts that are remembered. Messages with more layouts than this are read correctly, but slowly.
 _REMEMBERED = 16
@@ -58,13 +58,13 @@ class MessageReader:
         self._known.appendleft(known)
         return known.numbers.unpack_from(raw), known.texts
 
-    def _learn(self, layout: Layout) -> _KnownLayout:
+    def _learn(self, layout: MessageLayout) -> _KnownLayout:
         numbers = struct.Struct(_struct_format(layout, self._numbers))
         texts = tuple(_text(layout, path) for path in self._strings)
         return _KnownLayout(tuple(_runs(layout)), numbers, texts)
 
 
-def _struct_format(layout: Layout, paths: Sequence[str]) -> str:
+def _struct_format(layout: MessageLayout, paths: Sequence[str]) -> str:
     """The format by which ``struct`` reads the numbers at these paths and skips the bytes between them."""
     assert layout.dtype.fields is not None
     text, position = "", 0
@@ -77,7 +77,7 @@ def _struct_format(layout: Layout, paths: Sequence[str]) -> str:
     return f"{'<' if layout.template[1] else '>'}{text}"
 
 
-def _runs(layout: Layout) -> list[tuple[int, int, bytes]]:
+def _runs(layout: MessageLayout) -> list[tuple[int, int, bytes]]:
     """The bytes that decide the layout, as the fewest contiguous pieces: begin, end, and the bytes between them."""
     fixed = sorted(layout.fixed.tolist())
     breaks = [0, *(i + 1 for i, (a, b) in enumerate(pairwise(fixed)) if b > a + 1), len(fixed)]
@@ -85,5 +85,5 @@ def _runs(layout: Layout) -> list[tuple[int, int, bytes]]:
     return [(begin, end, layout.template[begin:end]) for begin, end in pieces]
 
 
-def _text(layout: Layout, path: str) -> Text:
+def _text(layout: MessageLayout, path: str) -> Text:
     return layout.strings[path] if path in layout.strings else layout.texts(path)

@@ -41,7 +41,7 @@ class Conditions:
 
 
 @dataclass
-class States:
+class ReportedStates:
     """The states that were said: what is one thing or another, and never wrong in itself. ``clock`` never jumps."""
 
     clock: Callable[[], float] = time.monotonic  # s

@@ -37,7 +37,7 @@ def absent(source: str, width: int) -> Signal:
 
 
 @dataclass(frozen=True)
-class Commands:
+class LoggedCommands:
     """Commands to the controls, or the raw outputs from which the aircraft file's ``outputs`` makes joints."""
 
     names: tuple[str, ...]  # one a column of the signal
@@ -54,8 +54,8 @@ class AutopilotLog:
     attitude: Signal  # (N, 4) w x y z, which rotates body axes to north-east-down
     airspeed: Signal  # (N, 1) true airspeed
     density: Signal  # (N, 1)
-    controls: Commands  # fractions of the full command, as in ``streams.COMMAND_FRACTIONS``
-    outputs: Commands  # in the unit of the log: us of pulse, or -1..1
+    controls: LoggedCommands  # fractions of the full command, as in ``streams.COMMAND_FRACTIONS``
+    outputs: LoggedCommands  # in the unit of the log: us of pulse, or -1..1
     vanes: Signal | None = None  # (N, 2) angle of attack, sideslip; None: no vane was logged
     flown: Spans | None = None  # in the air as a fixed wing; None: the log does not say
     remarks: tuple[str, ...] = ()

@@ -12,7 +12,7 @@ import numpy as np
 from sysid_node.flight.align import STEP_BACK_NS
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv
-from sysid_node.flight.logs.autopilot_log import AutopilotLog, Commands, Signal
+from sysid_node.flight.logs.autopilot_log import AutopilotLog, LoggedCommands, Signal
 from sysid_node.flight.logs.content import content_of
 from sysid_node.flight.logs.flown import within
 from sysid_node.flight.logs.log_streams import missing_airspeed, part_remarks
@@ -56,7 +56,7 @@ class SurveyRow:
 
 
 @dataclass(frozen=True)
-class Survey:
+class LogSurvey:
     """What was found in a flight's file."""
 
     name: str
@@ -75,14 +75,14 @@ class _Signals:
 
     imu: Signal
     airspeed: Signal
-    commands: Commands
+    commands: LoggedCommands
     others: Mapping[str, Signal]  # attitude, air density, vanes
     rates: Mapping[str, SampleRate]
     faults: Mapping[str, str]
     in_radians: bool  # the commands are deflections, not fractions of the full command
 
 
-def survey(path: str | Path) -> Survey:
+def survey(path: str | Path) -> LogSurvey:
     """What a flight's file holds. Raises InputError where it cannot be read at all."""
     path = Path(path)
     log = read_autopilot_log(path)
@@ -121,7 +121,7 @@ def _of_streams(streams: Streams) -> _Signals:
     return _Signals(
         Signal(rates[IMU].source, streams.imu.arrival.stamp_ns, streams.imu.values),
         Signal(rates[AIR_DATA].source, air.arrival.stamp_ns, air.values[:, :1]),
-        Commands(joints.names, Signal(rates[ACTUATORS].source, joints.arrival.stamp_ns, joints.positions)),
+        LoggedCommands(joints.names, Signal(rates[ACTUATORS].source, joints.arrival.stamp_ns, joints.positions)),
         others,
         rates,
         {},
@@ -129,7 +129,9 @@ def _of_streams(streams: Streams) -> _Signals:
     )
 
 
-def _surveyed(name: str, kind: str, signals: _Signals, remarks: Sequence[str], remedies: Mapping[str, str]) -> Survey:
+def _surveyed(
+    name: str, kind: str, signals: _Signals, remarks: Sequence[str], remedies: Mapping[str, str]
+) -> LogSurvey:
     needed = {
         IMU: ("IMU", signals.imu),
         AIR_DATA: ("airspeed", signals.airspeed),
@@ -146,7 +148,7 @@ def _surveyed(name: str, kind: str, signals: _Signals, remarks: Sequence[str], r
         rows.append(_row(shown, signal, SampleRate(signal.source, rate_of(signal.stamp_ns), 0.0, ""), missing))
     stamps = signals.imu.stamp_ns
     seconds = float(stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
-    return Survey(
+    return LogSurvey(
         name,
         kind,
         seconds,

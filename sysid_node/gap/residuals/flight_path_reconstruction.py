@@ -26,7 +26,7 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim.effects import air_data_lag, imu_misalignment
 from sysid_node.sim.model.chain import Chain
-from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters
 from sysid_node.sim.signals.time_shift import shift_cubic, slope
 from sysid_node.sim.stations import sensors
@@ -38,7 +38,7 @@ READINGS = ("V", "alpha", "beta", "phi", "theta", "psi")
 _ATTITUDE_MEMORY = 4.0
 
 
-class Motion(NamedTuple):
+class InstrumentReadings(NamedTuple):
     """Readings of the instruments, N samples at a constant rate, at the times of the messages' stamps."""
 
     force: Scalar  # (N, 3) specific force, m/s^2
@@ -77,7 +77,7 @@ class _State(NamedTuple):
     truth: Scalar  # (3,) the flow at the probe
 
 
-def motion_of(record: FlightRecord) -> Motion | None:
+def motion_of(record: FlightRecord) -> InstrumentReadings | None:
     """The readings of a record, angular accelerations included; None without roll and pitch angle.
 
     A heading that was not measured is set to zero: nothing but its own prediction depends on it.
@@ -91,7 +91,7 @@ def motion_of(record: FlightRecord) -> Motion | None:
     def columns(*names: str) -> Scalar:
         return jnp.asarray(np.column_stack([record[name] for name in names]))
 
-    return Motion(
+    return InstrumentReadings(
         columns("ax", "ay", "az"),
         columns("p", "q", "r"),
         columns("p_rate", "q_rate", "r_rate"),
@@ -101,7 +101,12 @@ def motion_of(record: FlightRecord) -> Motion | None:
 
 
 def reconstruct(
-    layout: Layout, model: Model, theta: Parameters, motion: Motion, memory: Scalar | float, step: Scalar
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    theta: Parameters,
+    motion: InstrumentReadings,
+    memory: Scalar | float,
+    step: Scalar,
 ) -> Scalar:
     """Readings (N, 6), columns ``READINGS``, that parameters (P,) predict, each from the samples before it.
 
@@ -121,7 +126,7 @@ def reconstruct(
     return jnp.concatenate([shift_cubic(air, late_air), shift_cubic(attitude, late_imu)], axis=1)
 
 
-def corrected_motion(chain: Chain, motion: Motion) -> Sample:
+def corrected_motion(chain: Chain, motion: InstrumentReadings) -> Sample:
     """The motion (N,) without the sensors' effects of a parameter vector, at the time of the samples."""
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
@@ -139,7 +144,7 @@ class Flow(NamedTuple):
 export.register_namedtuple_serialization(Flow, serialized_name="sysid.Flow")
 
 
-def flow_of(chain: Chain, motion: Motion, memory: Scalar | float) -> Flow:
+def flow_of(chain: Chain, motion: InstrumentReadings, memory: Scalar | float) -> Flow:
     """The flow by the inertial instruments, corrected by the vanes with a time constant ``memory``, s.
 
     Only the vanes show gusts: with a memory of zero they are followed at every sample. In still air their noise would
@@ -188,7 +193,7 @@ def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
     return jnp.stack(flow_rates(velocity, velocity_at(moving, turning, probe), jnp), axis=1)
 
 
-def _inertial(chain: Chain, motion: Motion) -> _Inertial:
+def _inertial(chain: Chain, motion: InstrumentReadings) -> _Inertial:
     """The motion (N,) by gyroscopes, accelerometers and attitude, moved to the CG."""
     effects, late = chain.effects, chain.effects["imu_delay"]["delay"] / chain.step
     force, rates, turning, attitude = (
@@ -202,7 +207,7 @@ def _inertial(chain: Chain, motion: Motion) -> _Inertial:
     return _Inertial(specific_force_from(felt, rates, turning, arm), rates, turning, attitude)
 
 
-def _reading(chain: Chain, motion: Motion) -> Scalar:
+def _reading(chain: Chain, motion: InstrumentReadings) -> Scalar:
     """The flow (N, 3) that the probe would have read with no error but its lag."""
     late = chain.effects["air_data_delay"]["delay"] / chain.step
     return jnp.stack(sensors.flow_from(chain.effects, *shift_cubic(motion.air, -late).T), 1)

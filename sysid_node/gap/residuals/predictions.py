@@ -16,12 +16,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sysid_node.gap.residuals.flight_path_reconstruction import READINGS, Flow, Motion, flow_of, reconstruct
+from sysid_node.gap.residuals.flight_path_reconstruction import READINGS, Flow, InstrumentReadings, flow_of, reconstruct
 from sysid_node.sim import EFFECTS
 from sysid_node.sim.compiled.programs import kept
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.chain import Chain
-from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.model.parameters import Parameters
 from sysid_node.sim.prediction.accelerations import predict_accelerations
 from sysid_node.sim.prediction.coefficients import COEFFICIENTS, coefficients
@@ -53,12 +53,14 @@ class PredictionInputs(NamedTuple):
     """What predictions take from a flight of N samples at a constant rate; series are padded at the end."""
 
     signals: MeasuredSignals
-    motion: Motion | None  # None without attitude
+    motion: InstrumentReadings | None  # None without attitude
     memory: ObserverMemory
     step: Scalar  # s
 
 
-def flow(layout: Layout, model: Model, theta: Parameters, _: Scalar, inputs: PredictionInputs) -> Flow | None:
+def flow(
+    layout: ParameterLayout, model: AircraftNumbers, theta: Parameters, _: Scalar, inputs: PredictionInputs
+) -> Flow | None:
     """The flow by the inertial instruments, which depends on kinematic parameters alone; None without attitude."""
     if inputs.motion is None:
         return None
@@ -68,8 +70,8 @@ def flow(layout: Layout, model: Model, theta: Parameters, _: Scalar, inputs: Pre
 
 @partial(jax.jit, static_argnums=0)  # traced once for all programs that contain it
 def force_coefficients(
-    layout: Layout,
-    model: Model,
+    layout: ParameterLayout,
+    model: AircraftNumbers,
     theta: Parameters,
     acting: Scalar,
     inputs: PredictionInputs,
@@ -86,7 +88,12 @@ def force_coefficients(
 
 @partial(jax.jit, static_argnums=0)
 def instrument_readings(
-    layout: Layout, model: Model, theta: Parameters, _: Scalar, inputs: PredictionInputs, __: Flow | None = None
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    theta: Parameters,
+    _: Scalar,
+    inputs: PredictionInputs,
+    __: Flow | None = None,
 ) -> Channels:
     """Air data and attitude, six series (N,), that parameters (P,) predict; zeros without attitude."""
     if inputs.motion is None:
@@ -95,7 +102,12 @@ def instrument_readings(
 
 
 def all_channels(
-    layout: Layout, model: Model, theta: Parameters, acting: Scalar, inputs: PredictionInputs, _: Flow | None
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    theta: Parameters,
+    acting: Scalar,
+    inputs: PredictionInputs,
+    _: Flow | None,
 ) -> Channels:
     """All twelve channels (N,) that parameters (P,) predict, in the flow that they themselves give."""
     own_flow = flow(layout, model, theta, acting, inputs)
@@ -104,7 +116,7 @@ def all_channels(
 
 
 @kept(2)
-def evaluate(function: Callable[..., _Result], layout: Layout, *arguments: Any) -> _Result:
+def evaluate(function: Callable[..., _Result], layout: ParameterLayout, *arguments: Any) -> _Result:
     """What one of the functions above returns for these arguments."""
     return function(layout, *arguments)
 
@@ -112,8 +124,8 @@ def evaluate(function: Callable[..., _Result], layout: Layout, *arguments: Any) 
 @kept(2)
 def directional_slopes(
     prediction: Prediction,
-    layout: Layout,
-    model: Model,
+    layout: ParameterLayout,
+    model: AircraftNumbers,
     theta: Scalar,
     acting: Scalar,
     directions: Scalar,
@@ -139,7 +151,12 @@ def directional_slopes(
 
 @kept(1)
 def slopes_by_derivative(
-    layout: Layout, model: Model, theta: Scalar, acting: Scalar, inputs: PredictionInputs, known_flow: Flow | None
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    theta: Scalar,
+    acting: Scalar,
+    inputs: PredictionInputs,
+    known_flow: Flow | None,
 ) -> Channels:
     """Derivatives (N, D) of the six coefficients with respect to each derivative of the aircraft file.
 
@@ -160,7 +177,7 @@ _NOT_KINEMATIC = frozenset({"actuator_stamp_delay", "sensor_noise"})
 
 
 @cache
-def kinematic_parameters(layout: Layout) -> list[int]:
+def kinematic_parameters(layout: ParameterLayout) -> list[int]:
     """Entries of the parameter vector that the kinematics depend on: clocks, sensors, and where the sensors are."""
     return [
         i
@@ -170,7 +187,7 @@ def kinematic_parameters(layout: Layout) -> list[int]:
 
 
 @cache
-def free_parameters(prediction: Prediction, layout: Layout) -> list[int]:
+def free_parameters(prediction: Prediction, layout: ParameterLayout) -> list[int]:
     """Entries of the parameter vector by which a prediction is differentiated.
 
     Coefficients in a known flow are differentiated by what does not move the flow, all channels by what does.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft, Table
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
@@ -42,7 +42,7 @@ class Residual(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Curve:
+class TableCurve:
     """A table over one variable: its points, its values, and the variable's name."""
 
     coefficient: str
@@ -51,9 +51,11 @@ class Curve:
     values: Array
 
     @property
-    def table(self) -> Table:
+    def table(self) -> LookupTable:
         """As an aircraft file holds it."""
-        return Table(self.coefficient, (self.variable,), (tuple(self.points.tolist()),), tuple(self.values.tolist()))
+        return LookupTable(
+            self.coefficient, (self.variable,), (tuple(self.points.tolist()),), tuple(self.values.tolist())
+        )
 
 
 def residual_of(models: Sequence[ResidualModel], points: Sequence[Array]) -> Residual:
@@ -67,7 +69,7 @@ def residual_of(models: Sequence[ResidualModel], points: Sequence[Array]) -> Res
     return Residual(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
-def curves(aircraft: Aircraft, fitted: Residual, held_out: Residual) -> list[Curve]:
+def curves(aircraft: Aircraft, fitted: Residual, held_out: Residual) -> list[TableCurve]:
     """The tables that predict flight not fitted clearly better."""
     names = list(aircraft.derivatives)
     return [
@@ -92,13 +94,13 @@ def _of(residual: Residual, place: int) -> _Single:
 
 def _curves_of(
     aircraft: Aircraft, names: Sequence[str], coefficient: str, fitted: _Single, held_out: _Single
-) -> list[Curve]:
+) -> list[TableCurve]:
     """The tables of one coefficient, added one after another."""
     own = [i for i, name in enumerate(names) if split_derivative(name)[0] == coefficient]
     if not own:
         return []
     motion = float(np.var(held_out.measured))
-    chosen: list[Curve] = []
+    chosen: list[TableCurve] = []
     best = _power_after(own, [], fitted, held_out, names)[0]
     for _ in range(_MOST):
         tried = [
@@ -130,19 +132,19 @@ def _series(variable: str, single: _Single, names: Sequence[str]) -> Array | Non
     return None
 
 
-def _empty(coefficient: str, variable: str, series: Array | None) -> Curve | None:
+def _empty(coefficient: str, variable: str, series: Array | None) -> TableCurve | None:
     """A table of zeros over the range of a variable; none where it is not known or does not move."""
     if series is None:
         return None
     low, high = np.percentile(series, _ENDS)
     if not high - low > 1e-3:
         return None
-    return Curve(coefficient, variable, np.linspace(low, high, _POINTS), np.zeros(_POINTS))
+    return TableCurve(coefficient, variable, np.linspace(low, high, _POINTS), np.zeros(_POINTS))
 
 
 def _power_after(
-    own: Sequence[int], tables: Sequence[Curve], fitted: _Single, held_out: _Single, names: Sequence[str]
-) -> tuple[float, list[Curve]]:
+    own: Sequence[int], tables: Sequence[TableCurve], fitted: _Single, held_out: _Single, names: Sequence[str]
+) -> tuple[float, list[TableCurve]]:
     """Mean square that is left of flight held out with tables fitted, and these."""
     A, H = fitted.slopes[:, own], [_hats(c.points, _series(c.variable, fitted, names)) for c in tables]
     regressors = np.hstack([A, *H])

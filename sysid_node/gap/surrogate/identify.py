@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft, Table
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.errors import InputError
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.convergence import converged
@@ -43,7 +43,7 @@ class Surrogate:
     error: SimulatorError  # on simulated flight held out
     room: Mapping[str, float]  # 1 sigma by which a real derivative may plausibly be off the simulator's
     effects: tuple[str, ...]  # found in the simulator beyond the file, by name
-    tables: tuple[Table, ...]  # found in the simulator beyond the file
+    tables: tuple[LookupTable, ...]  # found in the simulator beyond the file
     fitted_seconds: float
     held_out_seconds: float
 

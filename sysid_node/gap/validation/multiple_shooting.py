@@ -20,11 +20,16 @@ from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.dynamics.attitude import quaternion
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array
-from sysid_node.gap.residuals.flight_path_reconstruction import Motion, Sample, corrected_motion, rates_of_change
+from sysid_node.gap.residuals.flight_path_reconstruction import (
+    InstrumentReadings,
+    Sample,
+    corrected_motion,
+    rates_of_change,
+)
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim.flying.rollout import Pilot, StepState, advance, begin
 from sysid_node.sim.model.chain import Chain
-from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.signals.time_shift import shift_cubic
 from sysid_node.sim.stations import command
 
@@ -32,7 +37,7 @@ from sysid_node.sim.stations import command
 class Course(NamedTuple):
     """A flight to be simulated, N samples at a constant rate."""
 
-    motion: Motion
+    motion: InstrumentReadings
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
     altitude: Scalar  # (N,) m, at which the standard air has the density that was measured
     moving: Scalar  # (N, 3) velocity of the air that is added to what the air data show, m/s
@@ -64,7 +69,7 @@ class Readings(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def fly(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Readings:
+def fly(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, course: Course, step: Scalar) -> Readings:
     """The readings with parameters (P,) beside a flight; a pure function of arrays, compiled."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
     samples = corrected_motion(chain, course.motion)
@@ -124,7 +129,7 @@ def _air(samples: Sample, begins: Scalar, step: Scalar) -> Scalar:
     return jnp.asarray(inertial - shown)
 
 
-def _measured(chain: Chain, motion: Motion) -> Scalar:
+def _measured(chain: Chain, motion: InstrumentReadings) -> Scalar:
     """Readings (N, 12) as recorded, moved to when the parameters say that they were taken."""
     late = [chain.effects[name]["delay"] / chain.step for name in ("imu_delay", "air_data_delay")]
     inertial = shift_cubic(jnp.concatenate([motion.force, motion.rates, motion.attitude], axis=1), -late[0])
@@ -164,7 +169,9 @@ class Beginnings(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def _beginnings(layout: Layout, model: Model, theta: Scalar, course: Course, step: Scalar) -> Beginnings:
+def _beginnings(
+    layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, course: Course, step: Scalar
+) -> Beginnings:
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
     samples = corrected_motion(chain, course.motion)
     arriving = command.arrive(layout, chain.effects, course.commands, step)

@@ -16,7 +16,7 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.flightdata.gap_flight import resampled
-from sysid_node.gap.residuals.flight_path_reconstruction import Motion
+from sysid_node.gap.residuals.flight_path_reconstruction import InstrumentReadings
 from sysid_node.gap.residuals.predictions import kinematic_parameters
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.residuals.sensor_noise import with_added_noise
@@ -115,7 +115,9 @@ def _recorded(model: ResidualModel, course: Course, readings: Array, noise: dict
     short = course.altitude.size - len(readings)
     parts = [*np.split(readings, (3, 6, 9), axis=1), turning]
     force, rates, attitude, air, turned = (jnp.pad(jnp.asarray(p), ((0, short), (0, 0)), mode="edge") for p in parts)
-    return course._replace(motion=Motion(force, rates, turned, air, attitude), commands=jnp.asarray(commands))
+    return course._replace(
+        motion=InstrumentReadings(force, rates, turned, air, attitude), commands=jnp.asarray(commands)
+    )
 
 
 def _rates_of_change(rates: Array, begins: Array, step: float) -> Array:

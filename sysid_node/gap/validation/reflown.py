@@ -33,14 +33,14 @@ from sysid_node.gap.validation.simulation_error import (
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.sim.effects import EFFECTS
 from sysid_node.sim.model.chain import Chain
-from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.stations import sensors
 
 #: Stations of the flight's instruments; the air of a flight is none of a simulator's either.
 INSTRUMENTS = ("sensors", "clock")
 
 
-class Motion(Protocol):
+class CentreOfGravityMotion(Protocol):
     """The motion at the centre of gravity, N samples, in body axes forward-right-down."""
 
     @property
@@ -67,7 +67,7 @@ class Motion(Protocol):
 class Flyer(Protocol):
     """A simulator with one model."""
 
-    def fly_short(self, begins: Array, body: Array, commands: Array, air: Array, rate: float) -> Motion:
+    def fly_short(self, begins: Array, body: Array, commands: Array, air: Array, rate: float) -> CentreOfGravityMotion:
         """Short flights from states (N, 13), with commands (N, controls + 1) and air (N, 3) m/s, at a rate, Hz."""
 
 
@@ -140,7 +140,7 @@ def _flown(model: ResidualModel, flyer: Flyer, theta: Array, known: Beginnings, 
 
 @partial(jax.jit, static_argnums=0)
 def _read(
-    layout: Layout, model: Model, theta: Scalar, shown: _Shown, begins: Scalar, step: Scalar
+    layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, shown: _Shown, begins: Scalar, step: Scalar
 ) -> tuple[Scalar, Scalar]:
     """Readings of the inertial instruments (N, 6) and of the air data (N, 3)."""
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))

@@ -26,7 +26,7 @@ REGIMES = {"alpha": "rad", "beta": "rad", "V": "m/s", "thrust": "N", "p": "rad/s
 
 
 @dataclass(frozen=True)
-class Shape:
+class BinnedCoefficient:
     """The missing coefficient, in bins of the signal that explains most of it."""
 
     axis: str
@@ -131,7 +131,7 @@ def regime_of(model: ResidualModel, by_window: Array, thresholds: Thresholds = T
     return found
 
 
-def missing(attribution: Attribution) -> Shape | None:
+def missing(attribution: Attribution) -> BinnedCoefficient | None:
     """The shape of the coefficient that is missing most: what derivatives and biases leave of it, structured.
 
     None where nothing that they leave is structured.
@@ -158,7 +158,7 @@ def _moving_signals(model: ResidualModel) -> dict[str, str]:
     return {n: u for n, u in {**REGIMES, **controls}.items() if n in model.record.columns and model.record[n].std() > 0}
 
 
-def binned_shape(axis: str, signal: str, unit: str, values: Array, remainder: Array, rate: float) -> Shape:
+def binned_shape(axis: str, signal: str, unit: str, values: Array, remainder: Array, rate: float) -> BinnedCoefficient:
     """A remainder (N,) in bins of a signal's values (N,) at a rate (Hz), without the extremes of the signal.
 
     Neighbouring samples are not independent: the remainder is taken to keep its sign for a quarter of a second.
@@ -175,4 +175,6 @@ def binned_shape(axis: str, signal: str, unit: str, values: Array, remainder: Ar
     between = float(np.sum(counts[full] * (means[full] - kept.mean()) ** 2) / within)
     centres = 0.5 * (edges[1:] + edges[:-1])
     independent = np.maximum(counts * 4.0 / rate, 1.0)
-    return Shape(axis, signal, unit, centres[full], means[full], (spread / np.sqrt(independent))[full], between)
+    return BinnedCoefficient(
+        axis, signal, unit, centres[full], means[full], (spread / np.sqrt(independent))[full], between
+    )

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.least_squares import Solution
 from sysid_node.online.regression.normal_equations import NormalEquations
@@ -21,7 +21,7 @@ def reconstruction_covariance(
     filter_: FlowAngleFilter,
     at: float,
     aircraft: Aircraft,
-    layout: Layout,
+    layout: SignalLayout,
     lines: Spectrum,
     equations: NormalEquations,
     solution: Solution,
@@ -47,7 +47,7 @@ def reconstruction_covariance(
 
 
 def _error_energies(
-    filter_: FlowAngleFilter, at: float, aircraft: Aircraft, layout: Layout, lines: Spectrum, info: Information
+    filter_: FlowAngleFilter, at: float, aircraft: Aircraft, layout: SignalLayout, lines: Spectrum, info: Information
 ) -> list[float]:
     """Energies over the lines of the errors of alpha and beta that the file's errors make.
 
@@ -69,7 +69,7 @@ def _error_energies(
     return energies
 
 
-def _angle_errors(aircraft: Aircraft, layout: Layout, coefficient: str, angle: str) -> Array:
+def _angle_errors(aircraft: Aircraft, layout: SignalLayout, coefficient: str, angle: str) -> Array:
     """(W,) error of the reference angle per unit of each signal; that of the offset stands at its regressor k."""
     error, slope = np.zeros(layout.width), aircraft.derivatives[f"{coefficient}_{angle}"].value
     for name, derivative in aircraft.derivatives.items():

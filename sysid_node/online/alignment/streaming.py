@@ -34,7 +34,7 @@ from sysid_node.flight.checks import (
     imu_fault,
     is_nan,
 )
-from sysid_node.flight.commanded import Commands, commands_of, deflections, follows, take_command
+from sysid_node.flight.commanded import RecordedCommands, commands_of, deflections, follows, take_command
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 FOLLOWS_NS = 1_000_000_000  # a message this soon after a leap of the stamps confirms it
@@ -143,7 +143,7 @@ class AlignmentState:
     actuators: _Neighbours = field(default_factory=lambda: _Neighbours(ACTUATORS))
     since: int = 0  # of the last IMU message
     bases: deque[_Base] = field(default_factory=lambda: deque(maxlen=16))  # of the last epochs
-    commands: Commands | None = None  # None: the topic carries positions
+    commands: RecordedCommands | None = None  # None: the topic carries positions
     commands_from: float = math.inf  # s: time of the first sample whose deflections follow from commands
     joints: tuple[Sequence[str], tuple[int, ...]] = ((), ())  # the last message's names, and our joints among them
     accepted: dict[str, int] = field(default_factory=lambda: dict.fromkeys((IMU, AIR_DATA, ACTUATORS), 0))
@@ -222,7 +222,11 @@ def stamp_of(state: AlignmentState, time: float) -> int:
 
 
 def _on_neighbour(
-    state: AlignmentState, topic: _Neighbours, stamp: int, values: Values | str, commands: Commands | None = None
+    state: AlignmentState,
+    topic: _Neighbours,
+    stamp: int,
+    values: Values | str,
+    commands: RecordedCommands | None = None,
 ) -> list[AlignedSample]:
     """Takes a message of a topic with neighbours, or the reason why not; ``commands`` are told of it."""
     fault = values if isinstance(values, str) else topic.clock.fault(stamp)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.changes.excited_segments import ExcitedSegments, estimates_of
-from sysid_node.online.changes.score_test import Reference, ScoreTest, disagreement, score_test
+from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, disagreement, score_test
 from sysid_node.online.regression.information import Spectrum, clean_lines
 from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.normal_equations import NormalEquations
@@ -52,7 +52,7 @@ class ChangeMonitor:
     """The last pieces of the transform, the estimates that belong to their starts, and what was found of the spans."""
 
     pieces: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=SPANS[-1]))  # start, (2F+1, W)
-    references: deque[Reference] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))
+    references: deque[ReferenceEstimates] = field(default_factory=lambda: deque(maxlen=SPANS[-1] + 1))
     typical_statistic: deque[Array] = field(
         default_factory=lambda: deque(maxlen=SPANS[-1] + 1)
     )  # (C,) F where nothing changes
@@ -99,7 +99,7 @@ class _Stretch(NamedTuple):
     start: float  # s
     end: float
     part: Array  # (2F + 1, W) transform
-    before: Reference
+    before: ReferenceEstimates
 
 
 def _summed(pieces: Sequence[tuple[float, Array]], span: int) -> Array:
@@ -124,7 +124,7 @@ def _tested(stretches: Sequence[_Stretch], model: InstrumentModel | None, spectr
     for _, some in groupby(stretches, key=lambda stretch: id(stretch.before.equations)):
         starts, ends, parts, references = zip(*some, strict=True)
         lines, duration = clean_lines(np.array(parts), model), np.array(ends) - np.array(starts)
-        yield from score_test(Reference.stacked(references), lines, spectrum, duration).each()
+        yield from score_test(ReferenceEstimates.stacked(references), lines, spectrum, duration).each()
 
 
 def _due(look: int) -> list[int]:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.changes.score_test import Reference
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.changes.score_test import ReferenceEstimates
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.information import Information
 from sysid_node.online.regression.normal_equations import NormalEquations
@@ -28,7 +28,7 @@ KEPT = 12  # segments remembered
 
 
 @dataclass(frozen=True)
-class Segment:
+class ExcitedSegment:
     """One finished segment."""
 
     end: float  # s
@@ -41,7 +41,7 @@ class ExcitedSegments:
     """Of one block of equations: the last segments in which any of its controls moved much."""
 
     controls: NDArray[np.intp]  # columns of the block's controls
-    segments: deque[Segment] = field(default_factory=lambda: deque(maxlen=KEPT))
+    segments: deque[ExcitedSegment] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def peaks(self) -> Array:
         """(m,) the largest energy of each control in a segment."""
@@ -56,7 +56,7 @@ class ExcitedSegments:
         return bool((COMPARABLE * energy > self.peaks()).any())
 
 
-def no_excited_segments(equations: NormalEquations, layout: Layout) -> list[ExcitedSegments]:
+def no_excited_segments(equations: NormalEquations, layout: SignalLayout) -> list[ExcitedSegments]:
     """An empty collection for each block of the normal equations."""
     blocks = (equations.columns[equations.group == block] for block in range(int(equations.group.max()) + 1))
     moved = np.arange(layout.width)[layout.deflections]
@@ -69,10 +69,12 @@ def remember(known: Sequence[ExcitedSegments], information: Information, end: fl
     for excited in known:
         energy = energies[excited.controls]
         if excited.is_comparable(energy):
-            excited.segments.append(Segment(end, energy, information))
+            excited.segments.append(ExcitedSegment(end, energy, information))
 
 
-def estimates_of(excited: ExcitedSegments, full: NormalEquations, since: float, before: float) -> Reference | None:
+def estimates_of(
+    excited: ExcitedSegments, full: NormalEquations, since: float, before: float
+) -> ReferenceEstimates | None:
     """The estimates by the well-excited segments that ended in ``since``..``before`` (s); None where there are none."""
     chosen = [s for s in excited.segments if since < s.end <= before + 1e-6 and excited.is_comparable(s.energy)]
     if not chosen:
@@ -84,4 +86,6 @@ def estimates_of(excited: ExcitedSegments, full: NormalEquations, since: float, 
     instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), information)
     equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
     solution = least_squares.solve(equations, gram)
-    return Reference(chosen[-1].end, equations, solution, least_squares.uncertainty(equations, solution, information))
+    return ReferenceEstimates(
+        chosen[-1].end, equations, solution, least_squares.uncertainty(equations, solution, information)
+    )

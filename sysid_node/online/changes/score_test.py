@@ -38,7 +38,7 @@ NUISANCES = 3  # lines that offset, constant and drift take up
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceEstimates:
     """The estimates as they stood at one time (s), and by which equations."""
 
     time: float
@@ -47,7 +47,7 @@ class Reference:
     uncertainty: Uncertainty
 
     @classmethod
-    def stacked(cls, some: Sequence[Reference]) -> Reference:
+    def stacked(cls, some: Sequence[ReferenceEstimates]) -> ReferenceEstimates:
         """Estimates by the same equations with an axis in front."""
         solution = Solution(*_columns([one.solution for one in some]))
         return cls(some[0].time, some[0].equations, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
@@ -79,7 +79,7 @@ class ScoreTest:
             yield ScoreTest(some[0], self.count, *some[1:])
 
 
-def score_test(reference: Reference, lines: Array, spectrum: Spectrum, duration: Any) -> ScoreTest:
+def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, duration: Any) -> ScoreTest:
     """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
     equations, known = reference.equations, reference.uncertainty
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
@@ -102,7 +102,9 @@ def score_test(reference: Reference, lines: Array, spectrum: Spectrum, duration:
     return ScoreTest(_normalised(equations, spread, score) / count, count, known.freedom, excess, rest / motion)
 
 
-def _unexplained(equations: NormalEquations, reference: Reference, regressed: Array, left_over: Array) -> Array:
+def _unexplained(
+    equations: NormalEquations, reference: ReferenceEstimates, regressed: Array, left_over: Array
+) -> Array:
     """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
     misfit: Array = left_over.take(equations.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
     score = left_over.take(equations.columns, axis=-2) * equations.belongs
@@ -137,7 +139,7 @@ def _normalised(equations: NormalEquations, spread: Array, score: Array) -> Arra
     return np.asarray((scaled * np.linalg.solve(correlation, scaled[..., None])[..., 0]).sum(axis=-1))
 
 
-def disagreement(one: Reference, other: Reference) -> Array:
+def disagreement(one: ReferenceEstimates, other: ReferenceEstimates) -> Array:
     """(C,) the chance that the estimates of two stretches differ as much, were they independent and both unbiased."""
     equations = one.equations
     difference = ((one.solution.theta - other.solution.theta) * equations.belongs).T

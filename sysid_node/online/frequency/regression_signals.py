@@ -53,7 +53,7 @@ _CONTROLS = len(SAMPLE_COLUMNS)
 
 
 @dataclass(frozen=True)
-class Layout:
+class SignalLayout:
     """Which column of the signal vector is what: six coefficients, three nuisances, then the regressors."""
 
     regressors: tuple[str, ...]  # controls come last
@@ -99,13 +99,13 @@ class Layout:
         return self.column(f"{regressor} instrument" if regressor in self.instrumented else regressor)
 
 
-def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> Layout:
+def layout(aircraft: Aircraft, instrumented: Sequence[str] = ()) -> SignalLayout:
     """The union of the regressors in the aircraft's model, each once, in the order of the file but controls last."""
     wanted = dict.fromkeys(r for regressors in aircraft.model_structure.values() for r in regressors if r != "0")
     timed = tuple(r for r in wanted if r in aircraft.control_symbols)
     states = tuple(r for r in wanted if r not in timed)
     with_thrust = aircraft.throttle is not None and any(sigma > 0.0 for sigma in aircraft.tolerances.values())
-    return Layout(states + timed, timed, tuple(r for r in states if r in instrumented), with_thrust)
+    return SignalLayout(states + timed, timed, tuple(r for r in states if r in instrumented), with_thrust)
 
 
 def scalar_signals(aircraft: Aircraft) -> ScalarSignals:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.frequency.fourier_transform import Transform
-from sysid_node.online.frequency.regression_signals import OUTPUTS, Layout
+from sysid_node.online.frequency.regression_signals import OUTPUTS, SignalLayout
 
 Array = NDArray[np.float64]
 MOST_WAITING = 2 * fourier_transform.BLOCK  # samples
@@ -26,7 +26,7 @@ MOST_WAITING = 2 * fourier_transform.BLOCK  # samples
 class SampledTransform:
     """The transform of all samples up to some time, and the samples since then. T signals are transformed."""
 
-    layout: Layout
+    layout: SignalLayout
     transform: Transform
     times: list[float] = field(default_factory=list)  # s: the last sample transformed, then those that wait
     rows: list[Sequence[float]] = field(default_factory=list)  # (T,) signals of each
@@ -78,7 +78,7 @@ def transform_waiting(state: SampledTransform) -> None:
     state.times, state.rows, state.gains = times[-1:], state.rows[-1:], []
 
 
-def over_intervals(layout: Layout, steps: Array, rows: Array, gains: Array) -> tuple[Array, Array]:
+def over_intervals(layout: SignalLayout, steps: Array, rows: Array, gains: Array) -> tuple[Array, Array]:
     """Areas and slants (n, T) of the signals ``rows`` (n + 1, T) over ``steps`` (n, 1) s; see ``fourier_transform``.
 
     ``gains`` (n, 6) are added to the coefficients' areas, (n, m) behind them to those of the controls. The area of a

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
 
@@ -45,7 +45,7 @@ class LagTest(NamedTuple):
 
 def examine(
     equations: NormalEquations,
-    layout: Layout,
+    layout: SignalLayout,
     solution: Solution,
     spread: Uncertainty,
     gram: Array,
@@ -83,7 +83,7 @@ def examine(
 
 def _with_rate(
     equations: NormalEquations,
-    layout: Layout,
+    layout: SignalLayout,
     solution: Solution,
     spread: Uncertainty,
     gram: Array,

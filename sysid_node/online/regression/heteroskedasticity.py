@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ class NoiseMoments:
 
 def measure(
     aircraft: Aircraft,
-    layout: Layout,
+    layout: SignalLayout,
     equations: NormalEquations,
     theta: Array,
     rows: Array,

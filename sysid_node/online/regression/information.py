@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.blas import dger
 
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.regression.instruments import InstrumentModel, fill_in
 
@@ -64,7 +64,7 @@ class Information:
         return Information(*(getattr(self, f) * factor for f in self.__dataclass_fields__))
 
 
-def nothing(layout: Layout, lines: int = 0) -> Information:
+def nothing(layout: SignalLayout, lines: int = 0) -> Information:
     """No information at all; ``lines``: how many have cross-spectra."""
     width, T = layout.width, layout.transformed if lines else 0
     zeros = np.zeros((BANDS, width, width))

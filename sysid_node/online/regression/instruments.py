@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft, Inertia
 from sysid_node.dynamics.linear_model import STATES, DimensionalScales, linear_model
 from sysid_node.dynamics.linearised import linear_derivatives
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class InstrumentModel:
     following: Array = field(default_factory=lambda: np.zeros((2, 2, 0, 0)))
 
 
-def instrument_model(aircraft: Aircraft, layout: Layout, omega: Array) -> InstrumentModel | None:
+def instrument_model(aircraft: Aircraft, layout: SignalLayout, omega: Array) -> InstrumentModel | None:
     """Response at omega (F,) rad/s of the ``layout``'s instruments; None where it has none."""
     if not layout.instrumented:
         return None
@@ -52,7 +52,7 @@ def instrument_model(aircraft: Aircraft, layout: Layout, omega: Array) -> Instru
 
 
 def with_servos(
-    model: InstrumentModel | None, layout: Layout, omega: Array, servos: NDArray[np.complex128]
+    model: InstrumentModel | None, layout: SignalLayout, omega: Array, servos: NDArray[np.complex128]
 ) -> InstrumentModel:
     """The model with the controls' response to what is recorded of them, ``servos`` (F, m)."""
     none = np.zeros((omega.size, 0, len(layout.timed)), dtype=complex)
@@ -89,7 +89,7 @@ def _follow(model: InstrumentModel, lines: Array, F: int) -> None:
     parts[..., model.controls.start : model.rates.stop] += more[..., 0, :, :] + more[..., 1, :, :]
 
 
-def _linear(aircraft: Aircraft, layout: Layout) -> tuple[Array, Array, NDArray[np.intp], Array]:
+def _linear(aircraft: Aircraft, layout: SignalLayout) -> tuple[Array, Array, NDArray[np.intp], Array]:
     """x' = A x + B u about trim, x = alpha, q, beta, p, r, phi; rows of x and scales that the instruments are."""
     reference, inertia = aircraft.reference, aircraft.inertia
     Ixx, Iyy, Izz = (m if math.isfinite(m) else math.inf for m in (inertia.Ixx, inertia.Iyy, inertia.Izz))

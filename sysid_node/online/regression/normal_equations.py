@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -66,7 +66,7 @@ class NormalEquations:
         return np.flatnonzero(self.group == self.block[coefficient])
 
 
-def normal_equations(structure: dict[str, tuple[str, ...]], layout: Layout) -> NormalEquations:
+def normal_equations(structure: dict[str, tuple[str, ...]], layout: SignalLayout) -> NormalEquations:
     """Normal equations for a model structure, e.g. ``{"Cm": ("0", "alpha", "q", "de")}``; offsets come after."""
     slopes = {c: tuple(r for r in rs if r != "0") for c, rs in structure.items()}
     blocks = list(dict.fromkeys(slopes.values()))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.least_squares import Solution
 from sysid_node.online.regression.normal_equations import NormalEquations
@@ -30,7 +30,7 @@ _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
 DOUBT = 1.5  # a residual's density is itself uncertain: only beyond this does it contradict the aircraft file
 
 
-def gram_bias(aircraft: Aircraft, layout: Layout, mean: Array, step: float, air_interval: float) -> Array:
+def gram_bias(aircraft: Aircraft, layout: SignalLayout, mean: Array, step: float, air_interval: float) -> Array:
     """(W, W) expected Gram matrix of the noise, per line and second.
 
     ``mean`` (W,) signals' means, ``step`` and ``air_interval`` (s) the sampling intervals of IMU and air data.

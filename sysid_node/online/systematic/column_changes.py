@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.frequency.regression_signals import OFFSET, Layout, momentum_matrix
+from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout, momentum_matrix
 from sysid_node.online.systematic.cross_spectra import ServoColumns
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ class FlightMeans:
         return self.values.get(name, 0.0)
 
 
-def flight_means(layout: Layout, integrals: Array) -> FlightMeans:
+def flight_means(layout: SignalLayout, integrals: Array) -> FlightMeans:
     """Means by the signals' ``integrals`` (W,)."""
     weight, time = float(integrals[OFFSET]), float(integrals[layout.column("1")])
     names = layout.names[: layout.transformed]
@@ -51,7 +51,7 @@ class ColumnChanges:
     """Changes of N signals (``ServoColumns``) with K imperfections, per unit of each."""
 
     aircraft: Aircraft
-    layout: Layout
+    layout: SignalLayout
     columns: ServoColumns
     means: FlightMeans
     count: int

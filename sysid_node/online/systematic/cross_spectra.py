@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression.instruments import InstrumentModel
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class ServoColumns:
     width: int
 
     @classmethod
-    def of(cls, layout: Layout) -> ServoColumns:
+    def of(cls, layout: SignalLayout) -> ServoColumns:
         """Those of a signal vector's ``layout``."""
         T, m, made = layout.transformed, len(layout.timed), len(layout.instrumented)
         return cls(T, slice(T, T + m), slice(T + m, T + m + made), T + m + made)

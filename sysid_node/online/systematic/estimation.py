@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
@@ -64,7 +64,7 @@ class SystematicErrors:
 def systematic_errors(
     imperfect: Imperfections,
     aircraft: Aircraft,
-    layout: Layout,
+    layout: SignalLayout,
     lines: Spectrum,
     model: InstrumentModel | None,
     servos: ServoModel,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.servos import servos_of
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression.information import Information, Spectrum
 from sysid_node.online.regression.instruments import InstrumentModel, with_servos
 from sysid_node.online.systematic import servo_model
@@ -19,7 +19,7 @@ from sysid_node.online.systematic.column_changes import ColumnChanges, flight_me
 from sysid_node.online.systematic.cross_spectra import ServoColumns, band_grams
 from sysid_node.online.systematic.cross_spectra import with_servos as spectra_with_servos
 from sysid_node.online.systematic.servo_model import ServoModel
-from sysid_node.online.systematic.sources import Source, describe, sources
+from sysid_node.online.systematic.sources import ErrorSource, describe, sources
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -33,7 +33,7 @@ SHORTEST = 0.02  # s: the lateness from which on the curvature's tolerance goes 
 class Imperfections:
     """K = S + 2 m imperfections: S sources, and the lateness and the curvature of m servos."""
 
-    sources: tuple[Source, ...]
+    sources: tuple[ErrorSource, ...]
     controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
     timed: Index  # (m,) places of these controls among those of the layout
     applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
@@ -54,7 +54,9 @@ class Imperfections:
         return slice(len(self.sources), len(self.sources) + len(self.controls))
 
 
-def imperfections(aircraft: Aircraft, layout: Layout, *, commanded: bool, positions: bool) -> Imperfections | None:
+def imperfections(
+    aircraft: Aircraft, layout: SignalLayout, *, commanded: bool, positions: bool
+) -> Imperfections | None:
     """Those of an aircraft file; None where it states that all is exact.
 
     ``commanded``: the deflections follow from commands by the file's servos. ``positions``: they are known to be
@@ -93,7 +95,7 @@ _SERVO_EFFECTS = ("actuator_lag", "command_delay")
 
 
 def line_model(
-    exact: InstrumentModel | None, layout: Layout, omega: Array, model: ServoModel, applied: ServoModel
+    exact: InstrumentModel | None, layout: SignalLayout, omega: Array, model: ServoModel, applied: ServoModel
 ) -> InstrumentModel | None:
     """The ``exact`` model of the lines with the controls where the servos have them."""
     if np.array_equal(model.lateness, applied.lateness) and np.array_equal(model.curvature, applied.curvature):
@@ -102,7 +104,7 @@ def line_model(
 
 
 def column_changes(
-    imperfect: Imperfections, aircraft: Aircraft, layout: Layout, integrals: Array
+    imperfect: Imperfections, aircraft: Aircraft, layout: SignalLayout, integrals: Array
 ) -> tuple[ColumnChanges, Array]:
     """What one unit of each imperfection changes, and the means (W,) of the signals."""
     means = flight_means(layout, integrals)
@@ -136,7 +138,7 @@ def remapped(
     info: Information,
     imperfect: Imperfections,
     exact: InstrumentModel | None,
-    layout: Layout,
+    layout: SignalLayout,
     lines: Spectrum,
     servos: tuple[ServoModel, ServoModel],
 ) -> Information:

@@ -22,7 +22,7 @@ _COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 
 
 @dataclass(frozen=True)
-class Source:
+class ErrorSource:
     """One imperfection: its key among the tolerances, and its 1 sigma."""
 
     key: str
@@ -34,28 +34,28 @@ class Source:
         return self.key.rpartition(".")[0] or self.key
 
 
-def sources(aircraft: Aircraft, *, vanes: bool = True) -> tuple[Source, ...]:
+def sources(aircraft: Aircraft, *, vanes: bool = True) -> tuple[ErrorSource, ...]:
     """All imperfections of an aircraft but its servos; without those of the flow angles where no ``vanes`` are."""
     found = []
     for key, sigma in aircraft.tolerances.items():
-        source = Source(key, float(sigma))
+        source = ErrorSource(key, float(sigma))
         change = _change_of(source)
         if sigma > 0.0 and math.isfinite(sigma) and change is not None and (vanes or source.kind not in _FLOW):
             found.append(source)
     bias = aircraft.noise_bias.get("airspeed", 0.0)
     if bias > 0.0 and not (aircraft.ideal and "noise.bias.airspeed" not in aircraft.stated_tolerances):
-        found.append(Source("airspeed_bias", bias))
+        found.append(ErrorSource("airspeed_bias", bias))
     return tuple(found)
 
 
-def describe(changes: ColumnChanges, source: Source) -> None:
+def describe(changes: ColumnChanges, source: ErrorSource) -> None:
     """Put what one unit of a source changes into the ``changes``."""
     change = _change_of(source)
     assert change is not None
     change(changes, source.key.rpartition(".")[2], source.key)
 
 
-def _change_of(source: Source) -> Change | None:
+def _change_of(source: ErrorSource) -> Change | None:
     return CHANGES.get(source.key) or CHANGES.get(source.kind) or (_control(source.key))
 
 

@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from sysid_node.faults.recorded_flight import Episode, FaultVerdict
-from sysid_node.faults.types import Change, Fault
+from sysid_node.faults.types import DerivativeChange, Fault
 
 
 def as_summary(verdict: FaultVerdict | None) -> dict[str, Any] | None:
@@ -34,5 +34,5 @@ def _row(fault: Fault) -> dict[str, Any]:
 def _episode(row: Mapping[str, Any]) -> Episode:
     known = {field.name: row[field.name] for field in fields(Fault)}
     known |= {name: math.nan for name in ("size", "lower", "upper") if row[name] is None}
-    known["changes"] = tuple(Change(**change) for change in row["changes"])
+    known["changes"] = tuple(DerivativeChange(**change) for change in row["changes"])
     return Episode(Fault(**known), row["until"])

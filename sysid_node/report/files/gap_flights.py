@@ -33,7 +33,7 @@ MISSING = ("missing_file", "missing_corrected")
 
 
 @dataclass(frozen=True)
-class SimulatedFlight:
+class FlightTable:
     """A flight of the table: ``time`` (N,) s and columns (N,) by name, NaN where empty."""
 
     time: Array
@@ -55,7 +55,7 @@ def write_flights(path: Path, found: Diagnosis) -> None:
     write_table(path, ["flight", *names], rows, blank_nan=True)
 
 
-def read_flights(path: Path) -> list[SimulatedFlight]:
+def read_flights(path: Path) -> list[FlightTable]:
     """The flights of the table. Raises InputError where it is missing or damaged."""
     columns = read_columns(path, "flight")
     if not columns:
@@ -63,8 +63,7 @@ def read_flights(path: Path) -> list[SimulatedFlight]:
     places = columns.pop("flight")
     chosen = [places == place for place in np.unique(places)]
     return [
-        SimulatedFlight(columns["time"][rows], {name: values[rows] for name, values in columns.items()})
-        for rows in chosen
+        FlightTable(columns["time"][rows], {name: values[rows] for name, values in columns.items()}) for rows in chosen
     ]
 
 

@@ -31,7 +31,7 @@ RESPONSE_NOTE = "Both are averaged over half the shortest period in use; measure
 
 
 @dataclass(frozen=True)
-class Motion:
+class CoefficientHistories:
     """Complete samples with their coefficients, name -> (N,), as measured and from the final estimates."""
 
     time: Array  # (N,) s
@@ -39,12 +39,12 @@ class Motion:
     measured: Mapping[str, Array]
     modelled: Mapping[str, Array]  # where all derivatives of the coefficient are known
 
-    def since(self, start: float) -> Motion | None:
+    def since(self, start: float) -> CoefficientHistories | None:
         """The part from ``start`` (s) on; None for fewer than ten samples."""
         first = int(np.searchsorted(self.time, start))
         groups = (self.controls, self.measured, self.modelled)
         later = ({name: values[first:] for name, values in group.items()} for group in groups)
-        return Motion(self.time[first:], *later) if self.time.size - first >= FEWEST else None
+        return CoefficientHistories(self.time[first:], *later) if self.time.size - first >= FEWEST else None
 
 
 def replay_result(
@@ -111,7 +111,9 @@ def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | N
     return FlightRecord(time, {n: samples[:, i] for i, n in enumerate(names) if i != AIR_INTERVAL})
 
 
-def _motion(aircraft: Aircraft, time: Array, samples: Array, history: Sequence[Estimates]) -> Motion | None:
+def _motion(
+    aircraft: Aircraft, time: Array, samples: Array, history: Sequence[Estimates]
+) -> CoefficientHistories | None:
     """The complete samples, an unknown thrust taken as zero, as in the estimator; None for fewer than ten."""
     filled = samples.copy()
     filled[np.isnan(filled[:, THRUST]), THRUST] = 0.0
@@ -130,7 +132,7 @@ def _motion(aircraft: Aircraft, time: Array, samples: Array, history: Sequence[E
     regressors = {name: row[columns.column(name) - 1] / k for name in columns.regressors}
     modelled = _modelled(aircraft, {"0": np.ones(time.size), **regressors}, history[-1]) if history else {}
     controls = {symbol: filled[:, len(SAMPLE_COLUMNS) + i] for i, symbol in enumerate(aircraft.control_symbols)}
-    return Motion(time, controls, measured, modelled)
+    return CoefficientHistories(time, controls, measured, modelled)
 
 
 def _modelled(aircraft: Aircraft, regressors: Mapping[str, Array], final: Estimates) -> dict[str, Array]:
@@ -144,7 +146,7 @@ def _modelled(aircraft: Aircraft, regressors: Mapping[str, Array], final: Estima
     return modelled
 
 
-def _spectra(settings: OnlineSettings, motion: Motion) -> Spectra:
+def _spectra(settings: OnlineSettings, motion: CoefficientHistories) -> Spectra:
     """Inputs, coefficients and residuals at the frequencies in use."""
     start, step, stop = settings.frequencies
     frequency = np.arange(start, stop + 0.5 * step, step)
@@ -163,7 +165,7 @@ def _averaged(values: Array, every: int) -> Array:
     return np.asarray(whole.reshape(-1, every, *values.shape[1:]).mean(axis=1))
 
 
-def _responses(settings: OnlineSettings, motion: Motion) -> dict[str, Response]:
+def _responses(settings: OnlineSettings, motion: CoefficientHistories) -> dict[str, Response]:
     """Measured and modelled coefficients, averaged over half the shortest period in use to remove noise above it."""
     step = float(np.median(np.diff(motion.time)))
     width = max(round(0.5 / (settings.frequencies[2] * step)), 1)

@@ -18,7 +18,7 @@ LEAST = 0.05  # share from which one is listed
 
 
 @dataclass(frozen=True)
-class Row:
+class BudgetRow:
     """One derivative: its largest sources with their shares in percent, and what reduces the first."""
 
     name: str
@@ -33,10 +33,10 @@ def context(run: RunResult) -> Mapping[str, Any]:
     return {"rows": [_row(name, shares) for name, shares in final.budget.items() if shares] if final else []}
 
 
-def _row(name: str, shares: Mapping[str, float]) -> Row:
+def _row(name: str, shares: Mapping[str, float]) -> BudgetRow:
     largest = [(key, share) for key, share in shares.items() if share >= LEAST][:LISTED]
     sources = ", ".join(f"{source_words(key)[0]} {100.0 * share:.0f} %" for key, share in largest)
-    return Row(name, symbol(name), sources, source_words(largest[0][0])[1] if largest else "")
+    return BudgetRow(name, symbol(name), sources, source_words(largest[0][0])[1] if largest else "")
 
 
 SECTION: Section[RunResult] = Section("budget", "Error budget", "budget.html.j2", context)

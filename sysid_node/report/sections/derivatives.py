@@ -33,7 +33,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Row:
+class DerivativeRow:
     """One derivative as the table shows it."""
 
     name: str
@@ -66,14 +66,14 @@ def context(run: RunResult) -> Mapping[str, Any]:
     }
 
 
-def _row(run: RunResult, d: DerivativeEstimate, span: float) -> Row:
+def _row(run: RunResult, d: DerivativeEstimate, span: float) -> DerivativeRow:
     prior, truth, reference = (
         run.references.prior.get(d.name),
         run.references.truth.get(d.name),
         _reference(run, d.name),
     )
     drawn = math.isfinite(reference) and reference != 0.0
-    return Row(
+    return DerivativeRow(
         name=d.name,
         symbol=symbol(d.name),
         meaning=short_meaning(d.name),

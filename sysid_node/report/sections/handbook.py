@@ -20,7 +20,7 @@ DEGREES = 180.0 / math.pi
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A title, headings and rows of text; the first column is text, the others are right-aligned where ``numbers``."""
 
     title: str
@@ -93,26 +93,26 @@ def file_context(book: Handbook) -> Mapping[str, Any]:
     return {"tables": [servo_table(book.aircraft), tolerance_table(book.aircraft)], "figures": []}
 
 
-def trim_table(book: Handbook) -> Table:
+def trim_table(book: Handbook) -> TextTable:
     """Level flight over airspeed."""
     rows = [
         (f"{t.airspeed:.1f}", number(DEGREES * t.alpha), number(DEGREES * t.elevator), number(t.thrust), number(t.lift))
         for t in book.trims
     ]
-    return Table("Level flight", ("airspeed, m/s", "alpha, deg", "elevator, deg", "thrust, N", "CL"), tuple(rows))
+    return TextTable("Level flight", ("airspeed, m/s", "alpha, deg", "elevator, deg", "thrust, N", "CL"), tuple(rows))
 
 
-def mode_table(book: Handbook) -> Table:
+def mode_table(book: Handbook) -> TextTable:
     """Modes at the reference airspeed."""
     rows = []
     for mode in book.modes:
         change = f"{number(mode.time_to_half)} ({'half' if mode.stable else 'double'})"
         rows.append((mode.name, number(mode.frequency), number(mode.damping), change))
     title = f"Modes at {number(book.trim.airspeed)} m/s"
-    return Table(title, ("mode", "frequency, rad/s", "damping ratio", "time to half or double, s"), tuple(rows))
+    return TextTable(title, ("mode", "frequency, rad/s", "damping ratio", "time to half or double, s"), tuple(rows))
 
 
-def performance_table(book: Handbook) -> Table:
+def performance_table(book: Handbook) -> TextTable:
     """Stall, glide and climb."""
     found = book.performance
     stall = f"CL {number(found.largest_lift)} at {number(DEGREES * found.stall_alpha)} deg; {found.stall_from}"
@@ -126,10 +126,10 @@ def performance_table(book: Handbook) -> Table:
         ("best climb, m/s", number(found.climb_rate), climb),
         ("airspeed of best climb, m/s", number(found.climb_speed), ""),
     )
-    return Table("Performance", ("quantity", "value", "remark"), rows, numbers=False)
+    return TextTable("Performance", ("quantity", "value", "remark"), rows, numbers=False)
 
 
-def power_table(book: Handbook) -> Table:
+def power_table(book: Handbook) -> TextTable:
     """Control power per degree and at the file's limit."""
     power = book.power
     rows = [
@@ -137,7 +137,7 @@ def power_table(book: Handbook) -> Table:
         _power_row(book, "elevator", "pitch acceleration", power.pitch_acceleration, "deg/s²"),
         _power_row(book, "rudder", "steady sideslip", power.sideslip, "deg"),
     ]
-    return Table("Control power", ("control and what it does", "per rad", "at its limit"), tuple(rows))
+    return TextTable("Control power", ("control and what it does", "per rad", "at its limit"), tuple(rows))
 
 
 def _power_row(book: Handbook, control: str, words: str, value: float, unit: str) -> tuple[str, str, str]:
@@ -148,7 +148,7 @@ def _power_row(book: Handbook, control: str, words: str, value: float, unit: str
     return f"{control}: {words}", f"{number(value)} {per_radian}", at_limit
 
 
-def servo_table(aircraft: Aircraft) -> Table:
+def servo_table(aircraft: Aircraft) -> TextTable:
     """Servos, delays and further effects that the file states."""
     rows = [
         (f"{effect}.{key}", number(item.value), NONE if item.tolerance is None else number(item.tolerance))
@@ -160,10 +160,10 @@ def servo_table(aircraft: Aircraft) -> Table:
         for topic, d in aircraft.delays.items()
         if d.value or d.tolerance is not None
     ]
-    return Table("Servos, delays and effects in the file", ("key", "value", "tolerance"), tuple(rows))
+    return TextTable("Servos, delays and effects in the file", ("key", "value", "tolerance"), tuple(rows))
 
 
-def tolerance_table(aircraft: Aircraft) -> Table:
+def tolerance_table(aircraft: Aircraft) -> TextTable:
     """Tolerances that the file states itself, and the default's size in words."""
     rows = []
     for key, value in aircraft.stated_tolerances.items():
@@ -172,7 +172,7 @@ def tolerance_table(aircraft: Aircraft) -> Table:
         default = default_of(key)
         usual = f"{number(100 * default.share)} %" if default.share else f"{number(default.absolute)} {default.unit}"
         rows.append((key, number(value), usual))
-    return Table("Tolerances other than the defaults", ("key", "in the file", "default"), tuple(rows))
+    return TextTable("Tolerances other than the defaults", ("key", "in the file", "default"), tuple(rows))
 
 
 def _figure(label: str, x: Any, y: Any, below: str, beside: str) -> Figure:

@@ -25,7 +25,7 @@ POINTS = 900  # of one panel's curves
 
 
 @dataclass(frozen=True)
-class Panel:
+class HistoryPanel:
     """A panel with its caption; without a figure if no estimate was ever finite."""
 
     name: str
@@ -67,11 +67,11 @@ def figures_of(run: RunResult) -> list[tuple[str, Figure]]:
     return [(panel.name, panel.figure) for panel in panels if panel.figure]
 
 
-def _panel(run: RunResult, last: DerivativeEstimate) -> Panel:
+def _panel(run: RunResult, last: DerivativeEstimate) -> HistoryPanel:
     curves = _curves(run, last.name)
     figure = _figure(run, last, curves) if np.isfinite(curves.value).any() else None
     status = "valid" if last.valid and last.status == "ok" else last.status
-    return Panel(last.name, symbol(last.name), short_meaning(last.name), last.valid, status, figure)
+    return HistoryPanel(last.name, symbol(last.name), short_meaning(last.name), last.valid, status, figure)
 
 
 def _curves(run: RunResult, name: str) -> _Curves:

@@ -14,12 +14,12 @@ from rclpy.node import Node
 
 from sysid_node.errors import InputError
 from sysid_node.given_values import fits, given_values
-from sysid_node.parameter import Parameter
+from sysid_node.parameter import NodeParameter
 
 Check = Callable[[Mapping[str, Any]], None]  # raises InputError on wrong values
 
 
-def declare(node: Node, table: Sequence[Parameter], check: Check) -> None:
+def declare(node: Node, table: Sequence[NodeParameter], check: Check) -> None:
     """Declare all parameters. Raises InputError where the user gave one of them a wrong type or value."""
     refuse_mistyped(sys.argv[1:], node.get_fully_qualified_name(), table)
     for parameter in table:
@@ -35,7 +35,7 @@ def declare(node: Node, table: Sequence[Parameter], check: Check) -> None:
     _warn_of_unknown(node, table)
 
 
-def refuse_mistyped(arguments: Sequence[str], full_name: str, table: Sequence[Parameter]) -> None:
+def refuse_mistyped(arguments: Sequence[str], full_name: str, table: Sequence[NodeParameter]) -> None:
     """Raise InputError where a value given in ``arguments`` to the node (``/namespace/name``) has a wrong type."""
     known = {parameter.name: parameter for parameter in table}
     for name, value, source in given_values(arguments, full_name):
@@ -44,14 +44,14 @@ def refuse_mistyped(arguments: Sequence[str], full_name: str, table: Sequence[Pa
             raise InputError(f"parameter {name} = {value!r} ({kind}): expected {known[name].expected}; given {source}")
 
 
-def values_of(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
+def values_of(node: Node, table: Sequence[NodeParameter]) -> dict[str, Any]:
     """The values of all parameters by name."""
     return {parameter.name: node.get_parameter(parameter.name).value for parameter in table}
 
 
 def refusal(
     node: Node,
-    table: Sequence[Parameter],
+    table: Sequence[NodeParameter],
     live: frozenset[str],
     changes: Iterable[RosParameter],
     check: Check,
@@ -72,7 +72,7 @@ def refusal(
     return ""
 
 
-def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+def _descriptor(parameter: NodeParameter) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(
         description=f"{parameter.meaning}{unit} Default: {parameter.default}. Change: {parameter.change}",
@@ -83,7 +83,7 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     return descriptor
 
 
-def _warn_of_unknown(node: Node, table: Sequence[Parameter]) -> None:
+def _warn_of_unknown(node: Node, table: Sequence[NodeParameter]) -> None:
     """Log a warning for each parameter that is not in the table: ROS would ignore a misspelt one silently."""
     known = [parameter.name for parameter in table]
     for name in node._parameter_overrides:

@@ -19,7 +19,7 @@ FOREIGN_CLOCK = 60.0  # s of lag, beyond which the stamps are taken to be of ano
 
 
 @dataclass(frozen=True)
-class Source:
+class DiagnosticSource:
     """The node that reports, and the aircraft that it identifies."""
 
     node: str

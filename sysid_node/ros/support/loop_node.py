@@ -19,10 +19,10 @@ from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.flight.live import messages
-from sysid_node.flight.live.conditions import Conditions, States
+from sysid_node.flight.live.conditions import Conditions, ReportedStates
 from sysid_node.flight.live.messages import UNREADABLE, Numbers, Paths, Texts
 from sysid_node.flight.live.monitor import TopicMonitor
-from sysid_node.parameter import Parameter, check_each
+from sysid_node.parameter import NodeParameter, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.message_types import fields_of
@@ -43,7 +43,7 @@ SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 SET_POINT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 #: The parameter that all nodes of the loop have.
-AIRCRAFT = Parameter(
+AIRCRAFT = NodeParameter(
     "aircraft",
     "",
     "",
@@ -59,13 +59,13 @@ EFFECT = "They take effect when the node starts; effects of the flight_simulator
 class LoopNode(Node, ABC):
     """A node with a table of parameters, of which those in ``live`` may change in flight."""
 
-    def __init__(self, name: str, table: Sequence[Parameter], live: frozenset[str] = frozenset()) -> None:
+    def __init__(self, name: str, table: Sequence[NodeParameter], live: frozenset[str] = frozenset()) -> None:
         super().__init__(name)
         self.inputs: dict[str, TopicMonitor] = {}  # by topic; the monitors' names are the resolved ones
         self.present: Mapping[str, str] = {}  # the conditions that were found last
         self._needed: set[str] = set()  # topics without which the node cannot do its work
         self._unreadable: dict[str, int] = {}  # messages since the last report, by resolved topic
-        self._conditions, self._states = Conditions(), States()
+        self._conditions, self._states = Conditions(), ReportedStates()
         self._table, self._live = table, live
         declare(self, table, lambda values: check_each(table, values))
         self.values = values_of(self, table)

@@ -23,7 +23,7 @@ from sysid_node.flight.frames import quaternion_from_euler
 from sysid_node.flight.live.arrivals import LATE
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import Parameter
+from sysid_node.parameter import NodeParameter
 from sysid_node.ros.support.conversion import NANOSECONDS, header, stamp_message
 from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
 from sysid_node.sim import EFFECTS, Simulator, trim_flight
@@ -34,7 +34,7 @@ from sysid_node.sim.signals.dryden import INTENSITIES
 
 PARAMETERS = (
     AIRCRAFT,
-    Parameter(
+    NodeParameter(
         "effects",
         "actuator_lag:time_constant=0.05",
         "",
@@ -42,7 +42,7 @@ PARAMETERS = (
         "It replaces what the file states of the same; the default does not where the file states actuator_lag.",
         "To let something fail: control_effectiveness_loss:elevator=0.6 (docs: Effects).",
     ),
-    Parameter(
+    NodeParameter(
         "rate",
         200.0,
         "Hz",
@@ -51,7 +51,7 @@ PARAMETERS = (
         lower=20.0,
         upper=1000.0,
     ),
-    Parameter(
+    NodeParameter(
         "speed",
         1.0,
         "",
@@ -60,7 +60,7 @@ PARAMETERS = (
         lower=0.05,
         upper=50.0,
     ),
-    Parameter(
+    NodeParameter(
         "turbulence",
         "none",
         "",
@@ -68,8 +68,8 @@ PARAMETERS = (
         "To see the loop at work in rough air.",
         choices=tuple(INTENSITIES),
     ),
-    Parameter("noise", 1.0, "", "Sensor noise, in that of the aircraft file.", "0 for ideal sensors.", 0.0, 20.0),
-    Parameter("seed", 0.0, "", "Of noise and turbulence.", "For another flight.", 0.0, 1e9),
+    NodeParameter("noise", 1.0, "", "Sensor noise, in that of the aircraft file.", "0 for ideal sensors.", 0.0, 20.0),
+    NodeParameter("seed", 0.0, "", "Of noise and turbulence.", "For another flight.", 0.0, 1e9),
 )
 COMMAND_AGE = 0.2  # s without a command, beyond which diagnostics warn
 LIVE = frozenset({"effects"})

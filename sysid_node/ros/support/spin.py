@@ -19,7 +19,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 from sysid_node.errors import InputError
-from sysid_node.parameter import Parameter
+from sysid_node.parameter import NodeParameter
 
 #: What rclpy raises where ROS has been shut down.
 _AT_SHUTDOWN = (
@@ -30,7 +30,7 @@ _AT_SHUTDOWN = (
 )
 
 
-def run_node(make: Callable[[], Node], about: str, table: Sequence[Parameter] = ()) -> int:
+def run_node(make: Callable[[], Node], about: str, table: Sequence[NodeParameter] = ()) -> int:
     """Make a node and serve it until it is stopped; returns the exit code (see ``run_program``).
 
     With ``--help`` it prints what the node is ``about`` and its ``table`` of parameters.
@@ -41,7 +41,7 @@ def run_node(make: Callable[[], Node], about: str, table: Sequence[Parameter] = 
     return run_program(lambda: serve(make()))
 
 
-def help_text(name: str, about: str, table: Sequence[Parameter]) -> str:
+def help_text(name: str, about: str, table: Sequence[NodeParameter]) -> str:
     """The help of a node: how to start it, what it does, its parameters with their defaults."""
     lines = [f"usage: ros2 run sysid_node {name} --ros-args [-p NAME:=VALUE]... [--params-file FILE]", ""]
     lines += [about.strip(), "", "parameters (default):"]

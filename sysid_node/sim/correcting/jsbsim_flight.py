@@ -16,8 +16,8 @@ from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model
 from sysid_node.sim.importing.jsbsim.program import FOOT, POUND, SLUG, Flight, Program
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, Surface
-from sysid_node.sim.importing.jsbsim.survey import Survey
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface
+from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class JsbsimFlyer:
     depends on the motion is held at its recorded position. Raises InputError where JSBSim does not load the model.
     """
 
-    def __init__(self, survey: Survey, files: ModelFiles, aircraft: Aircraft, rate: float) -> None:
+    def __init__(self, survey: ModelSurvey, files: ModelFiles, aircraft: Aircraft, rate: float) -> None:
         self._frames = max(round(_RATE / rate), 1)
         self._survey, self._names = survey, tuple(aircraft.controls)
         self._surfaces = {surface.name: surface for surface in survey.surfaces}
@@ -179,7 +179,7 @@ def _state(flights: ShortFlights, place: int, throttle: float) -> Flight:
     return Flight(speed, alpha, beta, (p, q, r), phi, theta, float(flights.altitude[place]), throttle)
 
 
-def _to_surface(surface: Surface, command: float, offset: float) -> dict[str, float]:
+def _to_surface(surface: JsbsimSurface, command: float, offset: float) -> dict[str, float]:
     """Properties that give a commanded deflection (rad); the model's own servo adds its offset (rad)."""
     if surface.feedback:
         return surface.at(command + offset)

@@ -27,7 +27,7 @@ from sysid_node.sim.correcting.jsbsim_throttle import change_throttle
 from sysid_node.sim.correcting.xml_editing import append_block, read_document, write_document
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model
 from sysid_node.sim.importing.jsbsim.program import Program
-from sysid_node.sim.importing.jsbsim.survey import Survey
+from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class CorrectedModel:
     left_out: dict[str, str]
 
 
-def write_corrected(survey: Survey, before: Aircraft, after: Aircraft, folder: Path) -> CorrectedModel:
+def write_corrected(survey: ModelSurvey, before: Aircraft, after: Aircraft, folder: Path) -> CorrectedModel:
     """Write a copy of the surveyed model into a folder, with what ``after`` has other than ``before``.
 
     Raises InputError where the model's parts cannot be read, or where JSBSim does not load the copy.
@@ -147,7 +147,7 @@ def _included(files: ModelFiles, file: str) -> Path:
     raise InputError(f"{files.main}: refers to {name}, which is not found; put it beside the model")
 
 
-def _change_systems(parts: _Parts, survey: Survey, before: Aircraft, after: Aircraft) -> dict[str, str]:
+def _change_systems(parts: _Parts, survey: ModelSurvey, before: Aircraft, after: Aircraft) -> dict[str, str]:
     """Servos and throttle; what could not be changed, with the reason."""
     left_out = {}
     old, new = before.effect_values(), after.effect_values()
@@ -178,7 +178,7 @@ def _change_systems(parts: _Parts, survey: Survey, before: Aircraft, after: Airc
     return left_out
 
 
-def _properties(survey: Survey, aircraft: Aircraft, root: Element) -> ModelProperties:
+def _properties(survey: ModelSurvey, aircraft: Aircraft, root: Element) -> ModelProperties:
     surfaces = {s.name: (s.position, s.sign * s.unit) for s in survey.surfaces}
     external = root.find("external_reactions/force[@name='thrust']")
     thrust = "forces/fbx-prop-lbs" if survey.engines else None

@@ -14,9 +14,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from sysid_node.sim.correcting.xml_editing import insert_block, text_element
-from sysid_node.sim.importing.jsbsim.actuators import Servo, inputs_of
+from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo, inputs_of
 from sysid_node.sim.importing.jsbsim.files import outputs_of
-from sysid_node.sim.importing.jsbsim.surfaces import Surface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
 from sysid_node.sim.importing.jsbsim.survey import ServoChain
 
 #: The parts of a servo: effect, field of ``Servo``, and JSBSim's element, in the order in which an actuator has them.
@@ -33,13 +33,13 @@ PARTS = (
 class ServoChange:
     """One control's servo as it is to be, in s, rad and rad/s; ``damping`` of a lag of second order, 0 of first."""
 
-    servo: Servo
+    servo: JsbsimServo
     damping: float = 0.0
     lost: float = 0.0  # share of the control's effect
 
 
 def change_servo(
-    sections: Sequence[Element], surface: Surface, chain: ServoChain, before: Servo, change: ServoChange
+    sections: Sequence[Element], surface: JsbsimSurface, chain: ServoChain, before: JsbsimServo, change: ServoChange
 ) -> bool:
     """Change a control's servo in the sections of a flight control system, in place.
 
@@ -64,7 +64,7 @@ def change_servo(
     return bool(writers)
 
 
-def _writers(sections: Sequence[Element], surface: Surface) -> list[tuple[Element, Element, str]]:
+def _writers(sections: Sequence[Element], surface: JsbsimSurface) -> list[tuple[Element, Element, str]]:
     """The components that write a position of the control, each with its channel and the property.
 
     Those that only convert one position into another are left out.
@@ -105,7 +105,7 @@ def _new_name(name: str, what: str) -> str:
     return f"fcs/corrected/{name.removeprefix('fcs/').replace('/', '-')}-{what}"
 
 
-def _slope(surface: Surface, name: str) -> float:
+def _slope(surface: JsbsimSurface, name: str) -> float:
     """Units of a property per rad of the control, about the middle of its travel."""
     values, deflection = surface.properties[name], surface.deflection
     near = np.argsort(np.abs(deflection - 0.5 * (deflection[0] + deflection[-1])))[:3]

@@ -10,7 +10,7 @@ from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.errors import InputError
 from sysid_node.sim.correcting.jsbsim_flight import JsbsimFlyer
 from sysid_node.sim.correcting.jsbsim_model import CorrectedModel, write_corrected
-from sysid_node.sim.importing.jsbsim.survey import Survey, survey_model
+from sysid_node.sim.importing.jsbsim.survey import ModelSurvey, survey_model
 
 _FORM = "expected jsbsim:NAME of an aircraft that comes with JSBSim, or jsbsim:FILE of a model's XML"
 
@@ -26,7 +26,7 @@ class UserSimulator:
     """A user's simulator with its model, checked against the aircraft file."""
 
     label: str  # as the user gave it
-    survey: Survey
+    survey: ModelSurvey
     aircraft: Aircraft  # the aircraft file
 
     def corrected(self, after: Aircraft, folder: Path) -> CorrectedModel:
@@ -55,7 +55,7 @@ def user_simulator(text: str, aircraft: Aircraft) -> UserSimulator:
     return UserSimulator(text, survey, aircraft)
 
 
-def _require_same_aircraft(text: str, survey: Survey, aircraft: Aircraft) -> None:
+def _require_same_aircraft(text: str, survey: ModelSurvey, aircraft: Aircraft) -> None:
     """Raises InputError where mass or sizes differ by more than the file's tolerances."""
     S, b, cbar = survey.geometry
     pairs = {

@@ -50,7 +50,7 @@ from sysid_node.sim.effects import (
     vane_lever_arm,
     vane_scale,
 )
-from sysid_node.sim.effects.base import STATIONS, Effect, Parameter
+from sysid_node.sim.effects.base import STATIONS, Effect, SimulationParameter
 
 #: In the order in which the chain applies them.
 _MODULES = (
@@ -108,4 +108,4 @@ _MODULES = (
 
 EFFECTS: dict[str, Effect] = {module.EFFECT.name: module.EFFECT for module in _MODULES}
 
-__all__ = ["EFFECTS", "STATIONS", "Effect", "Parameter"]
+__all__ = ["EFFECTS", "STATIONS", "Effect", "SimulationParameter"]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from sysid_node.sim.effects.base import Effect, Parameter, each_control
+from sysid_node.sim.effects.base import Effect, SimulationParameter, each_control
 from sysid_node.sim.model.layout import Scalar
 
 EFFECT = Effect(
@@ -19,8 +19,8 @@ EFFECT = Effect(
     ),
     source="Stevens, Lewis & Johnson (2016), Aircraft Control and Simulation (actuators of the F-16 model)",
     parameters=each_control(
-        Parameter("time_constant", "s", "time constant", 0.05, lower=0.0, upper=1.0),
-        Parameter("damping", "1", "of second order; 0: first order", 0.3, 0.0, 0.0, 10.0, switch=False),
+        SimulationParameter("time_constant", "s", "time constant", 0.05, lower=0.0, upper=1.0),
+        SimulationParameter("damping", "1", "of second order; 0: first order", 0.3, 0.0, 0.0, 10.0, switch=False),
     ),
     shared="time_constant",
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, each_control
+from sysid_node.sim.effects.base import Effect, SimulationParameter, each_control
 from sysid_node.sim.model.layout import Scalar
 from sysid_node.sim.signals.smooth import soft_clip
 
@@ -13,7 +13,7 @@ EFFECT = Effect(
     equation="x' = x + clip(u - x, -+ rate step), the clip's corner rounded: d / (1 + (d / limit)^16)^(1/16)",
     source="Klyde, McRuer & Myers (1997), J. Guidance 20(1) (rate-limited actuators)",
     parameters=each_control(
-        Parameter("inverse_rate", "s/rad", "1 / largest rate", 0.5, lower=0.0, upper=50.0, reciprocal="rate")
+        SimulationParameter("inverse_rate", "s/rad", "1 / largest rate", 0.5, lower=0.0, upper=50.0, reciprocal="rate")
     ),
     shared="inverse_rate",
 )

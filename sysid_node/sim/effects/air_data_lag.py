@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.sim.effects.actuator_lag import first_order
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -15,7 +15,7 @@ EFFECT = Effect(
     summary="Airspeed and flow angles follow the truth with a first-order lag.",
     equation="time_constant dy/dt + y = truth, solved exactly for a truth linear between samples",
     source="Haering (1995), NASA TM-104316 (pneumatic lag)",
-    parameters=fixed(Parameter("time_constant", "s", "time constant", 0.05, lower=0.0, upper=2.0)),
+    parameters=fixed(SimulationParameter("time_constant", "s", "time constant", 0.05, lower=0.0, upper=2.0)),
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -11,7 +11,7 @@ EFFECT = Effect(
     summary="The airspeed reads too much or too little by a factor (position error, calibration).",
     equation="V' = V (1 + error)",
     source="Haering (1995), NASA TM-104316 (airdata measurement and calibration)",
-    parameters=fixed(Parameter("error", "1", "scale error", 0.04, lower=-0.9, upper=2.0)),
+    parameters=fixed(SimulationParameter("error", "1", "scale error", 0.04, lower=-0.9, upper=2.0)),
 )
 
 

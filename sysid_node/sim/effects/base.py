@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 
-from sysid_node.sim.model.layout import Layout, Scalar, Values
+from sysid_node.sim.model.layout import ParameterLayout, Scalar, Values
 
 #: The chain, in the order in which a command becomes a message.
 STATIONS = (
@@ -25,7 +25,7 @@ STATIONS = (
 
 
 @dataclass(frozen=True)
-class Parameter:
+class SimulationParameter:
     """One number of an effect.
 
     An effect is neutral while all of its parameters with ``switch`` are neutral; the others only shape it.
@@ -52,7 +52,7 @@ class Effect:
     summary: str
     equation: str
     source: str
-    parameters: Callable[[Layout], tuple[Parameter, ...]]
+    parameters: Callable[[ParameterLayout], tuple[SimulationParameter, ...]]
     shared: str = (
         ""  # the parameter that all controls share, to which each control's own is added: see ``each_control``
     )
@@ -62,26 +62,33 @@ class Effect:
 THROTTLE = "throttle"
 
 
-def fixed(*parameters: Parameter) -> Callable[[Layout], tuple[Parameter, ...]]:
+def fixed(*parameters: SimulationParameter) -> Callable[[ParameterLayout], tuple[SimulationParameter, ...]]:
     """The same parameters for every aircraft."""
     return lambda layout: parameters
 
 
 def per_control(
-    unit: str, meaning: str, scale: float, *others: Parameter, lower: float = -math.inf, upper: float = math.inf
-) -> Callable[[Layout], tuple[Parameter, ...]]:
+    unit: str,
+    meaning: str,
+    scale: float,
+    *others: SimulationParameter,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+) -> Callable[[ParameterLayout], tuple[SimulationParameter, ...]]:
     """One switch for each aerodynamic control, named after it; then the ``others``."""
 
-    def parameters(layout: Layout) -> tuple[Parameter, ...]:
-        switches = (Parameter(c, unit, f"{meaning}, {c}", scale, lower=lower, upper=upper) for c in layout.controls)
+    def parameters(layout: ParameterLayout) -> tuple[SimulationParameter, ...]:
+        switches = (
+            SimulationParameter(c, unit, f"{meaning}, {c}", scale, lower=lower, upper=upper) for c in layout.controls
+        )
         return (*switches, *others)
 
     return parameters
 
 
 def each_control(
-    shared: Parameter, *others: Parameter, throttle: bool = False
-) -> Callable[[Layout], tuple[Parameter, ...]]:
+    shared: SimulationParameter, *others: SimulationParameter, throttle: bool = False
+) -> Callable[[ParameterLayout], tuple[SimulationParameter, ...]]:
     """What all controls share, what each has in addition, named after it, and the ``others``.
 
     A control's value is ``of_control``: the sum of both. One parameter then moves all controls, and another one alone,
@@ -89,10 +96,10 @@ def each_control(
     """
     size = shared.upper - shared.lower
 
-    def parameters(layout: Layout) -> tuple[Parameter, ...]:
+    def parameters(layout: ParameterLayout) -> tuple[SimulationParameter, ...]:
         names = (*layout.controls, *((THROTTLE,) if throttle else ()))
         per_control = (
-            Parameter(c, shared.unit, f"{shared.meaning}, {c}: added", shared.scale, lower=-size, upper=size)
+            SimulationParameter(c, shared.unit, f"{shared.meaning}, {c}: added", shared.scale, lower=-size, upper=size)
             for c in names
         )
         return (shared, *per_control, *others)
@@ -107,4 +114,4 @@ def of_control(values: Values, shared: str, control: str) -> Scalar:
 
 
 #: The parameter of effects that begin during a flight.
-ONSET = Parameter("onset", "s", "time at which it sets in", 10.0, neutral=-10.0, switch=False)
+ONSET = SimulationParameter("onset", "s", "time at which it sets in", 10.0, neutral=-10.0, switch=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, each_control
+from sysid_node.sim.effects.base import Effect, SimulationParameter, each_control
 
 EFFECT = Effect(
     name="command_delay",
@@ -10,6 +10,8 @@ EFFECT = Effect(
     summary="Commands reach the actuators late.",
     equation="u'(t) = u(t - delay); commands are linear between samples",
     source="Hodgkinson (1999), Aircraft Handling Qualities (equivalent time delay)",
-    parameters=each_control(Parameter("delay", "s", "transport delay", 0.05, lower=0.0, upper=0.5), throttle=True),
+    parameters=each_control(
+        SimulationParameter("delay", "s", "transport delay", 0.05, lower=0.0, upper=0.5), throttle=True
+    ),
     shared="delay",
 )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter
-from sysid_node.sim.model.layout import Layout
+from sysid_node.sim.effects.base import Effect, SimulationParameter
+from sysid_node.sim.model.layout import ParameterLayout
 
 
-def _parameters(layout: Layout) -> tuple[Parameter, ...]:
+def _parameters(layout: ParameterLayout) -> tuple[SimulationParameter, ...]:
     return tuple(
-        Parameter(name, "1/rad" if not name.endswith("_0") else "1", f"added to the file's {name}", 0.1)
+        SimulationParameter(name, "1/rad" if not name.endswith("_0") else "1", f"added to the file's {name}", 0.1)
         for name in layout.derivatives
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -11,7 +11,7 @@ EFFECT = Effect(
     summary="A parabola of lift on top of the drag polar.",
     equation="CD' = CD + parabola (CL - CL0)^2, CL0 at the reference condition",
     source="Raymer (2018), Aircraft Design: A Conceptual Approach, ch. 12 (drag due to lift)",
-    parameters=fixed(Parameter("parabola", "1", "quadratic term in CL", 0.05, lower=-2.0, upper=5.0)),
+    parameters=fixed(SimulationParameter("parabola", "1", "quadratic term in CL", 0.05, lower=-2.0, upper=5.0)),
 )
 
 

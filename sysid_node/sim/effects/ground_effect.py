@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -17,10 +17,10 @@ EFFECT = Effect(
     ),
     source="McCormick (1995), Aerodynamics, Aeronautics and Flight Mechanics (factor of induced drag)",
     parameters=fixed(
-        Parameter("lift", "1", "lift gained at the ground, share", 0.2, lower=0.0, upper=2.0),
-        Parameter("drag", "1", "induced drag lost at the ground, per CL^2", 0.05, lower=0.0, upper=1.0),
-        Parameter("moment", "1", "nose-down moment at the ground, per CL", 0.05, lower=0.0, upper=1.0),
-        Parameter("height", "m", "height above the ground at the start", 0.5, 0.5, 0.0, 20000.0, False),
+        SimulationParameter("lift", "1", "lift gained at the ground, share", 0.2, lower=0.0, upper=2.0),
+        SimulationParameter("drag", "1", "induced drag lost at the ground, per CL^2", 0.05, lower=0.0, upper=1.0),
+        SimulationParameter("moment", "1", "nose-down moment at the ground, per CL", 0.05, lower=0.0, upper=1.0),
+        SimulationParameter("height", "m", "height above the ground at the start", 0.5, 0.5, 0.0, 20000.0, False),
     ),
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -14,11 +14,11 @@ EFFECT = Effect(
     equation="gust' = gust + peak (1 - cos(2 pi V0 (t - start) / length)) / 2 over one length",
     source="MIL-F-8785C (1980), sec. 3.7.1.3 (discrete gust; here with its fall)",
     parameters=fixed(
-        Parameter("forward", "m/s", "peak of the air's velocity along body x", 2.0, lower=-30.0, upper=30.0),
-        Parameter("right", "m/s", "peak of the air's velocity along body y", 2.0, lower=-30.0, upper=30.0),
-        Parameter("down", "m/s", "peak of the air's velocity along body z", 2.0, lower=-30.0, upper=30.0),
-        Parameter("start", "s", "time at which it begins", 2.0, neutral=2.0, switch=False),
-        Parameter("length", "m", "its length", 20.0, neutral=30.0, lower=0.5, upper=2000.0, switch=False),
+        SimulationParameter("forward", "m/s", "peak of the air's velocity along body x", 2.0, lower=-30.0, upper=30.0),
+        SimulationParameter("right", "m/s", "peak of the air's velocity along body y", 2.0, lower=-30.0, upper=30.0),
+        SimulationParameter("down", "m/s", "peak of the air's velocity along body z", 2.0, lower=-30.0, upper=30.0),
+        SimulationParameter("start", "s", "time at which it begins", 2.0, neutral=2.0, switch=False),
+        SimulationParameter("length", "m", "its length", 20.0, neutral=30.0, lower=0.5, upper=2000.0, switch=False),
     ),
 )
 

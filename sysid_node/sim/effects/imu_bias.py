@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
@@ -13,8 +13,8 @@ EFFECT = Effect(
     equation="a' = a + (ax, ay, az), w' = w + (p, q, r)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(
-        *(Parameter(n, "m/s^2", f"offset of {n}", 0.1, lower=-20.0, upper=20.0) for n in ("ax", "ay", "az")),
-        *(Parameter(n, "rad/s", f"offset of {n}", 0.01, lower=-2.0, upper=2.0) for n in ("p", "q", "r")),
+        *(SimulationParameter(n, "m/s^2", f"offset of {n}", 0.1, lower=-20.0, upper=20.0) for n in ("ax", "ay", "az")),
+        *(SimulationParameter(n, "rad/s", f"offset of {n}", 0.01, lower=-2.0, upper=2.0) for n in ("p", "q", "r")),
     ),
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
@@ -13,7 +13,10 @@ EFFECT = Effect(
     equation="a' = a + dw/dt x arm + w x (w x arm), arm' = arm + (x, y, z)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (position of the accelerometers)",
     parameters=fixed(
-        *(Parameter(n, "m", f"IMU off its stated place along body {n}", 0.1, lower=-50.0, upper=50.0) for n in "xyz")
+        *(
+            SimulationParameter(n, "m", f"IMU off its stated place along body {n}", 0.1, lower=-50.0, upper=50.0)
+            for n in "xyz"
+        )
     ),
 )
 

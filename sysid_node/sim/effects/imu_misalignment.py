@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
@@ -14,7 +14,7 @@ EFFECT = Effect(
     source="Titterton & Weston (2004), Strapdown Inertial Navigation Technology (small misalignments)",
     parameters=fixed(
         *(
-            Parameter(n, "rad", f"rotation about body {axis}", 0.02, lower=-0.5, upper=0.5)
+            SimulationParameter(n, "rad", f"rotation about body {axis}", 0.02, lower=-0.5, upper=0.5)
             for n, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
         ),
     ),

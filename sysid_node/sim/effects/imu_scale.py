@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
@@ -13,8 +13,8 @@ EFFECT = Effect(
     equation="a' = a (1 + error), w' = w (1 + error), each axis its own",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(
-        *(Parameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("ax", "ay", "az")),
-        *(Parameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("p", "q", "r")),
+        *(SimulationParameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("ax", "ay", "az")),
+        *(SimulationParameter(n, "1", f"scale error of {n}", 0.02, lower=-0.9, upper=2.0) for n in ("p", "q", "r")),
     ),
 )
 

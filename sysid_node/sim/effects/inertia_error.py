@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 _AXES = ("Ixx", "Iyy", "Izz")
@@ -16,8 +16,8 @@ EFFECT = Effect(
     equation="Ixx' = Ixx (1 + Ixx error), likewise Iyy, Izz; Ixz' = Ixz + (Ixz error) sqrt(Ixx Izz)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (equations of motion)",
     parameters=fixed(
-        *(Parameter(axis, "1", f"share of {axis}", 0.1, lower=-0.8, upper=5.0) for axis in _AXES),
-        Parameter("Ixz", "1", "share of sqrt(Ixx Izz) added to Ixz", 0.02, lower=-0.5, upper=0.5),
+        *(SimulationParameter(axis, "1", f"share of {axis}", 0.1, lower=-0.8, upper=5.0) for axis in _AXES),
+        SimulationParameter("Ixz", "1", "share of sqrt(Ixx Izz) added to Ixz", 0.02, lower=-0.5, upper=0.5),
     ),
 )
 

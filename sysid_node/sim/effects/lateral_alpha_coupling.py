@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,9 +12,9 @@ EFFECT = Effect(
     equation="Cl' = Cl + (Cl_beta_alpha beta + Cl_r_alpha r) a, Cn' = Cn + Cn_beta_alpha beta a, a = alpha - alpha0",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (polynomial terms)",
     parameters=fixed(
-        Parameter("Cl_beta_alpha", "1/rad^2", "slope of Cl_beta with alpha", 0.4),
-        Parameter("Cn_beta_alpha", "1/rad^2", "slope of Cn_beta with alpha", 0.2),
-        Parameter("Cl_r_alpha", "1/rad^2", "slope of Cl_r with alpha", 1.0),
+        SimulationParameter("Cl_beta_alpha", "1/rad^2", "slope of Cl_beta with alpha", 0.4),
+        SimulationParameter("Cn_beta_alpha", "1/rad^2", "slope of Cn_beta with alpha", 0.2),
+        SimulationParameter("Cl_r_alpha", "1/rad^2", "slope of Cl_r with alpha", 1.0),
     ),
 )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,9 +12,9 @@ EFFECT = Effect(
     equation="CY' = CY + CY_0, Cl' = Cl + Cl_0, Cn' = Cn + Cn_0",
     source="Etkin & Reid (1996), Dynamics of Flight, ch. 3 (lateral control and trim)",
     parameters=fixed(
-        Parameter("CY_0", "1", "side force", 0.005, lower=-0.5, upper=0.5),
-        Parameter("Cl_0", "1", "rolling moment", 0.002, lower=-0.2, upper=0.2),
-        Parameter("Cn_0", "1", "yawing moment", 0.002, lower=-0.2, upper=0.2),
+        SimulationParameter("CY_0", "1", "side force", 0.005, lower=-0.5, upper=0.5),
+        SimulationParameter("Cl_0", "1", "rolling moment", 0.002, lower=-0.2, upper=0.2),
+        SimulationParameter("Cn_0", "1", "yawing moment", 0.002, lower=-0.2, upper=0.2),
     ),
 )
 

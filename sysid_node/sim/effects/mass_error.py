@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -11,7 +11,7 @@ EFFECT = Effect(
     summary="The mass differs from the file's; the inertia does not.",
     equation="m' = m (1 + error)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (equations of motion)",
-    parameters=fixed(Parameter("error", "1", "share of the mass", 0.05, lower=-0.8, upper=3.0)),
+    parameters=fixed(SimulationParameter("error", "1", "share of the mass", 0.05, lower=-0.8, upper=3.0)),
 )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.sim.effects.actuator_lag import first_order
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,7 +12,7 @@ EFFECT = Effect(
     summary="Thrust follows its command with a first-order lag.",
     equation="time_constant dT/dt + T = command, solved exactly for commands linear between samples",
     source="Stevens, Lewis & Johnson (2016), Aircraft Control and Simulation (engine of the F-16 model)",
-    parameters=fixed(Parameter("time_constant", "s", "time constant", 0.2, lower=0.0, upper=10.0)),
+    parameters=fixed(SimulationParameter("time_constant", "s", "time constant", 0.2, lower=0.0, upper=10.0)),
 )
 
 

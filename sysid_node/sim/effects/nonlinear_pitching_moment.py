@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,8 +12,8 @@ EFFECT = Effect(
     equation="Cm' = Cm + quadratic (alpha - alpha0)^2 + cubic (alpha - alpha0)^3, alpha0 at the reference condition",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 3 (polynomial terms)",
     parameters=fixed(
-        Parameter("quadratic", "1/rad^2", "quadratic term", 1.0),
-        Parameter("cubic", "1/rad^3", "cubic term", 10.0),
+        SimulationParameter("quadratic", "1/rad^2", "quadratic term", 1.0),
+        SimulationParameter("cubic", "1/rad^3", "cubic term", 10.0),
     ),
 )
 

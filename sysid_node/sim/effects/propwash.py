@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 #: Controls in the propeller's slipstream.
@@ -15,7 +15,9 @@ EFFECT = Effect(
     equation="delta' = delta (1 + gain T / (qbar S)), of elevator and rudder",
     source="Stinton (2001), The Design of the Aeroplane; actuator disc: q_slip = q (1 + T / (q A))",
     parameters=fixed(
-        Parameter("gain", "1", "S over disc area, times the share of the tail in the slipstream", 1.0, 0.0, -5.0, 50.0)
+        SimulationParameter(
+            "gain", "1", "S over disc area, times the share of the tail in the slipstream", 1.0, 0.0, -5.0, 50.0
+        )
     ),
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -17,13 +17,15 @@ EFFECT = Effect(
     ),
     source="Fischenberg & Jategaonkar (1999), RTO-MP-11; Jategaonkar (2015), ch. 12 (Kirchhoff's theory of stall)",
     parameters=fixed(
-        Parameter("depth", "1", "how much of it: 0 none, 1 as the theory has it", 1.0, lower=0.0, upper=1.5),
-        Parameter("alpha_star", "rad", "angle at which half the flow is separated", 0.04, 0.26, 0.05, 1.0, False),
-        Parameter("a1", "1", "how abruptly", 5.0, 20.0, 1.0, 60.0, False),
-        Parameter("tau1", "cbar/V", "relaxation time", 5.0, 10.0, 0.5, 100.0, False),
-        Parameter("tau2", "cbar/V", "delay with the rate of alpha", 2.0, 3.0, 0.0, 30.0, False),
-        Parameter("CD_X", "1", "drag of full separation", 0.05, 0.1, -1.0, 2.0, False),
-        Parameter("Cm_X", "1", "pitching moment of full separation", 0.03, -0.05, -1.0, 1.0, False),
+        SimulationParameter("depth", "1", "how much of it: 0 none, 1 as the theory has it", 1.0, lower=0.0, upper=1.5),
+        SimulationParameter(
+            "alpha_star", "rad", "angle at which half the flow is separated", 0.04, 0.26, 0.05, 1.0, False
+        ),
+        SimulationParameter("a1", "1", "how abruptly", 5.0, 20.0, 1.0, 60.0, False),
+        SimulationParameter("tau1", "cbar/V", "relaxation time", 5.0, 10.0, 0.5, 100.0, False),
+        SimulationParameter("tau2", "cbar/V", "delay with the rate of alpha", 2.0, 3.0, 0.0, 30.0, False),
+        SimulationParameter("CD_X", "1", "drag of full separation", 0.05, 0.1, -1.0, 2.0, False),
+        SimulationParameter("Cm_X", "1", "pitching moment of full separation", 0.03, -0.05, -1.0, 1.0, False),
     ),
 )
 

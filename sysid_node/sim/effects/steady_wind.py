@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
@@ -13,9 +13,9 @@ EFFECT = Effect(
     equation="d(position)/dt = R (u, v, w) + wind; the state's velocity is relative to the steadily moving air",
     source="Etkin (1972), Dynamics of Atmospheric Flight (Galilean change of frame)",
     parameters=fixed(
-        Parameter("north", "m/s", "air's velocity to the north", 3.0, lower=-60.0, upper=60.0),
-        Parameter("east", "m/s", "air's velocity to the east", 3.0, lower=-60.0, upper=60.0),
-        Parameter("down", "m/s", "air's velocity downwards", 0.5, lower=-30.0, upper=30.0),
+        SimulationParameter("north", "m/s", "air's velocity to the north", 3.0, lower=-60.0, upper=60.0),
+        SimulationParameter("east", "m/s", "air's velocity to the east", 3.0, lower=-60.0, upper=60.0),
+        SimulationParameter("down", "m/s", "air's velocity downwards", 0.5, lower=-30.0, upper=30.0),
     ),
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -16,10 +16,10 @@ EFFECT = Effect(
     ),
     source="Waszak & Schmidt (1988), J. Aircraft 25(6) (mean axes, one in-vacuo mode)",
     parameters=fixed(
-        Parameter("gain", "1", "modal acceleration felt along body z", 0.3, lower=-5.0, upper=5.0),
-        Parameter("slope", "rad/m", "modal slope felt as pitch rate", 1.0, lower=-20.0, upper=20.0),
-        Parameter("frequency", "Hz", "natural frequency", 2.0, 8.0, 0.5, 40.0, False),
-        Parameter("damping", "1", "damping ratio", 0.02, 0.05, 0.001, 1.0, False),
+        SimulationParameter("gain", "1", "modal acceleration felt along body z", 0.3, lower=-5.0, upper=5.0),
+        SimulationParameter("slope", "rad/m", "modal slope felt as pitch rate", 1.0, lower=-20.0, upper=20.0),
+        SimulationParameter("frequency", "Hz", "natural frequency", 2.0, 8.0, 0.5, 40.0, False),
+        SimulationParameter("damping", "1", "damping ratio", 0.02, 0.05, 0.001, 1.0, False),
     ),
 )
 

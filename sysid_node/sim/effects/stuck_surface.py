@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import ONSET, Effect, Parameter
-from sysid_node.sim.model.layout import Layout, Scalar, Values
+from sysid_node.sim.effects.base import ONSET, Effect, SimulationParameter
+from sysid_node.sim.model.layout import ParameterLayout, Scalar, Values
 from sysid_node.sim.signals.smooth import soft_onset
 
 _SUFFIX = "_position"
 
 
-def _parameters(layout: Layout) -> tuple[Parameter, ...]:
+def _parameters(layout: ParameterLayout) -> tuple[SimulationParameter, ...]:
     amounts = (
-        Parameter(c, "1", f"how much of {c} is stuck: 0 moves freely, 1 is jammed", 1.0, lower=0.0, upper=1.0)
+        SimulationParameter(c, "1", f"how much of {c} is stuck: 0 moves freely, 1 is jammed", 1.0, lower=0.0, upper=1.0)
         for c in layout.controls
     )
     positions = (
-        Parameter(c + _SUFFIX, "rad", f"where {c} is jammed", 0.05, lower=-1.5, upper=1.5, switch=False)
+        SimulationParameter(c + _SUFFIX, "rad", f"where {c} is jammed", 0.05, lower=-1.5, upper=1.5, switch=False)
         for c in layout.controls
     )
     return (*amounts, *positions, ONSET)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -11,7 +11,7 @@ EFFECT = Effect(
     summary="The thrust line passes below (nose up) or above (nose down) where the file has it.",
     equation="M' = M + T arm",
     source="Etkin & Reid (1996), Dynamics of Flight, ch. 2 (influence of the propulsive system)",
-    parameters=fixed(Parameter("arm", "m", "thrust line below the nominal", 0.02, lower=-2.0, upper=2.0)),
+    parameters=fixed(SimulationParameter("arm", "m", "thrust line below the nominal", 0.02, lower=-2.0, upper=2.0)),
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,9 +12,9 @@ EFFECT = Effect(
     equation="N' = N + T (arm + p_factor alpha), L' = L + T torque_arm",
     source="McCormick (1995), Aerodynamics, Aeronautics and Flight Mechanics (propeller in inclined flow)",
     parameters=fixed(
-        Parameter("arm", "m", "thrust line to the left of the CG", 0.01, lower=-2.0, upper=2.0),
-        Parameter("p_factor", "m/rad", "arm gained with the angle of attack", 0.1, lower=-5.0, upper=5.0),
-        Parameter("torque_arm", "m", "rolling moment for each newton", 0.01, lower=-1.0, upper=1.0),
+        SimulationParameter("arm", "m", "thrust line to the left of the CG", 0.01, lower=-2.0, upper=2.0),
+        SimulationParameter("p_factor", "m/rad", "arm gained with the angle of attack", 0.1, lower=-5.0, upper=5.0),
+        SimulationParameter("torque_arm", "m", "rolling moment for each newton", 0.01, lower=-1.0, upper=1.0),
     ),
 )
 

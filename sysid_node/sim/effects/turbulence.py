@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -11,7 +11,7 @@ EFFECT = Effect(
     summary="Continuous random gusts of the Dryden spectra.",
     equation="gust' = gust + intensity * (a realisation of intensity 1 m/s, sim.dryden)",
     source="MIL-F-8785C (1980), sec. 3.7.1.2 (Dryden form)",
-    parameters=fixed(Parameter("intensity", "m/s", "rms of the vertical gusts", 0.8, lower=0.0, upper=15.0)),
+    parameters=fixed(SimulationParameter("intensity", "m/s", "rms of the vertical gusts", 0.8, lower=0.0, upper=15.0)),
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,8 +12,10 @@ EFFECT = Effect(
     equation="CL' = CL + CL_alphadot a, Cm' = Cm + Cm_alphadot a, a = dalpha/dt cbar / 2V",
     source="Etkin & Reid (1996), Dynamics of Flight, sec. 5.5 (the alpha-dot derivatives)",
     parameters=fixed(
-        Parameter("CL_alphadot", "1/rad", "lift with the rate of alpha", 1.5, lower=-20.0, upper=20.0),
-        Parameter("Cm_alphadot", "1/rad", "pitching moment with the rate of alpha", 3.0, lower=-60.0, upper=60.0),
+        SimulationParameter("CL_alphadot", "1/rad", "lift with the rate of alpha", 1.5, lower=-20.0, upper=20.0),
+        SimulationParameter(
+            "Cm_alphadot", "1/rad", "pitching moment with the rate of alpha", 3.0, lower=-60.0, upper=60.0
+        ),
     ),
 )
 

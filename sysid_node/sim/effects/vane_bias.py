@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,8 +12,8 @@ EFFECT = Effect(
     equation="alpha' = alpha + bias, beta' = beta + bias",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (instrument errors)",
     parameters=fixed(
-        Parameter("alpha", "rad", "offset of alpha", 0.01, lower=-0.5, upper=0.5),
-        Parameter("beta", "rad", "offset of beta", 0.01, lower=-0.5, upper=0.5),
+        SimulationParameter("alpha", "rad", "offset of alpha", 0.01, lower=-0.5, upper=0.5),
+        SimulationParameter("beta", "rad", "offset of beta", 0.01, lower=-0.5, upper=0.5),
     ),
 )
 

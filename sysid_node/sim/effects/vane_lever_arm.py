@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Values
 
 EFFECT = Effect(
@@ -14,7 +14,7 @@ EFFECT = Effect(
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (position of the vanes)",
     parameters=fixed(
         *(
-            Parameter(n, "m", f"probe off its stated place along body {n}", 0.1, lower=-100.0, upper=100.0)
+            SimulationParameter(n, "m", f"probe off its stated place along body {n}", 0.1, lower=-100.0, upper=100.0)
             for n in "xyz"
         )
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid_node.sim.effects.base import Effect, Parameter, fixed
+from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
 EFFECT = Effect(
@@ -12,8 +12,8 @@ EFFECT = Effect(
     equation="alpha' = alpha (1 + error), beta' = beta (1 + error)",
     source="Klein & Morelli (2006), Aircraft System Identification, ch. 10 (upwash at the vanes)",
     parameters=fixed(
-        Parameter("alpha", "1", "scale error of alpha", 0.1, lower=-0.9, upper=2.0),
-        Parameter("beta", "1", "scale error of beta", 0.1, lower=-0.9, upper=2.0),
+        SimulationParameter("alpha", "1", "scale error of alpha", 0.1, lower=-0.9, upper=2.0),
+        SimulationParameter("beta", "1", "scale error of beta", 0.1, lower=-0.9, upper=2.0),
     ),
 )
 

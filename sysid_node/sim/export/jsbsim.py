@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from sysid_node.aircraft.model import Aircraft, Table
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.names import COEFFICIENTS, split_derivative
 from sysid_node.errors import InputError
 from sysid_node.sim.export.cells import finite, plain
@@ -206,7 +206,7 @@ _VARIABLES = {
 }
 
 
-def _table(parent: Element, table: Table, positions: Mapping[str, tuple[str, ...]]) -> None:
+def _table(parent: Element, table: LookupTable, positions: Mapping[str, tuple[str, ...]]) -> None:
     """A lookup table. Raises InputError where it is over a rate, which JSBSim has in other units."""
     variables = {**_VARIABLES, **{symbol: (place, 1.0) for symbol, (place,) in positions.items()}}
     element = SubElement(parent, "table")

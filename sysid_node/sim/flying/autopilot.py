@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.sim.flying.lengths import cut, padded
-from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight, fly
+from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight, fly
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.chain import Chain
-from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.model.state import body_state
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import command
@@ -87,7 +87,7 @@ def fly_held(
     simulator: Simulator,
     theta: Array,
     trim: Trim,
-    inputs: Inputs,
+    inputs: RolloutInputs,
     autopilot: Autopilot,
     given: NDArray[np.bool_] | None = None,
 ) -> SimulatedFlight:
@@ -113,12 +113,12 @@ def fly_held(
 
 @partial(jax.jit, static_argnums=(0, 1))
 def _fly_held(
-    layout: Layout,
+    layout: ParameterLayout,
     history: int,
-    model: Model,
+    model: AircraftNumbers,
     theta: Scalar,
     initial: Scalar,
-    inputs: Inputs,
+    inputs: RolloutInputs,
     step: Scalar,
     autopilot: Autopilot,
     given: Scalar,

@@ -26,7 +26,7 @@ from sysid_node.sim.flying.rollout import Pilot, advance, begin
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.chain import Chain
-from sysid_node.sim.model.layout import OUTPUTS, Layout, Model, Scalar
+from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.model.state import STATES
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 from sysid_node.sim.simulator import Simulator
@@ -145,7 +145,13 @@ def vector(simulator: Simulator, effects: Sequence[str]) -> Array:
 
 @partial(jax.jit, static_argnums=(0, 1))
 def _begin(
-    layout: Layout, history: int, model: Model, theta: Scalar, step: Scalar, initial: Scalar, first: Scalar
+    layout: ParameterLayout,
+    history: int,
+    model: AircraftNumbers,
+    theta: Scalar,
+    step: Scalar,
+    initial: Scalar,
+    first: Scalar,
 ) -> _LiveState:
     chain = Chain.of(layout, model, theta, step, -initial[2])
     commands, gusts = first[:-6], first[-6:]
@@ -155,7 +161,7 @@ def _begin(
 
 @partial(jax.jit, static_argnums=0)
 def _advance(
-    layout: Layout, model: Model, theta: Scalar, step: Scalar, carried: _LiveState, row: Scalar
+    layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, step: Scalar, carried: _LiveState, row: Scalar
 ) -> tuple[_LiveState, Scalar]:
     m = len(layout.commands)
     commands, gust, noise, time, altitude = row[:m], row[m : m + 6], row[m + 6 : -2], row[-2], row[-1]

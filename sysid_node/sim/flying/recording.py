@@ -31,7 +31,7 @@ _COMMAND_STEP = 2.0**-15
 
 
 @dataclass(frozen=True)
-class Recorder:
+class FlightSampler:
     """Rates (Hz), jitter (s rms) of the sampling times, latency (s) from stamp to log, and what is recorded.
 
     Where an autopilot holds its commands (``SortieConditions.command_rate``), the commanded surfaces are its commands,

@@ -18,13 +18,13 @@ from sysid_node.dynamics.lever_arm import specific_force_at
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation
 from sysid_node.sim.model.chain import Chain, Drive, SensedMotion, derivative, drive_of
-from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.model.state import MODE_RATE, body_state
 from sysid_node.sim.stations import actuator, airflow, clock, command, propulsion, sensors, structure
 from sysid_node.sim.stations.actuator import ActuatorState
 
 
-class Inputs(NamedTuple):
+class RolloutInputs(NamedTuple):
     """Inputs of a flight; N samples at the simulator's rate."""
 
     commands: Scalar  # (N, controls + 1): surfaces rad, thrust N, by their recorded stamps
@@ -62,11 +62,11 @@ class StepState(NamedTuple):
 
 
 def rollout(
-    layout: Layout,
-    model: Model,
+    layout: ParameterLayout,
+    model: AircraftNumbers,
     theta: Scalar,
     initial: Scalar,
-    inputs: Inputs,
+    inputs: RolloutInputs,
     step: Scalar,
     samples: Scalar | int | None = None,
 ) -> SimulatedFlight:
@@ -84,7 +84,7 @@ def rollout(
 def fly(
     chain: Chain,
     initial: Scalar,
-    inputs: Inputs,
+    inputs: RolloutInputs,
     pilot: Pilot,
     pilot_state: Any,
     samples: Scalar | int | None = None,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.errors import InputError
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
-from sysid_node.sim.flying.rollout import Inputs, SimulatedFlight
+from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.model.parameters import parse, stated
@@ -47,7 +47,7 @@ class Sortie:
     effects: dict[str, dict[str, float]]  # those asked for, turbulence and noise
     theta: Array  # (P,)
     trim: Trim
-    inputs: Inputs
+    inputs: RolloutInputs
     flight: SimulatedFlight
 
     @property
@@ -125,7 +125,7 @@ def _check_travel(simulator: Simulator, commands: Array) -> None:
         )
 
 
-def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: SortieConditions) -> Inputs:
+def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: SortieConditions) -> RolloutInputs:
     """Inputs with the commands and with realisations of turbulence and noise from the seed."""
     turbulence, noise = np.random.default_rng(conditions.seed).spawn(2)
     samples = len(commands)

@@ -18,7 +18,7 @@ from sysid_node.dynamics.attitude import quaternion, to_earth
 from sysid_node.errors import InputError
 from sysid_node.sim.flying.rollout import settled
 from sysid_node.sim.model.chain import Chain, derivative, drive_of
-from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.model.state import body_state
 from sysid_node.sim.simulator import Simulator
 from sysid_node.sim.stations import actuator, propulsion
@@ -126,7 +126,7 @@ def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Arra
 
 
 @partial(jax.jit, static_argnums=0)
-def _residual(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
+def _residual(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
     """Residual (7,): accelerations (6,) and the error of the sine of the climb angle."""
     chain = Chain.of(layout, model, theta, jnp.asarray(0.01), point.altitude)
     command = z[len(_ANGLES) :]
@@ -142,7 +142,12 @@ def _residual(layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: 
 
 @partial(jax.jit, static_argnums=0)
 def _slope(
-    layout: Layout, model: Model, theta: Scalar, point: TrimPoint, z: Scalar, direction: Scalar | Array
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    theta: Scalar,
+    point: TrimPoint,
+    z: Scalar,
+    direction: Scalar | Array,
 ) -> Scalar:
     """The residual's derivative (7,) along a direction of the unknowns.
 

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Table
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.aircraft.names import COEFFICIENTS
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ Function = Callable[[Mapping[str, Array]], Array]
 
 
 @dataclass(frozen=True)
-class Axis:
+class TableAxis:
     """One variable: its nodes, ascending, its value in the steady flight (one of the nodes) and a small step."""
 
     nodes: Array
@@ -34,7 +34,7 @@ class Axis:
     step: float
 
     @classmethod
-    def of(cls, nodes: Array | list[float], centre: float, step: float) -> Axis:
+    def of(cls, nodes: Array | list[float], centre: float, step: float) -> TableAxis:
         """The axis with the centre among its nodes; nodes closer than a hundredth of the step are one."""
         every = np.unique(np.append(np.asarray(nodes, float), centre))
         keep = np.append(True, np.diff(every) > 0.01 * step)
@@ -53,10 +53,10 @@ class Expansion:
     """Derivatives by name and tables that together are the function at every node of every pair of variables."""
 
     derivatives: dict[str, float]
-    tables: tuple[Table, ...]
+    tables: tuple[LookupTable, ...]
 
 
-def expand(function: Function, axes: Mapping[str, Axis], tolerance: Array) -> Expansion:
+def expand(function: Function, axes: Mapping[str, TableAxis], tolerance: Array) -> Expansion:
     """The function about the centre of its axes.
 
     ``tolerance`` (6,) is the change of each coefficient that is left out. The variable ``V`` (m/s) has no derivative,
@@ -67,7 +67,7 @@ def expand(function: Function, axes: Mapping[str, Axis], tolerance: Array) -> Ex
     alone = {name: _along(function, centre, {name: axis.nodes}) - f0 for name, axis in axes.items()}
     slopes = {name: _slope(function, centre, name, axis) for name, axis in axes.items() if name != "V"}
     derivatives: dict[str, float] = {}
-    tables: list[Table] = []
+    tables: list[LookupTable] = []
     for k, coefficient in enumerate(COEFFICIENTS):
         offset = float(f0[k])
         for name, axis in axes.items():
@@ -80,7 +80,7 @@ def expand(function: Function, axes: Mapping[str, Axis], tolerance: Array) -> Ex
             rest = alone[name][:, k] - slope * (axis.nodes - axis.centre)
             if np.abs(rest).max() > tolerance[k]:
                 keep = thinned(axis.nodes, rest[:, None], tolerance[k], axis.middle)
-                tables.append(Table(coefficient, (name,), (_numbers(axis.nodes[keep]),), _numbers(rest[keep])))
+                tables.append(LookupTable(coefficient, (name,), (_numbers(axis.nodes[keep]),), _numbers(rest[keep])))
         derivatives[f"{coefficient}_0"] = offset
     for first, second in combinations(axes, 2):
         tables += _pair(function, axes, centre, (first, second), alone, f0, tolerance)
@@ -100,7 +100,7 @@ def evaluate(expansion: Expansion, points: Mapping[str, Array]) -> Array:
     return result
 
 
-def look_up(table: Table, points: Mapping[str, Array]) -> Array:
+def look_up(table: LookupTable, points: Mapping[str, Array]) -> Array:
     """A table's values (N,)."""
     values = np.asarray(table.values)
     if len(table.over) == 1:
@@ -112,7 +112,7 @@ def look_up(table: Table, points: Mapping[str, Array]) -> Array:
 
 
 def largest_error(
-    function: Function, expansion: Expansion, axes: Mapping[str, Axis], share: float, count: int, seed: int = 0
+    function: Function, expansion: Expansion, axes: Mapping[str, TableAxis], share: float, count: int, seed: int = 0
 ) -> tuple[Array, Array]:
     """Largest error and range (6,) over random states in which all variables differ from the steady flight at once.
 
@@ -164,13 +164,13 @@ def _straight(nodes: Array, values: Array, tolerance: float) -> bool:
 
 def _pair(
     function: Function,
-    axes: Mapping[str, Axis],
+    axes: Mapping[str, TableAxis],
     centre: Mapping[str, float],
     names: tuple[str, str],
     alone: Mapping[str, Array],
     f0: Array,
     tolerance: Array,
-) -> list[Table]:
+) -> list[LookupTable]:
     """Tables of what two variables add together beyond what each adds by itself."""
     first, second = (axes[name].nodes for name in names)
     grid = _along(function, centre, dict(zip(names, (first, second), strict=True)))
@@ -183,7 +183,7 @@ def _pair(
         rows = thinned(first, part, 0.5 * tolerance[k], axes[names[0]].middle)
         columns = thinned(second, part.T, 0.5 * tolerance[k], axes[names[1]].middle)
         values = tuple(_numbers(row) for row in part[np.ix_(rows, columns)])
-        tables.append(Table(coefficient, names, (_numbers(first[rows]), _numbers(second[columns])), values))
+        tables.append(LookupTable(coefficient, names, (_numbers(first[rows]), _numbers(second[columns])), values))
     return tables
 
 
@@ -199,7 +199,7 @@ def _along(function: Function, centre: Mapping[str, float], moving: Mapping[str,
     return result.reshape(*shape, len(COEFFICIENTS))
 
 
-def _slope(function: Function, centre: Mapping[str, float], name: str, axis: Axis) -> Array:
+def _slope(function: Function, centre: Mapping[str, float], name: str, axis: TableAxis) -> Array:
     """The derivative (6,) at the centre by central differences."""
     both = _along(function, centre, {name: axis.centre + axis.step * np.array([-1.0, 1.0])})
     return np.asarray((both[1] - both[0]) / (2.0 * axis.step))

@@ -19,13 +19,13 @@ from sysid_node.aircraft.model import (
     Derivative,
     Geometry,
     Inertia,
-    Reference,
+    ReferenceCondition,
     Throttle,
     UncertainValue,
 )
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
-from sysid_node.sim.importing.expansion import Axis, expand
+from sysid_node.sim.importing.expansion import TableAxis, expand
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _LIFTS = (0.4, 0.25, 0.6, 0.9, 0.15)
 
 
 @dataclass(frozen=True)
-class States:
+class PlantStates:
     """N states of flight in still air: m/s, rad, rad/s; controls by symbol (rad); throttle 0..1. Each (N,)."""
 
     airspeed: Array
@@ -51,7 +51,7 @@ class States:
 
 
 #: Force (N) and moment about the centre of gravity (N m), body axes forward-right-down, (N, 6).
-LoadFunction = Callable[[States], Array]
+LoadFunction = Callable[[PlantStates], Array]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def aircraft_of(plant: Plant, airspeed: float | None) -> tuple[Aircraft, LevelFl
         mass=plant.mass,
         inertia=plant.inertia,
         geometry=plant.geometry,
-        reference=Reference(level.airspeed, plant.density),
+        reference=ReferenceCondition(level.airspeed, plant.density),
         controls=dict(plant.controls),
         derivatives={name: Derivative(value) for name, value in expansion.derivatives.items()},
         throttle=throttle,
@@ -121,7 +121,7 @@ def aircraft_of(plant: Plant, airspeed: float | None) -> tuple[Aircraft, LevelFl
     return aircraft, level
 
 
-def nondimensional(load: Array, density: float, states: States, geometry: Geometry) -> Array:
+def nondimensional(load: Array, density: float, states: PlantStates, geometry: Geometry) -> Array:
     """CL, CD, CY, Cl, Cm, Cn (N, 6) of forces and moments in body axes."""
     X, Y, Z, L, M, N = (load / (0.5 * density * states.airspeed**2 * geometry.S)[:, None]).T
     cos, sin = np.cos(states.alpha), np.sin(states.alpha)
@@ -129,37 +129,39 @@ def nondimensional(load: Array, density: float, states: States, geometry: Geomet
     return np.column_stack([X * sin - Z * cos, -X * cos - Z * sin, Y, *moments])
 
 
-def _engine(plant: Plant, states: States) -> Array:
+def _engine(plant: Plant, states: PlantStates) -> Array:
     return np.zeros((len(states.airspeed), 6)) if plant.engine is None else plant.engine(states)
 
 
-def _states(plant: Plant, level: LevelFlight) -> States:
+def _states(plant: Plant, level: LevelFlight) -> PlantStates:
     one = np.ones(1)
     controls = {symbol: value * one for symbol, value in level.deflections.items()}
     still = 0.0 * one
-    return States(level.airspeed * one, level.alpha * one, still, still, still, still, controls, level.throttle * one)
+    return PlantStates(
+        level.airspeed * one, level.alpha * one, still, still, still, still, controls, level.throttle * one
+    )
 
 
-def _states_of(plant: Plant, points: Mapping[str, Array], throttle: float) -> States:
+def _states_of(plant: Plant, points: Mapping[str, Array], throttle: float) -> PlantStates:
     """States from columns of regressors; rates there are non-dimensional."""
     speed = points["V"]
     p, r = (points[name] * 2.0 * speed / plant.geometry.b for name in "pr")
     q = points["q"] * 2.0 * speed / plant.geometry.cbar
     controls = {control.symbol: points[control.symbol] for control in plant.controls.values()}
-    return States(speed, points["alpha"], points["beta"], p, q, r, controls, np.full_like(speed, throttle))
+    return PlantStates(speed, points["alpha"], points["beta"], p, q, r, controls, np.full_like(speed, throttle))
 
 
-def _axes(plant: Plant, level: LevelFlight) -> dict[str, Axis]:
+def _axes(plant: Plant, level: LevelFlight) -> dict[str, TableAxis]:
     alpha, beta = plant.nodes["alpha"], plant.nodes["beta"]
-    axes = {"alpha": Axis.of(alpha, level.alpha, 1e-3), "beta": Axis.of(beta, 0.0, 1e-3)}
+    axes = {"alpha": TableAxis.of(alpha, level.alpha, 1e-3), "beta": TableAxis.of(beta, 0.0, 1e-3)}
     for name, size in (("p", 0.15), ("q", 0.03), ("r", 0.15)):
-        axes[name] = Axis.of(size * np.linspace(-1.0, 1.0, 5), 0.0, 0.01 * size)
+        axes[name] = TableAxis.of(size * np.linspace(-1.0, 1.0, 5), 0.0, 0.01 * size)
     speeds = level.airspeed * np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2, 1.35, 1.5])
-    axes["V"] = Axis.of(speeds, level.airspeed, 0.01)
+    axes["V"] = TableAxis.of(speeds, level.airspeed, 0.01)
     for control in plant.controls.values():
         limit = control.limit or 0.5
         nodes = plant.nodes.get(control.symbol, limit * np.linspace(-1.0, 1.0, 5))
-        axes[control.symbol] = Axis.of(nodes, level.deflections[control.symbol], 1e-3)
+        axes[control.symbol] = TableAxis.of(nodes, level.deflections[control.symbol], 1e-3)
     return axes
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Control, Geometry, Inertia
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.plant import Plant, States, aircraft_of
+from sysid_node.sim.importing.plant import Plant, PlantStates, aircraft_of
 
 Array = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ class _Model:
         }
         self._prop = {name: get(name) for name in _PROPELLER} if powered else {}
 
-    def air(self, s: States) -> Array:
+    def air(self, s: PlantStates) -> Array:
         """Loads (N, 6) of the airframe."""
         c, geometry = self._c, self.geometry
         p, r = (rate * geometry.b / (2.0 * s.airspeed) for rate in (s.p, s.r))
@@ -172,7 +172,7 @@ class _Model:
         plate = 2.0 * np.where(alpha >= 0.0, 1.0, -1.0) * np.sin(alpha) ** 2 * np.cos(alpha)
         return np.asarray((1.0 - sigma) * attached + sigma * plate)
 
-    def engine(self, s: States) -> Array:
+    def engine(self, s: PlantStates) -> Array:
         """Loads (N, 6) of motor and propeller: their balance of torques gives the rotor's speed (sec. 4.3 there)."""
         g, rho, speed = self._prop, self.density, s.airspeed
         D, turn = g["D_prop"], 2.0 * math.pi

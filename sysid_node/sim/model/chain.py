@@ -15,7 +15,7 @@ from sysid_node.dynamics.coefficients import Coefficients
 from sysid_node.dynamics.rigid_body import MassProperties, accelerations, free_fall
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation, steady_wind, unsteady_aerodynamics
-from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters, unpack
 from sysid_node.sim.model.state import MODE, MODE_RATE, SEPARATION, body_state
 from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
@@ -32,8 +32,8 @@ from sysid_node.sim.stations.airflow import Air
 class Chain:
     """An aircraft with its effects: all that is constant during a flight."""
 
-    layout: Layout
-    model: Model
+    layout: ParameterLayout
+    model: AircraftNumbers
     effects: dict[str, Values]
     body: MassProperties
     servos: Servos
@@ -41,7 +41,9 @@ class Chain:
     altitude: Scalar  # m, at the start
 
     @classmethod
-    def of(cls, layout: Layout, model: Model, theta: Parameters, step: Scalar, altitude: Scalar) -> Chain:
+    def of(
+        cls, layout: ParameterLayout, model: AircraftNumbers, theta: Parameters, step: Scalar, altitude: Scalar
+    ) -> Chain:
         """The chain of a parameter vector (P,)."""
         effects = unpack(layout, theta)
         servos = Servos.of(layout, effects, step)

@@ -29,7 +29,7 @@ Values = Mapping[str, Scalar]
 
 
 @dataclass(frozen=True)
-class Layout:
+class ParameterLayout:
     """The names of an aircraft's controls and derivatives, which shape the compiled program."""
 
     controls: tuple[str, ...]  # aerodynamic controls: "elevator", ...
@@ -48,7 +48,7 @@ class Layout:
         return tuple((name, regressor) for name, (c, regressor) in pairs if c == coefficient)
 
 
-class Model(NamedTuple):
+class AircraftNumbers(NamedTuple):
     """The aircraft file's numbers, SI."""
 
     mass: Scalar
@@ -77,13 +77,13 @@ OUTPUTS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "psi", "V", "alpha",
 _NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "alpha", "beta")
 
 
-def layout_of(aircraft: Aircraft) -> Layout:
+def layout_of(aircraft: Aircraft) -> ParameterLayout:
     """The layout of this aircraft."""
     tables = tuple((table.coefficient, table.over) for table in aircraft.tables)
-    return Layout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives), tables)
+    return ParameterLayout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives), tables)
 
 
-def model_of(aircraft: Aircraft) -> Model:
+def model_of(aircraft: Aircraft) -> AircraftNumbers:
     """The numbers of this aircraft. Raises InputError where the file lacks a moment of inertia."""
     inertia = aircraft.inertia
     moments = np.array([inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz])
@@ -112,7 +112,7 @@ def model_of(aircraft: Aircraft) -> Model:
         "air_data": aircraft.sensors.air_data,
         "noise": [aircraft.noise[name] for name in _NOISE_OF],
     }
-    model = Model(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})  # type: ignore[arg-type]
+    model = AircraftNumbers(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})  # type: ignore[arg-type]
     if not aircraft.tables:
         return model
     packed = pack([(table.points, table.values) for table in aircraft.tables])

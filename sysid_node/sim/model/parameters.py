@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.errors import InputError
-from sysid_node.sim.effects import EFFECTS, Parameter
+from sysid_node.sim.effects import EFFECTS, SimulationParameter
 from sysid_node.sim.effects.base import THROTTLE
-from sysid_node.sim.model.layout import Layout, Scalar, Values
+from sysid_node.sim.model.layout import ParameterLayout, Scalar, Values
 from sysid_node.suggestion import did_you_mean
 
 
 @cache
-def table(layout: Layout) -> tuple[tuple[str, Parameter], ...]:
+def table(layout: ParameterLayout) -> tuple[tuple[str, SimulationParameter], ...]:
     """(effect, parameter) of every entry of the vector, in order."""
     return tuple((effect.name, p) for effect in EFFECTS.values() for p in effect.parameters(layout))
 
 
 @cache
-def names(layout: Layout) -> tuple[str, ...]:
+def names(layout: ParameterLayout) -> tuple[str, ...]:
     """``effect.parameter`` of every entry."""
     return tuple(f"{effect}.{p.name}" for effect, p in table(layout))
 
@@ -36,7 +36,7 @@ def names(layout: Layout) -> tuple[str, ...]:
 Parameters = Scalar | Sequence[Scalar]
 
 
-def unpack(layout: Layout, theta: Parameters) -> dict[str, Values]:
+def unpack(layout: ParameterLayout, theta: Parameters) -> dict[str, Values]:
     """Values by effect and parameter of the vector (P,)."""
     values: dict[str, dict[str, Scalar]] = {}
     entries = jnp.unstack(theta) if isinstance(theta, jax.Array) else theta
@@ -45,13 +45,13 @@ def unpack(layout: Layout, theta: Parameters) -> dict[str, Values]:
     return dict(values)
 
 
-def neutral(layout: Layout) -> NDArray[np.float64]:
+def neutral(layout: ParameterLayout) -> NDArray[np.float64]:
     """The vector (P,) at which every effect is neutral."""
     return np.array([p.neutral for _, p in table(layout)])
 
 
 def vector(
-    layout: Layout, effects: Mapping[str, Mapping[str, float]], base: NDArray[np.float64] | None = None
+    layout: ParameterLayout, effects: Mapping[str, Mapping[str, float]], base: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
     """The vector (P,) with these effects; what is not given stays as in ``base`` (default: every effect neutral).
 
@@ -72,9 +72,9 @@ def vector(
 
 
 def _changes(
-    layout: Layout,
+    layout: ParameterLayout,
     effect: str,
-    known: Mapping[str, Parameter],
+    known: Mapping[str, SimulationParameter],
     values: Mapping[str, float],
     base: NDArray[np.float64],
 ) -> dict[str, float]:
@@ -103,13 +103,13 @@ def _changes(
     return {**changed, shared: least, **{name: total - least for name, total in totals.items()}}
 
 
-def _controls(effect: str, known: Mapping[str, Parameter]) -> set[str]:
+def _controls(effect: str, known: Mapping[str, SimulationParameter]) -> set[str]:
     """The parameters of an effect that are added to the one that all controls share."""
     names = EFFECT_NAMES[effect]
     return set(known) - {EFFECTS[effect].shared} - {p.name for p in names.fixed} if EFFECTS[effect].shared else set()
 
 
-def _check_given_once(effect: str, meant: Mapping[str, tuple[Parameter, float]]) -> None:
+def _check_given_once(effect: str, meant: Mapping[str, tuple[SimulationParameter, float]]) -> None:
     """Raise InputError where two keys mean the same parameter."""
     given: dict[str, str] = {}
     for key, (parameter, _) in meant.items():
@@ -118,7 +118,7 @@ def _check_given_once(effect: str, meant: Mapping[str, tuple[Parameter, float]])
         given[parameter.name] = key
 
 
-def _value_of_control(effect: str, shared: Parameter, control: str, value: float) -> float:
+def _value_of_control(effect: str, shared: SimulationParameter, control: str, value: float) -> float:
     """What the vector's entries of a control add up to, from the value that is stated for it."""
     of_control = replace(shared, name="", reciprocal=control) if shared.reciprocal else replace(shared, name=control)
     return _resolve(effect, {of_control.name: of_control}, control, value)[1]
@@ -140,7 +140,7 @@ class StatedParameter:
 
 
 @cache
-def stated_parameters(layout: Layout, effect: str) -> dict[str, StatedParameter]:
+def stated_parameters(layout: ParameterLayout, effect: str) -> dict[str, StatedParameter]:
     """The parameters of an effect by the names by which users state them: those that act on a control by its name."""
     index = {p.name: i for i, (name, p) in enumerate(table(layout)) if name == effect}
     shared = EFFECTS[effect].shared
@@ -152,7 +152,7 @@ def stated_parameters(layout: Layout, effect: str) -> dict[str, StatedParameter]
     return {**{c: StatedParameter(entries, inverse) for c, entries in controls.items()}, **others}
 
 
-def stated(layout: Layout, theta: Scalar | NDArray[np.float64], effect: str) -> dict[str, float]:
+def stated(layout: ParameterLayout, theta: Scalar | NDArray[np.float64], effect: str) -> dict[str, float]:
     """The parameters of an effect as users state them, at a vector (P,); what is neutral on a control is left out."""
     shared = EFFECTS[effect].shared
     values = {name: parameter.value(theta) for name, parameter in stated_parameters(layout, effect).items()}
@@ -188,12 +188,14 @@ def _known_effect(name: str) -> None:
         raise InputError(f"effect {name!r} is not known; known: {', '.join(EFFECTS)}{did_you_mean(name, EFFECTS)}")
 
 
-def _parameters(layout: Layout, effect: str) -> tuple[Parameter, ...]:
+def _parameters(layout: ParameterLayout, effect: str) -> tuple[SimulationParameter, ...]:
     _known_effect(effect)
     return EFFECTS[effect].parameters(layout)
 
 
-def _resolve(effect: str, known: Mapping[str, Parameter], key: str, value: float) -> tuple[Parameter, float]:
+def _resolve(
+    effect: str, known: Mapping[str, SimulationParameter], key: str, value: float
+) -> tuple[SimulationParameter, float]:
     """The parameter that a key names, and its value in the vector. Raises InputError on an impossible value."""
     by_everyday_name = {p.reciprocal: p for p in known.values() if p.reciprocal}
     parameter = known.get(key) or by_everyday_name.get(key)
@@ -206,7 +208,7 @@ def _resolve(effect: str, known: Mapping[str, Parameter], key: str, value: float
     return parameter, inner
 
 
-def _range(parameter: Parameter, key: str) -> str:
+def _range(parameter: SimulationParameter, key: str) -> str:
     """The range of a key's values, in words."""
     lower, upper, unit = parameter.lower, parameter.upper, parameter.unit
     if key == parameter.reciprocal:
@@ -215,7 +217,7 @@ def _range(parameter: Parameter, key: str) -> str:
     return f"{lower:g} to {upper:g}" + (f" {unit}" if unit != "1" else "")
 
 
-def _does_nothing(effect: str, switches: Sequence[Parameter]) -> str:
+def _does_nothing(effect: str, switches: Sequence[SimulationParameter]) -> str:
     """The message for an effect that is named but stays neutral."""
     first = switches[0]
     key, value = (

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, Parameter
+from sysid_node.sim.effects import EFFECTS, STATIONS, Effect, SimulationParameter
 from sysid_node.sim.flying.trim import trim_flight
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.model.state import STATES
-from sysid_node.sim.pages.line_chart import Panel, draw
+from sysid_node.sim.pages.line_chart import LineChart, draw
 from sysid_node.sim.signals.dryden import Dryden
 from sysid_node.sim.simulator import Simulator
 
@@ -141,7 +141,7 @@ def _section(simulator: Simulator, effect: Effect) -> str:
     )
 
 
-def _rows_of_controls(effect: Effect, parameters: Sequence[Parameter]) -> list[str]:
+def _rows_of_controls(effect: Effect, parameters: Sequence[SimulationParameter]) -> list[str]:
     """The rows of what all controls share, of each control, and of the rest."""
     shared, names = parameters[0], EFFECT_NAMES[effect.name]
     known, (per_control,) = {p.name for p in names.fixed}, names.each
@@ -158,7 +158,7 @@ def _rows_of_controls(effect: Effect, parameters: Sequence[Parameter]) -> list[s
     return rows
 
 
-def _row(p: Parameter) -> str:
+def _row(p: SimulationParameter) -> str:
     key = f"{p.name} (or {p.reciprocal})" if p.reciprocal else p.name
     shape = "" if p.switch else " (shapes the effect)"
     return f"| {key} | {p.unit} | {p.neutral:g} | {p.scale:g} | {p.lower:g} to {p.upper:g} | {p.meaning}{shape} |"
@@ -197,7 +197,7 @@ def _doublets(simulator: Simulator, time: Array) -> Array:
     return moves
 
 
-def _panels(simulator: Simulator, time: Array, before: Array, after: Array) -> list[Panel]:
+def _panels(simulator: Simulator, time: Array, before: Array, after: Array) -> list[LineChart]:
     """Charts of the one or two readings, or coordinates of the ground track, that change most for their range."""
     names = (*OUTPUTS, *STATES[:3])
     sigma = np.concatenate([np.asarray(simulator.model.noise), [1.0] * 3])
@@ -207,7 +207,7 @@ def _panels(simulator: Simulator, time: Array, before: Array, after: Array) -> l
         0.1 if change[: len(OUTPUTS)].any() else 1.0
     )  # the ground track is shown only where no reading changes
     best = [i for i in np.argsort(seen)[-1:-3:-1] if change[i] > sigma[i]]
-    return [Panel(f"{names[i]}, {_unit(names[i])}", time, before[:, i], after[:, i]) for i in best]
+    return [LineChart(f"{names[i]}, {_unit(names[i])}", time, before[:, i], after[:, i]) for i in best]
 
 
 def _unit(name: str) -> str:

@@ -17,7 +17,7 @@ _BEFORE, _AFTER = "#9a9a9a", "#1f5fa8"
 
 
 @dataclass(frozen=True)
-class Panel:
+class LineChart:
     """One chart: a title with the unit, time (N,) s, the two curves (N,)."""
 
     title: str
@@ -26,7 +26,7 @@ class Panel:
     after: Array
 
 
-def draw(panels: list[Panel], label: str) -> str:
+def draw(panels: list[LineChart], label: str) -> str:
     """SVG of the panels side by side; ``label`` is for screen readers."""
     width = len(panels) * _WIDTH + (len(panels) - 1) * _GAP
     parts = [
@@ -41,7 +41,7 @@ def draw(panels: list[Panel], label: str) -> str:
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
-def _panel(panel: Panel) -> list[str]:
+def _panel(panel: LineChart) -> list[str]:
     low = float(min(panel.before.min(), panel.after.min()))
     high = float(max(panel.before.max(), panel.after.max()))
     if high - low < 1e-9:

@@ -18,7 +18,7 @@ from sysid_node.dynamics.lever_arm import specific_force_at
 from sysid_node.dynamics.rigid_body import accelerations
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.model.chain import Chain, drive_of, steady_load, unsteady_load
-from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.model.parameters import Parameters
 from sysid_node.sim.prediction.active_effects import effect_acts, evaluate_if
 from sysid_node.sim.prediction.carried_states import CarriedStates, carried_states
@@ -49,8 +49,8 @@ class _VibratingMotion(NamedTuple):
 
 
 def predict_accelerations(
-    layout: Layout,
-    model: Model,
+    layout: ParameterLayout,
+    model: AircraftNumbers,
     theta: Parameters,
     signals: MeasuredSignals,
     step: Scalar,

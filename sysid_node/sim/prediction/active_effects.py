@@ -8,7 +8,7 @@ from typing import TypeVar
 import jax
 import numpy as np
 
-from sysid_node.sim.model.layout import Layout, Scalar
+from sysid_node.sim.model.layout import ParameterLayout, Scalar
 from sysid_node.sim.model.parameters import table
 
 _Result = TypeVar("_Result")
@@ -17,7 +17,7 @@ _Result = TypeVar("_Result")
 EffectActs = Callable[[str], Scalar | None]
 
 
-def effect_acts(layout: Layout, acting: Scalar | None, effect: str) -> Scalar | None:
+def effect_acts(layout: ParameterLayout, acting: Scalar | None, effect: str) -> Scalar | None:
     """Whether any switch of an effect is among the acting parameters (P,); None where these are not known."""
     if acting is None:
         return None

@@ -19,7 +19,7 @@ from sysid_node.dynamics.forces import coefficients_of, thrust_axes
 from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
 from sysid_node.dynamics.rigid_body import moment_for
 from sysid_node.dynamics.vector import Vector
-from sysid_node.sim.model.layout import Layout, Model, Scalar
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
 from sysid_node.sim.prediction.accelerations import Accelerations, predict_accelerations
 from sysid_node.sim.prediction.signals import MeasuredSignals
 from sysid_node.sim.simulator import Simulator
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 COEFFICIENTS = Coefficients._fields
 
 
-def coefficients(model: Model, signals: MeasuredSignals, accelerations: Accelerations) -> Coefficients:
+def coefficients(model: AircraftNumbers, signals: MeasuredSignals, accelerations: Accelerations) -> Coefficients:
     """Coefficients (N,) about the file's CG that accelerations (N,) show, reduced by the aircraft file alone."""
     rates, turning = Vector(*signals.rates.T), accelerations.turning
     imu, probe = Vector(*model.imu), Vector(*model.air_data)
@@ -49,7 +49,9 @@ def coefficients(model: Model, signals: MeasuredSignals, accelerations: Accelera
 
 
 @partial(jax.jit, static_argnums=0)
-def _expected(layout: Layout, model: Model, theta: Scalar, signals: MeasuredSignals, step: Scalar) -> Coefficients:
+def _expected(
+    layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, signals: MeasuredSignals, step: Scalar
+) -> Coefficients:
     return coefficients(model, signals, predict_accelerations(layout, model, theta, signals, step))
 
 
@@ -59,7 +61,9 @@ def predict_coefficients(simulator: Simulator, theta: Scalar | Array, signals: M
 
 
 @partial(jax.jit, static_argnums=0)
-def _slopes(layout: Layout, model: Model, theta: Scalar, signals: MeasuredSignals, step: Scalar) -> Coefficients:
+def _slopes(
+    layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, signals: MeasuredSignals, step: Scalar
+) -> Coefficients:
     slopes: Coefficients = jax.jacfwd(lambda t: _expected(layout, model, t, signals, step))(theta)
     return slopes
 

@@ -20,7 +20,7 @@ from sysid_node.sim.effects import (
 )
 from sysid_node.sim.effects.actuator_lag import Transition
 from sysid_node.sim.effects.base import of_control
-from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 
 
 class ActuatorState(NamedTuple):
@@ -33,20 +33,20 @@ class ActuatorState(NamedTuple):
     position: Scalar  # after the rate limit
 
 
-def start(model: Model, command: Scalar) -> ActuatorState:
+def start(model: AircraftNumbers, command: Scalar) -> ActuatorState:
     """The state at rest on a command (controls,), rad."""
     limited = jnp.clip(command, -model.limits, model.limits)
     return ActuatorState(limited, limited, jnp.zeros_like(limited), limited, limited)
 
 
-def lags(layout: Layout, effects: dict[str, Values], step: Scalar) -> Transition:
+def lags(layout: ParameterLayout, effects: dict[str, Values], step: Scalar) -> Transition:
     """The transitions (controls,) of the actuators' lags over one sample (``step`` s)."""
     values = effects["actuator_lag"]
     tau = jnp.stack([of_control(values, "time_constant", control) for control in layout.controls])
     return actuator_lag.transition(tau, values["damping"], step)
 
 
-def rate_limits(layout: Layout, effects: dict[str, Values]) -> Scalar:
+def rate_limits(layout: ParameterLayout, effects: dict[str, Values]) -> Scalar:
     """The inverse (controls,) of the largest rates, s/rad."""
     values = effects["actuator_rate_limit"]
     return jnp.stack([of_control(values, "inverse_rate", control) for control in layout.controls])
@@ -59,14 +59,14 @@ class Servos(NamedTuple):
     inverse_rate: Scalar  # s/rad
 
     @classmethod
-    def of(cls, layout: Layout, effects: dict[str, Values], step: Scalar) -> Servos:
+    def of(cls, layout: ParameterLayout, effects: dict[str, Values], step: Scalar) -> Servos:
         """The actuators with these effects, at samples every ``step`` s."""
         return cls(lags(layout, effects, step), rate_limits(layout, effects))
 
 
 def advance(
-    layout: Layout,
-    model: Model,
+    layout: ParameterLayout,
+    model: AircraftNumbers,
     effects: dict[str, Values],
     servos: Servos,
     state: ActuatorState,
@@ -86,7 +86,7 @@ def advance(
     return ActuatorState(limited, lagged, rate, linked, position)
 
 
-def positions(layout: Layout, effects: dict[str, Values], actuators: Scalar, time: Scalar) -> list[Scalar]:
+def positions(layout: ParameterLayout, effects: dict[str, Values], actuators: Scalar, time: Scalar) -> list[Scalar]:
     """Position of each surface, rad, from the positions of the actuators (..., controls), at a time (s)."""
     surfaces = []
     for i, control in enumerate(layout.controls):
@@ -95,7 +95,9 @@ def positions(layout: Layout, effects: dict[str, Values], actuators: Scalar, tim
     return surfaces
 
 
-def effective(layout: Layout, effects: dict[str, Values], surfaces: list[Scalar], time: Scalar) -> list[Scalar]:
+def effective(
+    layout: ParameterLayout, effects: dict[str, Values], surfaces: list[Scalar], time: Scalar
+) -> list[Scalar]:
     """Effective deflections, rad: those of a faultless aircraft with the same forces, at a time (s)."""
     loss = effects["control_effectiveness_loss"]
     return [

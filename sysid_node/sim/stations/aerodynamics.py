@@ -21,12 +21,17 @@ from sysid_node.sim.effects import (
     stall_separation,
     unsteady_aerodynamics,
 )
-from sysid_node.sim.model.layout import Layout, Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.stations.airflow import Air
 
 
 def deflections(
-    layout: Layout, model: Model, effects: dict[str, Values], surfaces: list[Scalar], air: Air, thrust: Scalar
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    effects: dict[str, Values],
+    surfaces: list[Scalar],
+    air: Air,
+    thrust: Scalar,
 ) -> list[Scalar]:
     """Deflection of each surface by which its derivatives are multiplied, rad."""
     bent = []
@@ -36,7 +41,9 @@ def deflections(
     return bent
 
 
-def regressors_of(layout: Layout, model: Model, air: Air, deflections: list[Scalar]) -> dict[str, Scalar]:
+def regressors_of(
+    layout: ParameterLayout, model: AircraftNumbers, air: Air, deflections: list[Scalar]
+) -> dict[str, Scalar]:
     """Every regressor by name except CL^2; rates are non-dimensional."""
     flow, one = (air.speed, air.alpha, air.beta), jnp.ones_like(air.speed)
     state = regressors(flow, air.rates, model.span, model.chord, model.airspeed, one)
@@ -46,7 +53,12 @@ def regressors_of(layout: Layout, model: Model, air: Air, deflections: list[Scal
 
 
 def coefficients(
-    layout: Layout, model: Model, effects: dict[str, Values], x: dict[str, Scalar], separation: Scalar, climb: Scalar
+    layout: ParameterLayout,
+    model: AircraftNumbers,
+    effects: dict[str, Values],
+    x: dict[str, Scalar],
+    separation: Scalar,
+    climb: Scalar,
 ) -> Coefficients:
     """All six coefficients without the terms in the rate of alpha.
 
@@ -86,7 +98,7 @@ def coefficients(
     )
 
 
-def looked_up(layout: Layout, model: Model, x: dict[str, Scalar]) -> dict[str, Scalar]:
+def looked_up(layout: ParameterLayout, model: AircraftNumbers, x: dict[str, Scalar]) -> dict[str, Scalar]:
     """What the aircraft file's lookup tables add to each coefficient that has any; ``x`` are the regressors."""
     if not isinstance(model.tables, PackedTables):
         return {}
@@ -103,7 +115,7 @@ def looked_up(layout: Layout, model: Model, x: dict[str, Scalar]) -> dict[str, S
     }
 
 
-def of_alpha_rate(model: Model, effects: dict[str, Values], air: Air, rate: Scalar) -> Coefficients:
+def of_alpha_rate(model: AircraftNumbers, effects: dict[str, Values], air: Air, rate: Scalar) -> Coefficients:
     """The terms in the rate of alpha (rad/s)."""
     values, reduced = effects["unsteady_aerodynamics"], rate * model.chord * 0.5 / air.speed
     zero = jnp.zeros_like(reduced)
@@ -114,6 +126,6 @@ def of_alpha_rate(model: Model, effects: dict[str, Values], air: Air, rate: Scal
     return Coefficients(lift, zero, zero, zero, pitching_moment, zero)
 
 
-def load(model: Model, air: Air, c: Coefficients) -> tuple[Vector, Vector]:
+def load(model: AircraftNumbers, air: Air, c: Coefficients) -> tuple[Vector, Vector]:
     """Force (N) and moment about the file's CG (N m), body axes."""
     return force_and_moment(c, stability_axes(air.velocity, jnp), air.pressure * model.area, model.span, model.chord)

@@ -10,7 +10,7 @@ from sysid_node.dynamics.airflow import flow_angles
 from sysid_node.dynamics.atmosphere import dynamic_pressure
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import gust, turbulence
-from sysid_node.sim.model.layout import Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, Scalar, Values
 
 
 class Air(NamedTuple):
@@ -30,7 +30,9 @@ class Air(NamedTuple):
         return pressure
 
 
-def gusts(model: Model, effects: dict[str, Values], given: Scalar, realisation: Scalar, time: Scalar) -> Scalar:
+def gusts(
+    model: AircraftNumbers, effects: dict[str, Values], given: Scalar, realisation: Scalar, time: Scalar
+) -> Scalar:
     """Gusts (..., 6) at a time (s): velocity of the air along body axes (m/s), its rotation (rad/s)."""
     total = turbulence.apply(effects["turbulence"], given, realisation)
     return gust.apply(effects["gust"], total, time, model.airspeed)

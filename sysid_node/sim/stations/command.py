@@ -5,23 +5,23 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from sysid_node.sim.effects.base import THROTTLE, of_control
-from sysid_node.sim.model.layout import Layout, Scalar, Values
+from sysid_node.sim.model.layout import ParameterLayout, Scalar, Values
 from sysid_node.sim.signals.time_shift import shift_columns
 
 
-def arrive(layout: Layout, effects: dict[str, Values], commands: Scalar, step: Scalar) -> Scalar:
+def arrive(layout: ParameterLayout, effects: dict[str, Values], commands: Scalar, step: Scalar) -> Scalar:
     """Commands (N, m) as they reach the actuators, from commands as they were recorded; step in s."""
     late = delays(layout, effects) - effects["actuator_stamp_delay"]["delay"]
     return shift_columns(commands, late / step)
 
 
-def delays(layout: Layout, effects: dict[str, Values]) -> Scalar:
+def delays(layout: ParameterLayout, effects: dict[str, Values]) -> Scalar:
     """The delay (controls + 1,) of each command, s; the throttle's last."""
     values = effects["command_delay"]
     return jnp.stack([of_control(values, "delay", name) for name in (*layout.controls, THROTTLE)])
 
 
-def arrive_from_history(layout: Layout, effects: dict[str, Values], history: Scalar, step: Scalar) -> Scalar:
+def arrive_from_history(layout: ParameterLayout, effects: dict[str, Values], history: Scalar, step: Scalar) -> Scalar:
     """The command (m,) that reaches the actuators now; ``history`` (K, m) of commands, the newest last."""
     position = jnp.arange(history.shape[0])[::-1, None]
     weight = jnp.maximum(1.0 - jnp.abs(position - delays(layout, effects) / step), 0.0)

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 from sysid_node.dynamics.rigid_body import MassProperties
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import cg_shift, inertia_error, mass_error
-from sysid_node.sim.model.layout import Model, Values
+from sysid_node.sim.model.layout import AircraftNumbers, Values
 
 
-def properties(model: Model, effects: dict[str, Values]) -> MassProperties:
+def properties(model: AircraftNumbers, effects: dict[str, Values]) -> MassProperties:
     """Mass (kg), CG (m) and inertia (kg m^2) with their effects."""
     return MassProperties(
         mass_error.apply(effects["mass_error"], model.mass),
@@ -19,7 +19,7 @@ def properties(model: Model, effects: dict[str, Values]) -> MassProperties:
     )
 
 
-def nominal(model: Model) -> MassProperties:
+def nominal(model: AircraftNumbers) -> MassProperties:
     """Mass (kg), CG (m) and inertia (kg m^2) of the aircraft file."""
     zero = jnp.zeros_like(model.mass)
     return MassProperties(model.mass, Vector(zero, zero, zero), *model.inertia)

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 from sysid_node.dynamics.forces import thrust_axes
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import motor_lag, thrust_line_offset, thrust_scale, thrust_yaw
-from sysid_node.sim.model.layout import Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, Scalar, Values
 
 
-def commanded(model: Model, thrust: Scalar) -> Scalar:
+def commanded(model: AircraftNumbers, thrust: Scalar) -> Scalar:
     """The commanded thrust (N) within the motor's limits."""
     return jnp.clip(thrust, 0.0, model.max_thrust)
 
@@ -25,7 +25,7 @@ def thrust(effects: dict[str, Values], state: Scalar) -> Scalar:
     return thrust_scale.apply(effects["thrust_scale"], state)
 
 
-def load(model: Model, effects: dict[str, Values], thrust: Scalar, alpha: Scalar) -> tuple[Vector, Vector]:
+def load(model: AircraftNumbers, effects: dict[str, Values], thrust: Scalar, alpha: Scalar) -> tuple[Vector, Vector]:
     """Force (N) and moment about the file's CG (N m), body axes."""
     forward, down = thrust_axes(model.thrust_inclination, jnp)
     force = Vector(thrust * forward, jnp.zeros_like(thrust), thrust * down)

@@ -20,16 +20,16 @@ from sysid_node.sim.effects import (
     vane_lever_arm,
     vane_scale,
 )
-from sysid_node.sim.model.layout import Model, Scalar, Values
+from sysid_node.sim.model.layout import AircraftNumbers, Scalar, Values
 from sysid_node.sim.signals.time_shift import slope
 
 
-def imu_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
+def imu_arm(model: AircraftNumbers, effects: dict[str, Values], body: MassProperties) -> Vector:
     """From the CG to the IMU, m."""
     return Vector(*model.imu).plus(imu_lever_arm.arm(effects["imu_lever_arm"])).minus(body.cg)
 
 
-def air_data_arm(model: Model, effects: dict[str, Values], body: MassProperties) -> Vector:
+def air_data_arm(model: AircraftNumbers, effects: dict[str, Values], body: MassProperties) -> Vector:
     """From the CG to the air-data probe, m."""
     return Vector(*model.air_data).plus(vane_lever_arm.arm(effects["vane_lever_arm"])).minus(body.cg)
 
@@ -95,6 +95,6 @@ def before_lag(effects: dict[str, Values], reading: Scalar, flow_rate: Scalar | 
     return reading + air_data_lag.behind(effects["air_data_lag"], flow_rate, step)
 
 
-def noisy(model: Model, effects: dict[str, Values], reading: Scalar, realisation: Scalar) -> Scalar:
+def noisy(model: AircraftNumbers, effects: dict[str, Values], reading: Scalar, realisation: Scalar) -> Scalar:
     """Readings (12,) with noise."""
     return sensor_noise.apply(effects["sensor_noise"], reading, model.noise, realisation)

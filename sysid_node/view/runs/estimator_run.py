@@ -23,7 +23,7 @@ from sysid_node.view.panels import (
     motion_panels,
     residual_panels,
 )
-from sysid_node.view.scene import NOTHING, VERMILION, Arrow, Change, Lane, Note, Scene
+from sysid_node.view.scene import NOTHING, VERMILION, Arrow, Lane, LaneChange, Note, Scene
 
 #: What the colours of the derivatives' plots mean.
 COLOURS = (
@@ -59,8 +59,8 @@ def fault_lanes(faults: FaultVerdict | None) -> list[Lane]:
     lanes = []
     for episode in faults.episodes if faults else ():
         fault = episode.fault
-        end = [] if episode.until is None else [Change(episode.until, NOTHING)]
-        changes = [Change(0.0, NOTHING), Change(fault.since, fault.kind), *end]
+        end = [] if episode.until is None else [LaneChange(episode.until, NOTHING)]
+        changes = [LaneChange(0.0, NOTHING), LaneChange(fault.since, fault.kind), *end]
         lanes.append(Lane(f"fault: {fault.part}", changes, VERMILION))
     return lanes
 

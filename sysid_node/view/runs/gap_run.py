@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.report.files.gap_flights import FLIGHTS, MISSING, STAGES, SimulatedFlight, read_flights
+from sysid_node.report.files.gap_flights import FLIGHTS, MISSING, STAGES, FlightTable, read_flights
 from sysid_node.report.wording.names import COEFFICIENT_WORDS, words_of
 from sysid_node.view.bodies import shape_of_aircraft
 from sysid_node.view.flight_path import attitude_of, earth_velocity, filled, integrated
@@ -26,8 +26,8 @@ from sysid_node.view.scene import (
     Arrow,
     Body,
     Colour,
-    Curve,
-    Panel,
+    PlotCurve,
+    PlotPanel,
     Scene,
 )
 
@@ -60,7 +60,7 @@ def scene_of_gap(folder: Path, content: Mapping[str, Any], aircraft: Aircraft | 
     )
 
 
-def _measured(flight: SimulatedFlight) -> FlightRecord:
+def _measured(flight: FlightTable) -> FlightRecord:
     """The flight's measured columns as a record, its controls under their symbols."""
     columns = {n.removeprefix("measured_"): v for n, v in flight.columns.items() if n.startswith("measured_")}
     symbols = {name: symbol for symbol, name in SURFACES.items()}
@@ -71,7 +71,7 @@ def _measured(flight: SimulatedFlight) -> FlightRecord:
     return FlightRecord(flight.time, columns | {"rho": flight["rho"]})
 
 
-def _bodies(flight: SimulatedFlight, arrows: list[Arrow], span: float) -> list[Body]:
+def _bodies(flight: FlightTable, arrows: list[Arrow], span: float) -> list[Body]:
     """The aircraft as measured, and the simulated ones beside it, so that none hides another."""
     measured = _pose(flight, "measured")
     if measured is None:
@@ -89,7 +89,7 @@ def _bodies(flight: SimulatedFlight, arrows: list[Arrow], span: float) -> list[B
     return bodies
 
 
-def _pose(flight: SimulatedFlight, stage: str) -> tuple[Array, Array] | None:
+def _pose(flight: FlightTable, stage: str) -> tuple[Array, Array] | None:
     """Position and attitude of a stage; a simulated one leaves the measured way where the simulator starts again."""
     angles = [flight[f"{stage}_{name}"] for name in _ANGLES]
     if not all(np.isfinite(values).any() for values in angles[:2]):
@@ -104,12 +104,12 @@ def _pose(flight: SimulatedFlight, stage: str) -> tuple[Array, Array] | None:
     return position, attitude
 
 
-def _velocity(flight: SimulatedFlight, stage: str, attitude: Array) -> Array:
+def _velocity(flight: FlightTable, stage: str, attitude: Array) -> Array:
     air = (filled(flight.time, flight[f"{stage}_{name}"]) for name in ("V", "alpha", "beta"))
     return earth_velocity(attitude, *air)
 
 
-def _arrows(flight: SimulatedFlight, record: FlightRecord, aircraft: Aircraft | None) -> list[Arrow]:
+def _arrows(flight: FlightTable, record: FlightRecord, aircraft: Aircraft | None) -> list[Arrow]:
     """The force and the moment that the simulator lacks before and after the correction, to one scale."""
     if aircraft is None:
         return []
@@ -128,7 +128,7 @@ def _scaled(arrow: Arrow, scale: float) -> Arrow:
     return Arrow(arrow.name, arrow.unit, arrow.time, arrow.vectors, arrow.colour, scale)
 
 
-def _readings(flight: SimulatedFlight) -> list[Panel]:
+def _readings(flight: FlightTable) -> list[PlotPanel]:
     """Each reading as measured, with the aircraft file, and corrected; a line ends where the simulator starts again."""
     panels = []
     for _, unit, factor, columns in MOTION:
@@ -139,23 +139,23 @@ def _readings(flight: SimulatedFlight) -> list[Panel]:
             restarts = flight["begins"] == 1.0
             series |= {s: np.where(restarts, np.nan, series[s]) for s in STAGES[1:]}
             curves = [
-                Curve(NAMES[s], flight.time, values, COLOURS[s], width)
+                PlotCurve(NAMES[s], flight.time, values, COLOURS[s], width)
                 for (s, values), width in zip(series.items(), (4.0, 1.2, 1.5), strict=True)
             ]
-            panels.append(Panel(name, unit, curves))
+            panels.append(PlotPanel(name, unit, curves))
     return panels
 
 
-def _missing(flight: SimulatedFlight) -> list[Panel]:
+def _missing(flight: FlightTable) -> list[PlotPanel]:
     """Coefficients that the simulator lacks, before and after the correction."""
     panels = []
     for coefficient, words in COEFFICIENT_WORDS.items():
         curves = [
-            Curve(NAMES[stage], flight.time, flight[f"{missing}_{coefficient}"], COLOURS[stage])
+            PlotCurve(NAMES[stage], flight.time, flight[f"{missing}_{coefficient}"], COLOURS[stage])
             for stage, missing in zip(STAGES[1:], MISSING, strict=True)
         ]
         if np.isfinite(curves[0].values).any():
-            panels.append(Panel(words, "", curves))
+            panels.append(PlotPanel(words, "", curves))
     return panels
 
 

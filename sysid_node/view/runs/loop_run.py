@@ -14,7 +14,20 @@ from sysid_node.report.results.closed_loop import ClosedLoopFlight
 from sysid_node.view.bodies import shape_of_aircraft
 from sysid_node.view.flight_path import attitude_of, filled
 from sysid_node.view.panels import DEGREES
-from sysid_node.view.scene import BLUE, GREY, NOTHING, PALE, VERMILION, Body, Change, Curve, Lane, Note, Panel, Scene
+from sysid_node.view.scene import (
+    BLUE,
+    GREY,
+    NOTHING,
+    PALE,
+    VERMILION,
+    Body,
+    Lane,
+    LaneChange,
+    Note,
+    PlotCurve,
+    PlotPanel,
+    Scene,
+)
 
 
 def scene_of_loop(folder: Path, content: dict[str, Any], aircraft: Aircraft | None) -> Scene:
@@ -40,27 +53,29 @@ def _flown(flight: ClosedLoopFlight, axis: str) -> Array:
     return np.add(flight.commanded[axis], flight.errors[axis], dtype=np.float64)
 
 
-def _panels(flight: ClosedLoopFlight, time: Array, flown: dict[str, Array]) -> list[Panel]:
+def _panels(flight: ClosedLoopFlight, time: Array, flown: dict[str, Array]) -> list[PlotPanel]:
     """Angles flown and commanded, then the errors, deg."""
     panels = [
-        Panel(axis, "deg", [
-            Curve("commanded", time, DEGREES * np.asarray(flight.commanded[axis]), GREY, 1.5),
-            Curve("flown", time, DEGREES * values, BLUE, 1.5),
+        PlotPanel(axis, "deg", [
+            PlotCurve("commanded", time, DEGREES * np.asarray(flight.commanded[axis]), GREY, 1.5),
+            PlotCurve("flown", time, DEGREES * values, BLUE, 1.5),
         ])
         for axis, values in flown.items()
     ]  # fmt: skip
     errors = [
-        Panel(f"{axis}, tracking error", "deg", [Curve("error", time, DEGREES * np.asarray(values), VERMILION)])
+        PlotPanel(f"{axis}, tracking error", "deg", [PlotCurve("error", time, DEGREES * np.asarray(values), VERMILION)])
         for axis, values in flight.errors.items()
     ]
     return [*panels, *errors]
 
 
 def _lanes(flight: ClosedLoopFlight) -> list[Lane]:
-    excited = [change for begin, end in flight.excited for change in (Change(begin, "excites"), Change(end, NOTHING))]
-    lanes = [Lane("exciter", [Change(0.0, NOTHING), *excited])]
+    excited = [
+        change for begin, end in flight.excited for change in (LaneChange(begin, "excites"), LaneChange(end, NOTHING))
+    ]
+    lanes = [Lane("exciter", [LaneChange(0.0, NOTHING), *excited])]
     if flight.failure:
-        lanes.append(Lane("failure", [Change(0.0, NOTHING), Change(flight.onset, flight.failure)], VERMILION))
+        lanes.append(Lane("failure", [LaneChange(0.0, NOTHING), LaneChange(flight.onset, flight.failure)], VERMILION))
     return lanes
 
 

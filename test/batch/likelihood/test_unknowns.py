@@ -5,7 +5,7 @@ import pytest
 from made_models import SHORT_PERIOD, flown, short_period_model
 
 from sysid_node.batch.likelihood.unknowns import Unknowns
-from sysid_node.batch.models.model import Parameter
+from sysid_node.batch.models.model import ModelParameter
 from sysid_node.errors import InputError
 
 
@@ -34,7 +34,7 @@ def test_only_parameters_have_bounds_and_priors():
     assert (upper[:5] == 0.0).all()
     assert np.isinf(lower[5:]).all()
     parameters = tuple(
-        Parameter(name, value, prior=(value, 2.0) if name == "Mq" else None, fixed=name == "Za")
+        ModelParameter(name, value, prior=(value, 2.0) if name == "Mq" else None, fixed=name == "Za")
         for name, value in SHORT_PERIOD.items()
     )
     index, mean, sigma = Unknowns.of(

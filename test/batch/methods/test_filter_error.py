@@ -8,7 +8,7 @@ from reference_flights import HFB_FILTER_ERROR, HFB_FILTER_ERROR_DET, hfb_320
 
 from sysid_node.batch.methods.filter_error import filter_error, predict_filter_error
 from sysid_node.batch.methods.output_error import output_error
-from sysid_node.batch.models.model import Parameter
+from sysid_node.batch.models.model import ModelParameter
 from sysid_node.errors import InputError
 
 
@@ -77,7 +77,7 @@ def test_outputs_with_gaps_are_refused():
 def test_a_parameter_at_its_bound_is_named_and_not_valid():
     lowest = 0.5 * SHORT_PERIOD["Mq"]
     starts = SHORT_PERIOD | {"Mq": 0.4 * SHORT_PERIOD["Mq"]}
-    parameters = tuple(Parameter(n, v, lower=lowest if n == "Mq" else -np.inf) for n, v in starts.items())
+    parameters = tuple(ModelParameter(n, v, lower=lowest if n == "Mq" else -np.inf) for n, v in starts.items())
     fit = filter_error(short_period_model().changed(parameters=parameters), [in_gusts(np.random.default_rng(2))])
     assert fit.estimates["Mq"].status == f"at its lower bound {lowest:g}"
     assert not fit.estimates["Mq"].valid

@@ -17,7 +17,7 @@ from reference_flights import (
 
 from sysid_node.batch.likelihood.maximum_likelihood import SearchOptions
 from sysid_node.batch.methods.output_error import output_error, predict_output_error
-from sysid_node.batch.models.model import Parameter
+from sysid_node.batch.models.model import ModelParameter
 from sysid_node.errors import InputError
 
 WRONG_START = {"Za": -3.0, "Zd": -0.1, "Ma": -25.0, "Mq": -4.0, "Md": -40.0}
@@ -143,7 +143,7 @@ def test_a_prior_counts_by_its_uncertainty():
 
 def test_a_parameter_at_its_bound_is_named_and_not_valid():
     parameters = [
-        Parameter(n, v, lower=-5.0 if n == "Mq" else -np.inf) for n, v in (SHORT_PERIOD | {"Mq": -4.0}).items()
+        ModelParameter(n, v, lower=-5.0 if n == "Mq" else -np.inf) for n, v in (SHORT_PERIOD | {"Mq": -4.0}).items()
     ]
     model = short_period_model().changed(parameters=tuple(parameters))
     fit = output_error(model, [noisy(flown(short_period_model()), np.random.default_rng(6))])
@@ -155,7 +155,7 @@ def test_a_parameter_at_its_bound_is_named_and_not_valid():
 
 
 def test_a_fixed_parameter_stays():
-    parameters = [Parameter(n, v, fixed=n == "Zd") for n, v in (SHORT_PERIOD | {"Zd": -0.5}).items()]
+    parameters = [ModelParameter(n, v, fixed=n == "Zd") for n, v in (SHORT_PERIOD | {"Zd": -0.5}).items()]
     fit = output_error(
         short_period_model().changed(parameters=tuple(parameters)),
         [noisy(flown(short_period_model()), np.random.default_rng(6))],
@@ -197,7 +197,7 @@ def test_two_names_for_one_effect_cannot_be_told_apart():
         return alpha_rate, q_rate + theta[5] * u[0]
 
     doubled = model.changed(
-        parameters=(*model.parameters, Parameter("Md2", 0.0)),
+        parameters=(*model.parameters, ModelParameter("Md2", 0.0)),
         derivative=derivative,
         output=lambda x, u, theta: model.output(x, u, theta[:5]),
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL
 
-from sysid_node.aircraft.model import Derivative, Table
+from sysid_node.aircraft.model import Derivative, LookupTable
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 
 SIGNALS = {
@@ -34,10 +34,10 @@ def test_the_drag_polar_is_a_parabola_over_lift():
 def test_tables_add_to_the_coefficients_and_to_the_lift_of_the_polar():
     """By NumPy's interpolation; half the rate over V, Mach with the speed of sound at sea level (ICAO Doc 7488)."""
     tables = (
-        Table("CL", ("alpha",), ((0.0, 0.08, 0.2),), (0.0, 0.04, -0.2)),
-        Table("CL", ("V", "q"), ((10.0, 30.0), (-1.0, 1.0)), ((0.0, 0.0), (-0.2, 0.2))),
-        Table("CL", ("Mach",), ((0.0, 0.1),), (0.0, 0.5)),
-        Table("CY", ("alpha",), ((0.0, 1.0),), (0.0, 1.0)),
+        LookupTable("CL", ("alpha",), ((0.0, 0.08, 0.2),), (0.0, 0.04, -0.2)),
+        LookupTable("CL", ("V", "q"), ((10.0, 30.0), (-1.0, 1.0)), ((0.0, 0.0), (-0.2, 0.2))),
+        LookupTable("CL", ("Mach",), ((0.0, 0.1),), (0.0, 0.5)),
+        LookupTable("CY", ("alpha",), ((0.0, 1.0),), (0.0, 1.0)),
     )
     evaluate = coefficient_function(dataclasses.replace(KESTREL, tables=tables), ("CL_alpha", "CD_k"), False)
     found = evaluate({**SIGNALS, "rho": jnp.array(1.225)}, (jnp.array(5.0), jnp.array(0.05)))

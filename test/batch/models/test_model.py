@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_models import SHORT_PERIOD, short_period_model
 
-from sysid_node.batch.models.model import Parameter
+from sysid_node.batch.models.model import ModelParameter
 from sysid_node.errors import InputError
 
 
@@ -19,7 +19,7 @@ from sysid_node.errors import InputError
 )
 def test_impossible_parameters_are_refused(arguments, said):
     with pytest.raises(InputError, match=said):
-        Parameter("Cm_q", **arguments)
+        ModelParameter("Cm_q", **arguments)
 
 
 def test_a_name_twice_is_refused():

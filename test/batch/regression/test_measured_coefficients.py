@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, clean, flight
 
-from sysid_node.aircraft.model import Table
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
@@ -31,9 +31,9 @@ def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
 def test_what_tables_add_is_subtracted_and_the_polar_has_the_whole_lift():
     """By NumPy's interpolation; a table of a coefficient that has no derivatives is not needed."""
     tables = (
-        Table("CL", ("alpha",), ((0.0, 0.05, 0.2),), (0.0, 0.02, -0.2)),
-        Table("Cm", ("V",), ((15.0, 25.0),), (0.0, 0.3)),
-        Table("Cl", ("p",), ((-0.1, 0.0, 0.1),), (0.01, 0.0, 0.01)),
+        LookupTable("CL", ("alpha",), ((0.0, 0.05, 0.2),), (0.0, 0.02, -0.2)),
+        LookupTable("Cm", ("V",), ((15.0, 25.0),), (0.0, 0.3)),
+        LookupTable("Cl", ("p",), ((-0.1, 0.0, 0.1),), (0.01, 0.0, 0.01)),
     )
     plain = measured_coefficients(KESTREL, clean())
     found = measured_coefficients(dataclasses.replace(KESTREL, tables=tables), clean())

@@ -7,7 +7,7 @@ import pytest
 from plain import DERIVATIVES, make_aircraft
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Control, Geometry, Inertia, Reference, Table, UncertainValue
+from sysid_node.aircraft.model import Control, Geometry, Inertia, LookupTable, ReferenceCondition, UncertainValue
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.dynamics.handbook.handbook import handbook
 from sysid_node.dynamics.linear_model import DimensionalScales, linear_model
@@ -30,7 +30,7 @@ def navion():
         mass=2750.0 / 32.174 * SLUG,
         inertia=Inertia(1048.0 * unit, 3000.0 * unit, 3530.0 * unit),
         geometry=Geometry(184.0 * FOOT**2, 33.4 * FOOT, 5.7 * FOOT),
-        reference=Reference(176.0 * FOOT, 0.002377 * SLUG / FOOT**3),
+        reference=ReferenceCondition(176.0 * FOOT, 0.002377 * SLUG / FOOT**3),
         effects={"unsteady_aerodynamics": {"CL_alphadot": UncertainValue(0.0), "Cm_alphadot": UncertainValue(-4.36)}},
     )
 
@@ -69,8 +69,8 @@ def test_tables_count_as_derivatives_do():
     alpha, elevator = (-0.3, 0.0, 0.3), (-0.5, 0.5)
     rows = tuple(tuple(-0.2 * a - 0.4 * e for e in elevator) for a in alpha)
     tables = (
-        Table("CL", ("alpha",), (alpha,), tuple(1.2 * a for a in alpha)),
-        Table("Cm", ("alpha", "de"), (alpha, elevator), rows),
+        LookupTable("CL", ("alpha",), (alpha,), tuple(1.2 * a for a in alpha)),
+        LookupTable("Cm", ("alpha", "de"), (alpha, elevator), rows),
     )
     values = {**DERIVATIVES, "CL_alpha": 3.0, "Cm_alpha": -0.4, "Cm_de": -0.5}
     mixed, plain = handbook(make_aircraft(values, tables=tables)), handbook(make_aircraft())

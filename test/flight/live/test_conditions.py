@@ -1,6 +1,6 @@
 """What a node says in its log: every change once, what lasts every ten seconds, and never a flood."""
 
-from sysid_node.flight.live.conditions import REPEAT, Conditions, States
+from sysid_node.flight.live.conditions import REPEAT, Conditions, ReportedStates
 
 
 class Clock:
@@ -38,7 +38,7 @@ def test_a_condition_that_comes_and_goes_is_no_flood() -> None:
 
 def test_a_state_is_said_when_its_words_change() -> None:
     clock = Clock()
-    states = States(clock)
+    states = ReportedStates(clock)
     lines = []
     waiting = [f"baseline: no estimates for {seconds} s" for seconds in ("0.6", "1.6")]
     for text in ("baseline: no estimates yet", "adapted", *waiting):

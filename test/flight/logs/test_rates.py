@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.flight.logs.autopilot_log import AutopilotLog, Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.rates import rate_of, rate_text, rates_of_log
 from sysid_node.flight.logs.steps import MOSTLY, share_in_steps
 
@@ -31,7 +31,7 @@ def test_a_log_of_steps_needs_a_higher_rate():
     time = stamps / 1e9
     for commands, needed in ((np.sign(np.sin(1.7 * time)), 50.0), (np.sin(1.7 * time), 20.0)):
         other = Signal("IMU", stamps, np.zeros((400, 6)))
-        controls = Commands(("elevator",), Signal("RCOU", stamps, 0.2 * commands[:, np.newaxis]))
+        controls = LoggedCommands(("elevator",), Signal("RCOU", stamps, 0.2 * commands[:, np.newaxis]))
         log = AutopilotLog("x", "ArduPlane", other, absent("ATT", 4), other, other, controls, controls)
         found = rates_of_log(log)["actuators"]
         assert found.needed == needed

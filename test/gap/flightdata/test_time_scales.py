@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Derivative, Reference
+from sysid_node.aircraft.model import Derivative, ReferenceCondition
 from sysid_node.gap.flightdata.time_scales import dutch_roll, highest_frequency, roll_subsidence, short_period
 
 
@@ -20,7 +20,9 @@ def test_modes_are_those_of_the_eigenvalues() -> None:
 def test_modes_follow_the_airspeed() -> None:
     """All derivatives held, they are proportional to it."""
     aircraft = load_aircraft("cdrw")
-    slow = replace(aircraft, reference=Reference(0.5 * aircraft.reference.airspeed, aircraft.reference.air_density))
+    slow = replace(
+        aircraft, reference=ReferenceCondition(0.5 * aircraft.reference.airspeed, aircraft.reference.air_density)
+    )
     for mode in (short_period, dutch_roll, roll_subsidence):
         assert mode(slow) == pytest.approx(0.5 * mode(aircraft))
 

@@ -13,13 +13,13 @@ from sysid_node.online.changes.excited_segments import (
     no_excited_segments,
     remember,
 )
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, Information, nothing
 from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
-LAYOUT = Layout(("alpha", "beta", "de", "da", "dr"), ("de", "da", "dr"), ())
+LAYOUT = SignalLayout(("alpha", "beta", "de", "da", "dr"), ("de", "da", "dr"), ())
 PLAN: NormalEquations = normal_equations.normal_equations(
     {"Cm": ("0", "alpha", "de"), "Cn": ("0", "beta", "da", "dr")}, LAYOUT
 )

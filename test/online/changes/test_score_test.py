@@ -10,8 +10,8 @@ from scipy.stats import f as fisher
 
 from sysid_node.online import estimator
 from sysid_node.online.changes.detection import ChangeTests
-from sysid_node.online.changes.score_test import Reference, ScoreTest, disagreement, score_test
-from sysid_node.online.frequency.regression_signals import Layout
+from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, disagreement, score_test
+from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
@@ -21,18 +21,18 @@ from sysid_node.online.state import EstimatorState
 Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()
 RATE, SECONDS, CHANGED_AT = 100.0, 22.0, 18.0
-LAYOUT = Layout(("alpha", "q", "de"), ("de",), ())
+LAYOUT = SignalLayout(("alpha", "q", "de"), ("de",), ())
 PLAN = normal_equations.normal_equations({"CL": ("0", "alpha", "de"), "Cm": ("0", "alpha", "q", "de")}, LAYOUT)
 SPECTRUM = spectrum(2.0 * math.pi * np.arange(0.1, 2.0, 0.04), math.inf)
 LINES = 2 * SPECTRUM.omega.size
 
 
-def reference(theta: Array, covariance: Array, density: float = 1.0, freedom: float = 50.0) -> Reference:
+def reference(theta: Array, covariance: Array, density: float = 1.0, freedom: float = 50.0) -> ReferenceEstimates:
     """Estimates of one density in all bands."""
     C, P = PLAN.outputs.size, PLAN.columns.size
     solution = Solution(theta, np.eye(P), np.ones(C), np.ones(C), np.array(True))
     bands = np.full((C, BANDS), density)
-    return Reference(0.0, PLAN, solution, Uncertainty(covariance, bands[:, 0], bands, np.full(C, freedom)))
+    return ReferenceEstimates(0.0, PLAN, solution, Uncertainty(covariance, bands[:, 0], bands, np.full(C, freedom)))
 
 
 def test_statistic_is_that_of_plain_least_squares() -> None:

@@ -8,7 +8,7 @@ import pytest
 from plant import TRUTH, exact_flight, made_aircraft
 from scipy.interpolate import RegularGridInterpolator
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Inertia, Sensors, Table, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Inertia, LookupTable, Sensors, Throttle
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.frequency import regression_signals
@@ -78,13 +78,13 @@ def test_the_motion_tells_right_from_wrong() -> None:
 
 BENDS = (0.0, 0.05, 0.1, 0.16)
 TABLES = (
-    Table("CL", ("alpha",), (BENDS,), (0.0, 0.0, -0.03, -0.15)),
-    Table(
+    LookupTable("CL", ("alpha",), (BENDS,), (0.0, 0.0, -0.03, -0.15)),
+    LookupTable(
         "Cm", ("alpha", "beta"), (BENDS, (-0.1, 0.0, 0.1)), ((0.0,) * 3, (0.03, 0, -0.01), (0.02, 0, 0), (-0.03,) * 3)
     ),
-    Table("CD", ("V",), ((15.0, 18.0, 21.0),), (0.02, 0.0, 0.03)),
-    Table("CD", ("Mach",), ((0.04, 0.054, 0.06),), (0.0, 0.0, 0.05)),
-    Table("Cl", ("p",), ((-0.03, 0.0, 0.01, 0.03),), (-0.002, 0.0, 0.002, 0.0)),
+    LookupTable("CD", ("V",), ((15.0, 18.0, 21.0),), (0.02, 0.0, 0.03)),
+    LookupTable("CD", ("Mach",), ((0.04, 0.054, 0.06),), (0.0, 0.0, 0.05)),
+    LookupTable("Cl", ("p",), ((-0.03, 0.0, 0.01, 0.03),), (-0.002, 0.0, 0.002, 0.0)),
 )
 
 
@@ -122,7 +122,7 @@ def test_derivatives_are_recovered_on_top_of_tables() -> None:
 
 
 @pytest.mark.parametrize("tables", [(), TABLES])
-def test_one_sample_and_many_give_the_same_bits(tables: tuple[Table, ...]) -> None:
+def test_one_sample_and_many_give_the_same_bits(tables: tuple[LookupTable, ...]) -> None:
     aircraft = with_derivatives(AIRCRAFT["IMU and vanes away from the CG"], CL_V=0.2, CD_k=0.05)
     aircraft = replace(aircraft, tables=tables)
     time = np.arange(0.0, 3.0, 0.01)

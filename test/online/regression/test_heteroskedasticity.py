@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from plant import made_aircraft
 
-from sysid_node.online.frequency.regression_signals import Layout, layout
+from sysid_node.online.frequency.regression_signals import SignalLayout, layout
 from sysid_node.online.regression import heteroskedasticity, normal_equations
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 
@@ -14,7 +14,7 @@ AIRCRAFT = made_aircraft()
 STEP = 0.01  # s
 
 
-def bursts(seed: int, samples: int = 400) -> tuple[Layout, normal_equations.NormalEquations, Array]:
+def bursts(seed: int, samples: int = 400) -> tuple[SignalLayout, normal_equations.NormalEquations, Array]:
     """A roll motion of a few short bursts, as rows of signals."""
     equations = normal_equations.normal_equations({"Cl": ("p", "da")}, layout := signals())
     rows = np.zeros((samples, layout.transformed))
@@ -25,7 +25,7 @@ def bursts(seed: int, samples: int = 400) -> tuple[Layout, normal_equations.Norm
     return layout, equations, rows
 
 
-def signals() -> Layout:
+def signals() -> SignalLayout:
     """The layout of all signals."""
     return layout(AIRCRAFT, ())
 

@@ -91,7 +91,7 @@ def test_no_more_noise_is_subtracted_than_the_residuals_show(noisy_flights: tupl
 
 def test_all_that_the_residual_holds_is_allowed() -> None:
     """One regressor with noise of energy b: the residual holds theta^2 b, beyond which the column's share shrinks."""
-    layout = regression_signals.Layout(("p",))
+    layout = regression_signals.SignalLayout(("p",))
     equations = normal_equations.normal_equations({"Cl": ("p",)}, layout)
     bias = np.zeros((layout.width, layout.width))
     p = layout.column("p")

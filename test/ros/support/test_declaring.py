@@ -6,14 +6,14 @@ import pytest
 
 from sysid_node.errors import InputError
 from sysid_node.given_values import given_values
-from sysid_node.parameter import Parameter
+from sysid_node.parameter import NodeParameter
 from sysid_node.ros.support.declaring import refuse_mistyped
 
 TABLE = (
-    Parameter("adapt", True, "", "", ""),
-    Parameter("gain", 2.0, "", "", "", 0.0, 9.0),
-    Parameter("method", "iv_rft", "", "", ""),
-    Parameter("lines", [0.1, 0.04, 2.0], "Hz", "", ""),
+    NodeParameter("adapt", True, "", "", ""),
+    NodeParameter("gain", 2.0, "", "", "", 0.0, 9.0),
+    NodeParameter("method", "iv_rft", "", "", ""),
+    NodeParameter("lines", [0.1, 0.04, 2.0], "Hz", "", ""),
 )
 
 

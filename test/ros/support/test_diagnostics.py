@@ -7,9 +7,9 @@ import pytest
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.flight.live.recent_counts import RecentCounts
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.ros.support.diagnostics import ERROR, OK, STALE, WARN, Source
+from sysid_node.ros.support.diagnostics import ERROR, OK, STALE, WARN, DiagnosticSource
 
-SOURCE = Source("identifier", "cdrw")
+SOURCE = DiagnosticSource("identifier", "cdrw")
 
 
 def values(status) -> dict[str, str]:

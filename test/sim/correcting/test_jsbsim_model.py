@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, Reference, Throttle
+from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
 from sysid_node.aircraft.model import UncertainValue as Value
 from sysid_node.errors import InputError
 
@@ -41,7 +41,7 @@ def file(survey):
         mass=survey.mass,
         inertia=Inertia(**survey.inertia),
         geometry=Geometry(*survey.geometry),
-        reference=Reference(52.0, 1.12),
+        reference=ReferenceCondition(52.0, 1.12),
         controls={name: Control(name, symbol, {name: 1.0}) for name, symbol in symbols.items()},
         derivatives=derivatives,
         throttle=Throttle("throttle", 3000.0),
@@ -179,7 +179,7 @@ def test_the_rest_of_the_file_stays_and_what_is_no_models_is_said(survey, file, 
     ],
 )
 def test_a_simulator_that_is_not_the_aircrafts_is_one_line(file, text, said):
-    known = replace(file, reference=Reference(130.0, 0.9)) if text.endswith("737") else file
+    known = replace(file, reference=ReferenceCondition(130.0, 0.9)) if text.endswith("737") else file
     with pytest.raises(InputError, match=said) as error:
         user_simulator(text, known)
     assert "\n" not in str(error.value)

@@ -8,7 +8,7 @@ from sysid_node.aircraft.model import Control
 from sysid_node.errors import InputError
 from sysid_node.flight.servos import Servo, ServoState, give, move
 from sysid_node.sim import Simulator
-from sysid_node.sim.flying.recording import START_NS, Recorder
+from sysid_node.sim.flying.recording import START_NS, FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
 RATE, SECONDS = 200.0, 12.0
@@ -84,7 +84,7 @@ def test_the_seed_determines_the_flight(fast, moves, sortie):
 
 
 def test_streams_have_their_rates_and_stamps(sortie):
-    streams = Recorder().record(sortie)
+    streams = FlightSampler().record(sortie)
     span = SECONDS
     assert [len(s.arrival) for s in streams.by_topic.values()] == [200 * span + 1, 100 * span + 1, 100 * span + 1]
     stamps = streams.imu.arrival.stamp_ns
@@ -99,7 +99,7 @@ def test_streams_have_their_rates_and_stamps(sortie):
 
 def test_readings_are_the_flight_at_the_stamps(fast, moves):
     quiet = fly_sortie(fast, moves, SortieConditions(noise=0.0))
-    streams = Recorder(quantise=False).record(quiet)
+    streams = FlightSampler(quantise=False).record(quiet)
     time = (streams.imu.arrival.stamp_ns - START_NS) / 1e9
     outputs, grid = np.asarray(quiet.flight.outputs), np.arange(len(moves)) * fast.step
     for i, name in enumerate(("p", "q", "r"), start=3):
@@ -113,8 +113,8 @@ def test_readings_are_the_flight_at_the_stamps(fast, moves):
 
 
 def test_noise_and_quantisation(fast, moves, sortie):
-    streams = Recorder().record(sortie)
-    clean = Recorder(quantise=False).record(
+    streams = FlightSampler().record(sortie)
+    clean = FlightSampler(quantise=False).record(
         fly_sortie(fast, moves, SortieConditions(turbulence="light", seed=4, noise=0.0))
     )
     step = 32 * 9.80665 / 2**16
@@ -126,7 +126,7 @@ def test_noise_and_quantisation(fast, moves, sortie):
 
 
 def test_stamp_delay_of_the_actuators(fast, moves):
-    recorder = Recorder(jitter=0.0)
+    recorder = FlightSampler(jitter=0.0)
     late = recorder.record(fly_sortie(fast, moves, SortieConditions(["actuator_stamp_delay:delay=0.05"], noise=0.0)))
     plain = recorder.record(fly_sortie(fast, moves, SortieConditions(noise=0.0)))
     np.testing.assert_allclose(late.actuators.positions[5:], plain.actuators.positions[:-5], atol=1e-9)
@@ -148,7 +148,7 @@ def test_recorded_commands_move_the_surfaces_as_the_servo_model_says(fast, moves
     conditions = SortieConditions(effects, autopilot=False, noise=0.0, command_rate=50.0)
     steps = 0.05 * np.sign(np.sin(2.0 * np.pi * np.arange(len(moves)) * fast.step))[:, None] * [1.0, 1.0, 1.0, 0.0]
     sortie = fly_sortie(fast, steps[:800], conditions)
-    commands = Recorder().commands(sortie)
+    commands = FlightSampler().commands(sortie)
     assert np.diff(commands.arrival.stamp_ns)[1:] == pytest.approx(20_000_000, abs=1)
     state, found = ServoState(servo), []
     for stamp, row in zip(commands.arrival.stamp_ns.tolist(), commands.positions.tolist(), strict=True):
@@ -168,7 +168,7 @@ def test_measured_surfaces_and_mixed_joints(moves):
     controls = {n: Control(n, symbols[n], joints[n], limit=0.4, offset=0.01) for n in symbols}
     simulator = Simulator(make_aircraft(controls=controls), RATE)
     sortie = fly_sortie(simulator, moves, SortieConditions(["actuator_lag:time_constant=0.1"], noise=0.0))
-    streams = Recorder(surfaces="measured", jitter=0.0).record(sortie)
+    streams = FlightSampler(surfaces="measured", jitter=0.0).record(sortie)
     assert streams.actuators.names == ("left", "right", "rudder", "throttle")
     left, right = streams.actuators.positions[:, 0], streams.actuators.positions[:, 1]
     surfaces = np.asarray(sortie.flight.surfaces)[::2]
@@ -196,6 +196,6 @@ def test_travel_is_checked_with_trim(fast, moves):
 
 def test_bad_recorders():
     with pytest.raises(InputError, match="air_data_rate 0 Hz: expected 1 to 5000"):
-        Recorder(air_data_rate=0.0)
+        FlightSampler(air_data_rate=0.0)
     with pytest.raises(InputError, match="expected commanded or measured"):
-        Recorder(surfaces="guessed")
+        FlightSampler(surfaces="guessed")

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from sysid_node.sim.importing.expansion import Axis, evaluate, expand, largest_error, thinned
+from sysid_node.sim.importing.expansion import TableAxis, evaluate, expand, largest_error, thinned
 
 AXES = {
-    "alpha": Axis.of(np.linspace(-0.2, 0.3, 11), 0.05, 1e-3),
-    "q": Axis.of([-0.02, 0.0, 0.02], 0.0, 1e-3),
-    "V": Axis.of([15.0, 18.0, 20.0, 22.0], 20.0, 0.1),
-    "de": Axis.of([-0.3, 0.0, 0.3], -0.04, 1e-3),
+    "alpha": TableAxis.of(np.linspace(-0.2, 0.3, 11), 0.05, 1e-3),
+    "q": TableAxis.of([-0.02, 0.0, 0.02], 0.0, 1e-3),
+    "V": TableAxis.of([15.0, 18.0, 20.0, 22.0], 20.0, 0.1),
+    "de": TableAxis.of([-0.3, 0.0, 0.3], -0.04, 1e-3),
 }
 
 

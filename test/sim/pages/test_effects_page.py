@@ -7,7 +7,7 @@ import numpy as np
 
 from sysid_node.sim import EFFECTS
 from sysid_node.sim.pages.effects_page import EXAMPLES, page
-from sysid_node.sim.pages.line_chart import Panel, draw
+from sysid_node.sim.pages.line_chart import LineChart, draw
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "reference"
 
@@ -26,4 +26,4 @@ def test_every_effect_has_an_example_and_a_picture():
 
 def test_a_flat_line_can_be_drawn():
     time = np.linspace(0.0, 1.0, 10)
-    assert "NaN" not in draw([Panel("flat", time, time * 0, time * 0)], "nothing").replace("nan", "NaN")
+    assert "NaN" not in draw([LineChart("flat", time, time * 0, time * 0)], "nothing").replace("nan", "NaN")

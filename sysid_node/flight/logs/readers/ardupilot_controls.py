@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sysid_node.flight.logs.autopilot_log import Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import LoggedCommands, Signal, absent
 from sysid_node.flight.logs.readers.mixing import SIGNS, unmixed
 from sysid_node.flight.record import Array
 
@@ -30,14 +30,16 @@ _THROTTLES = (70, 73, 74)
 _SHORTEST, _LONGEST = 400.0, 2600.0
 
 
-def control_commands(outputs: Commands, parameters: Mapping[str, float]) -> tuple[Commands, tuple[str, ...]]:
+def control_commands(
+    outputs: LoggedCommands, parameters: Mapping[str, float]
+) -> tuple[LoggedCommands, tuple[str, ...]]:
     """The controls' fractions of full command, and remarks, from the pulses (us) of the outputs out1, out2, ..."""
     pulses = np.where((outputs.signal.values >= _SHORTEST) & (outputs.signal.values <= _LONGEST), 1.0, np.nan)
     pulses = pulses * outputs.signal.values
     functions = {i: int(parameters.get(f"SERVO{i + 1}_FUNCTION", 0)) for i in range(len(outputs.names))}
     surfaces = [i for i, function in functions.items() if function in _KINDS and np.isfinite(pulses[:, i]).any()]
     if not surfaces:
-        return Commands((), absent(outputs.signal.source, 0)), _without_surfaces(parameters)
+        return LoggedCommands((), absent(outputs.signal.source, 0)), _without_surfaces(parameters)
     commands = np.column_stack([_angle(pulses[:, i], i + 1, parameters) for i in surfaces])
     names, fractions = unmixed([SIGNS[_KINDS[functions[i]]] for i in surfaces], commands)
     columns = [fractions]
@@ -47,7 +49,7 @@ def control_commands(outputs: Commands, parameters: Mapping[str, float]) -> tupl
             names = (*names, name)
             columns.append(np.mean([_range(pulses[:, i], i + 1, parameters) for i in places], axis=0)[:, np.newaxis])
     signal = Signal(outputs.signal.source, outputs.signal.stamp_ns, np.hstack(columns))
-    return Commands(names, signal), ()
+    return LoggedCommands(names, signal), ()
 
 
 def _without_surfaces(parameters: Mapping[str, float]) -> tuple[str, ...]:

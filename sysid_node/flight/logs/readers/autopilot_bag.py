@@ -21,7 +21,7 @@ from sysid_node.flight.autopilots.mavros import ATTITUDE as MAVROS_ATTITUDE
 from sysid_node.flight.autopilots.mavros import IMU as MAVROS_IMU
 from sysid_node.flight.autopilots.recorded import LoggedSample
 from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.record import Array
 
 _RATE = {
@@ -142,8 +142,8 @@ def _converted(
         attitude=turned,
         airspeed=airspeed,
         density=density.selected(np.isfinite(density.values[:, 0])),
-        controls=Commands((), absent(said[JointSample], 0)),
-        outputs=Commands(tuple(names), outputs),
+        controls=LoggedCommands((), absent(said[JointSample], 0)),
+        outputs=LoggedCommands(tuple(names), outputs),
         vanes=Signal("vanes", airspeed.stamp_ns, flow) if np.isfinite(flow).any() else None,
         remarks=("a recording of topics holds no parameters of the outputs",),
         remedies={IMU: remedy, AIRSPEED: remedy, CONTROLS: remedy},

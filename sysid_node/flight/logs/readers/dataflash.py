@@ -12,7 +12,7 @@ import numpy as np
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.base import GAS_CONSTANT, SEA_LEVEL_DENSITY
 from sysid_node.flight.frames import quaternion_from_euler
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
 from sysid_node.flight.logs.readers.ardupilot_controls import control_commands
 from sysid_node.flight.logs.readers.packages import quietly, required
@@ -163,7 +163,7 @@ def _airspeed(rows: Rows, density: Signal) -> Signal:
     return Signal(name, equivalent.stamp_ns, equivalent.values * np.sqrt(SEA_LEVEL_DENSITY / at)[:, np.newaxis])
 
 
-def _outputs(rows: Rows) -> Commands:
+def _outputs(rows: Rows) -> LoggedCommands:
     """The pulses (us) of all outputs, at the times of RCOU; later banks are taken at their last sample."""
     base = _signal(rows["RCOU"], "RCOU", ())
     names: list[str] = []
@@ -179,7 +179,7 @@ def _outputs(rows: Rows) -> Commands:
     values = np.column_stack(columns)[:, order] if columns else np.empty((0, 0))
     if [names[i] for i in order] != [f"out{i + 1}" for i in range(len(names))]:
         raise InputError("RCOU: the outputs are not numbered from 1 without a gap; the log is damaged")
-    return Commands(tuple(names[i] for i in order), Signal("RCOU", base.stamp_ns, values))
+    return LoggedCommands(tuple(names[i] for i in order), Signal("RCOU", base.stamp_ns, values))
 
 
 def _output_numbers(rows: list[dict[str, Any]]) -> dict[str, int]:

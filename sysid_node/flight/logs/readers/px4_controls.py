@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from sysid_node.flight.logs.autopilot_log import Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import LoggedCommands, Signal, absent
 from sysid_node.flight.logs.readers.mixing import AXES, SIGNS, unmixed
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps
@@ -44,7 +44,7 @@ Parameters = Mapping[str, float]
 Topic = Callable[[str, tuple[str, ...]], Signal]
 
 
-def control_commands(topic: Topic, parameters: Parameters, *, vtol: bool) -> tuple[Commands, tuple[str, ...]]:
+def control_commands(topic: Topic, parameters: Parameters, *, vtol: bool) -> tuple[LoggedCommands, tuple[str, ...]]:
     """The controls' fractions of full command, and remarks. ``topic`` gives the columns of a topic as a signal."""
     count = int(parameters.get("CA_SV_CS_COUNT", 0))
     servos = topic("actuator_servos", tuple(f"control[{i}]" for i in range(max(count, 1))))
@@ -57,12 +57,12 @@ def control_commands(topic: Topic, parameters: Parameters, *, vtol: bool) -> tup
 
 def _from_servos(
     topic: Topic, parameters: Parameters, servos: Signal, *, vtol: bool
-) -> tuple[Commands, tuple[str, ...]]:
+) -> tuple[LoggedCommands, tuple[str, ...]]:
     kinds = [int(parameters.get(f"CA_SV_CS{i}_TYPE", 0)) for i in range(servos.values.shape[1])]
     signs = [_signs(parameters, i, kind) for i, kind in enumerate(kinds)]
     used = [i for i, row in enumerate(signs) if any(row)]
     if not used:
-        return Commands((), absent("actuator_servos", 0)), ("CA_SV_CS*_TYPE name no surface that moves an axis",)
+        return LoggedCommands((), absent("actuator_servos", 0)), ("CA_SV_CS*_TYPE name no surface that moves an axis",)
     names, fractions = unmixed([signs[i] for i in used], servos.values[:, used])
     signal = Signal(servos.source, servos.stamp_ns, fractions)
     signal, remarks = _refined(signal, topic, names, vtol=vtol)
@@ -73,7 +73,7 @@ def _from_servos(
     throttle = _throttle(topic, parameters, signal.stamp_ns)
     if throttle is not None:
         names, signal = (*names, "throttle"), _with_column(signal, throttle)
-    return Commands(names, signal), remarks
+    return LoggedCommands(names, signal), remarks
 
 
 def _signs(parameters: Parameters, surface: int, kind: int) -> tuple[int, int, int]:
@@ -143,13 +143,13 @@ def _output_of(parameters: Parameters, bank: str, function: int) -> int:
     return next(found, -1)
 
 
-def _from_axes(topic: Topic, *, vtol: bool) -> tuple[Commands, tuple[str, ...]]:
+def _from_axes(topic: Topic, *, vtol: bool) -> tuple[LoggedCommands, tuple[str, ...]]:
     """The commands before the mixer of PX4 before 1.14: roll, pitch, yaw, thrust."""
     name = "actuator_controls_1" if vtol else "actuator_controls_0"
     commands = topic(name, tuple(f"control[{i}]" for i in range(4)))
     values = commands.values * np.array([-1.0, -1.0, -1.0, 1.0])
     names = (*AXES, "throttle") if len(commands) else ()
-    return Commands(names, Signal(name, commands.stamp_ns, values)), ()
+    return LoggedCommands(names, Signal(name, commands.stamp_ns, values)), ()
 
 
 def _last_values(signal: Signal, values: Array, at_ns: Stamps) -> Array:

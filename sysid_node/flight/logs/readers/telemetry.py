@@ -17,7 +17,7 @@ from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.base import GAS_CONSTANT, SEA_LEVEL_DENSITY
 from sysid_node.flight.frames import quaternion_from_euler
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
 from sysid_node.flight.logs.readers.ardupilot_controls import control_commands
 from sysid_node.flight.logs.readers.packages import quietly, required
@@ -166,11 +166,11 @@ def _airspeed(rows: Rows, clock: _Clock, density: Signal) -> Signal:
     return Signal("VFR_HUD", equivalent.stamp_ns, equivalent.values * np.sqrt(SEA_LEVEL_DENSITY / at)[:, np.newaxis])
 
 
-def _outputs(rows: Rows, clock: _Clock) -> Commands:
+def _outputs(rows: Rows, clock: _Clock) -> LoggedCommands:
     names = tuple(f"out{i}" for i in range(1, 17))
     first = [row for row in rows["SERVO_OUTPUT_RAW"] if row.fields.get("port", 0) == 0]
     signal = _signal(first, clock, "SERVO_OUTPUT_RAW", tuple(f"servo{i}_raw" for i in range(1, 17)))
-    return Commands(names if len(signal) else (), signal)
+    return LoggedCommands(names if len(signal) else (), signal)
 
 
 def _flown(rows: Rows, clock: _Clock, end_ns: int) -> Spans | None:

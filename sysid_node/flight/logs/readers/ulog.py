@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sysid_node.errors import InputError
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Commands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
 from sysid_node.flight.logs.readers.packages import quietly, required
 from sysid_node.flight.logs.readers.px4_controls import control_commands
@@ -178,7 +178,7 @@ def _at_times(signal: Signal, other: Signal) -> Array:
     return values
 
 
-def _outputs(log: _Topics) -> Commands:
+def _outputs(log: _Topics) -> LoggedCommands:
     """The outputs by the names in the aircraft file: main1.., aux1.. (pulses), servo1.., motor1.. (-1..1)."""
     banks = {"main": log.signal("actuator_outputs", tuple(f"output[{i}]" for i in range(8)))}
     if ("actuator_outputs", 1) in log.data:
@@ -195,7 +195,7 @@ def _outputs(log: _Topics) -> Commands:
         names += [f"{bank}{i + 1}" for i in range(signal.values.shape[1])]
         columns += list(signal.values[place].T)
     values = np.column_stack(columns) if columns else np.empty((0, 0))
-    return Commands(tuple(names), Signal(base.source, base.stamp_ns, values))
+    return LoggedCommands(tuple(names), Signal(base.source, base.stamp_ns, values))
 
 
 def _flown(log: _Topics, end_ns: int) -> Spans | None:

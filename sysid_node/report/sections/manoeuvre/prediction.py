@@ -18,7 +18,7 @@ from sysid_node.report.wording.numbers import number
 
 
 @dataclass(frozen=True)
-class Row:
+class PredictionRow:
     """One derivative as the table shows it."""
 
     name: str
@@ -47,9 +47,9 @@ def context(result: ManoeuvreResult) -> Mapping[str, Any]:
     return {"groups": groups, "optimised": result.optimum is not None}
 
 
-def _row(result: ManoeuvreResult, name: str, error: float, before: float, left: float) -> Row:
+def _row(result: ManoeuvreResult, name: str, error: float, before: float, left: float) -> PredictionRow:
     derivative = result.aircraft.derivatives[name]
-    return Row(
+    return PredictionRow(
         name=name,
         symbol=symbol(name),
         meaning=short_meaning(name),

@@ -16,9 +16,9 @@ from sysid_node.errors import InputError
 from sysid_node.sim.importing.gazebo.advanced_lift_drag import AdvancedLiftDrag
 from sysid_node.sim.importing.gazebo.controls import controls_of, joint_angles
 from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
-from sysid_node.sim.importing.gazebo.sdf import Model, masses, number_in, read_sdf
+from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, number_in, read_sdf
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.plant import Plant, States, aircraft_of, nondimensional
+from sysid_node.sim.importing.plant import Plant, PlantStates, aircraft_of, nondimensional
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class _Loads:
 
     def __init__(
         self,
-        model: Model,
+        model: SdfModel,
         centre: Array,
         simple: Sequence[LiftDrag],
         advanced: Sequence[AdvancedLiftDrag],
@@ -99,12 +99,12 @@ class _Loads:
         joints = [wing.joint for wing in simple if wing.joint] + [j for wing in advanced for j in wing.joints]
         self.joints = tuple(dict.fromkeys(joints))
 
-    def air(self, s: States) -> Array:
+    def air(self, s: PlantStates) -> Array:
         """Loads (N, 6) of the wings, and of the rotor's drag and torques."""
         angles = joint_angles(self.controls, s.controls)
         return self.of_joints(s, angles)
 
-    def of_joints(self, s: States, angles: Mapping[str, Array]) -> Array:
+    def of_joints(self, s: PlantStates, angles: Mapping[str, Array]) -> Array:
         """The same by the joints' angles."""
         velocity, rates = _motion(s)
         total = np.zeros((len(s.airspeed), 6))
@@ -121,7 +121,7 @@ class _Loads:
             total[:, 3:] += moment
         return total + self._rotor_drag(s, velocity, rates)
 
-    def _rotor_drag(self, s: States, velocity: Array, rates: Array) -> Array:
+    def _rotor_drag(self, s: PlantStates, velocity: Array, rates: Array) -> Array:
         if self.rotor is None:
             return np.zeros((len(velocity), 6))
         rotor, k = self.rotor, self.rotor.constants
@@ -134,14 +134,14 @@ class _Loads:
         total[:, 3:] -= (speed * k["rollingMomentCoefficient"])[:, None] * across
         return total
 
-    def engine(self, s: States) -> Array:
+    def engine(self, s: PlantStates) -> Array:
         """Loads (N, 6) of the thrust."""
         assert self.rotor is not None
         thrust = self.rotor.full_thrust * s.throttle
         return _about(np.outer(thrust, self.rotor.axis), self.rotor.place)
 
 
-def _motion(s: States) -> tuple[Array, Array]:
+def _motion(s: PlantStates) -> tuple[Array, Array]:
     forward = s.airspeed * np.cos(s.beta)
     velocity = [forward * np.cos(s.alpha), s.airspeed * np.sin(s.beta), forward * np.sin(s.alpha)]
     return np.column_stack(velocity), np.column_stack([s.p, s.q, s.r])
@@ -181,7 +181,7 @@ def _nodes(simple: Sequence[LiftDrag], advanced: Sequence[AdvancedLiftDrag]) -> 
 def _power(loads: _Loads, geometry: Geometry, density: float) -> dict[str, Array]:
     """Each joint's coefficients per rad (6,) at a small angle of attack."""
     one = np.ones(2)
-    states = States(20.0 * one, 0.05 * one, 0.0 * one, 0.0 * one, 0.0 * one, 0.0 * one, {}, 0.0 * one)
+    states = PlantStates(20.0 * one, 0.05 * one, 0.0 * one, 0.0 * one, 0.0 * one, 0.0 * one, {}, 0.0 * one)
     power = {}
     for joint in loads.joints:
         angles = dict.fromkeys(loads.joints, 0.0 * one) | {joint: np.array([-0.01, 0.01])}
@@ -190,7 +190,7 @@ def _power(loads: _Loads, geometry: Geometry, density: float) -> dict[str, Array
     return power
 
 
-def _limits(model: Model, joints: Sequence[str]) -> dict[str, float]:
+def _limits(model: SdfModel, joints: Sequence[str]) -> dict[str, float]:
     """The largest angle of each joint both ways, rad, of those that have limits."""
     limits = {}
     for joint in joints:
@@ -201,7 +201,7 @@ def _limits(model: Model, joints: Sequence[str]) -> dict[str, float]:
     return limits
 
 
-def _effects(model: Model, controls: Mapping[str, Control], rotor: Rotor | None) -> dict[str, dict[str, float]]:
+def _effects(model: SdfModel, controls: Mapping[str, Control], rotor: Rotor | None) -> dict[str, dict[str, float]]:
     """Servos and motor: a position controller against a joint's damping is a lag of damping over gain."""
     lag = {}
     servos = {(p.findtext("joint_name") or "").strip(): p for p in model.plugins_named("JointPositionController")}
@@ -217,7 +217,7 @@ def _effects(model: Model, controls: Mapping[str, Control], rotor: Rotor | None)
     return effects
 
 
-def _servo_lag(model: Model, joint: str, controller: Element) -> float:
+def _servo_lag(model: SdfModel, joint: str, controller: Element) -> float:
     """Time constant (s) of P (command - angle) - D rate = (damping) rate; the surfaces' inertia is neglected."""
     gain, rate_gain = (
         number_in(controller, tag, value, model.file) for tag, value in (("p_gain", 1.0), ("d_gain", 0.1))
@@ -226,7 +226,7 @@ def _servo_lag(model: Model, joint: str, controller: Element) -> float:
     return (damping + (rate_gain if controller.find("d_gain") is not None else 0.0)) / gain if gain > 0.0 else 0.0
 
 
-def _rotor(model: Model, centre: Array) -> Rotor | None:
+def _rotor(model: SdfModel, centre: Array) -> Rotor | None:
     motors = model.plugins_named("MulticopterMotorModel")
     if not motors:
         return None
@@ -253,7 +253,7 @@ def _rotor(model: Model, centre: Array) -> Rotor | None:
     )
 
 
-def _notes(model: Model, loads: _Loads, throttle: float, simple: bool, advanced: bool) -> list[str]:
+def _notes(model: SdfModel, loads: _Loads, throttle: float, simple: bool, advanced: bool) -> list[str]:
     notes = []
     if simple:
         notes.append("LiftDrag states no span and no chord: those of the file only make coefficients non-dimensional.")

@@ -19,34 +19,34 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Pose:
+class SdfPose:
     """A frame: its origin (3,) m and axes in the model's frame."""
 
     place: Array = field(default_factory=lambda: np.zeros(3))
     axes: Rotation = field(default_factory=Rotation.identity)
 
-    def then(self, other: Pose) -> Pose:
+    def then(self, other: SdfPose) -> SdfPose:
         """The pose of a frame that is given in this one."""
-        return Pose(self.place + self.axes.apply(other.place), self.axes * other.axes)
+        return SdfPose(self.place + self.axes.apply(other.place), self.axes * other.axes)
 
 
 @dataclass(frozen=True)
-class Body:
+class SdfLink:
     """A link: its pose, mass (kg), centre of mass (3,) m and inertia (3, 3) kg m^2 about it, in the model's axes."""
 
-    pose: Pose
+    pose: SdfPose
     mass: float
     centre: Array
     inertia: Array
 
 
 @dataclass(frozen=True)
-class Model:
+class SdfModel:
     """A model of an SDF file."""
 
     file: str
     name: str
-    links: dict[str, Body]
+    links: dict[str, SdfLink]
     joints: dict[str, Element]
     plugins: tuple[Element, ...]
     includes: tuple[str, ...]
@@ -64,7 +64,7 @@ class Model:
         return value if abs(value) < 1e10 else None
 
 
-def read_sdf(path: Path) -> Model:
+def read_sdf(path: Path) -> SdfModel:
     """The first model of an SDF file. Raises InputError."""
     root = parse_xml(path)
     model = root if root.tag == "model" else root.find(".//model")
@@ -75,10 +75,10 @@ def read_sdf(path: Path) -> Model:
     if not links:
         raise InputError(f"{path}: model {model.get('name')!r} has no links; give the SDF of an aircraft")
     uris = tuple((i.findtext("uri") or "").strip() for i in model.findall("include"))
-    return Model(file, model.get("name") or path.stem, links, dict(_named(model, "joint")), _plugins(model), uris)
+    return SdfModel(file, model.get("name") or path.stem, links, dict(_named(model, "joint")), _plugins(model), uris)
 
 
-def masses(model: Model) -> tuple[float, Array, Array]:
+def masses(model: SdfModel) -> tuple[float, Array, Array]:
     """Mass (kg), centre of mass (3,) m and inertia (3, 3) about it of all links as they stand, in the model's axes."""
     bodies = model.links.values()
     mass = sum(body.mass for body in bodies)
@@ -128,20 +128,20 @@ def _plugins(model: Element) -> tuple[Element, ...]:
     return tuple(model.findall("plugin"))
 
 
-def _pose(parent: Element, file: str) -> Pose:
+def _pose(parent: Element, file: str) -> SdfPose:
     element = parent.find("pose")
     if element is None or not (element.text or "").strip():
-        return Pose()
+        return SdfPose()
     x, y, z, roll, pitch, yaw = numbers(element, file, 6)
-    return Pose(np.array([x, y, z]), Rotation.from_euler("xyz", [roll, pitch, yaw]))
+    return SdfPose(np.array([x, y, z]), Rotation.from_euler("xyz", [roll, pitch, yaw]))
 
 
-def _body(link: Element, file: str) -> Body:
+def _body(link: Element, file: str) -> SdfLink:
     # poses relative to a joint are those of wheels and sensors; without a frame of its own a link is in the model's
     pose = _pose(link, file)
     inertial = link.find("inertial")
     if inertial is None:
-        return Body(pose, 0.0, pose.place, np.zeros((3, 3)))
+        return SdfLink(pose, 0.0, pose.place, np.zeros((3, 3)))
     inner = pose.then(_pose(inertial, file))
     entry = {
         tag: number_in(inertial, f"inertia/{tag}", 0.0, file) for tag in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -154,4 +154,4 @@ def _body(link: Element, file: str) -> Body:
         ]
     )
     turn = inner.axes.as_matrix()
-    return Body(pose, number_in(inertial, "mass", 0.0, file), inner.place, turn @ tensor @ turn.T)
+    return SdfLink(pose, number_in(inertial, "mass", 0.0, file), inner.place, turn @ tensor @ turn.T)

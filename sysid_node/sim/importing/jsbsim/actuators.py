@@ -14,7 +14,7 @@ _MOTION = ("velocities/", "attitude/", "aero/", "accelerations/", "position/", "
 
 
 @dataclass
-class Servo:
+class JsbsimServo:
     """One control's servo, in the surface's units (s, rad, rad/s), and what of it was not understood."""
 
     lag: float = 0.0
@@ -64,13 +64,13 @@ def inputs_of(component: Element) -> list[str]:
     return [text for text in texts if "/" in text]
 
 
-def read_servo(chain: Sequence[Element], gains: Mapping[str, float], rate: float) -> Servo:
+def read_servo(chain: Sequence[Element], gains: Mapping[str, float], rate: float) -> JsbsimServo:
     """The servo of a chain of components.
 
     ``gains`` are the surface's rad per unit of a component's output, by property; ``rate`` is the simulator's, Hz, for
     delays that are given in frames.
     """
-    servo = Servo()
+    servo = JsbsimServo()
     for component in chain:
         gain = next((abs(gains[name]) for name in outputs_of(component) if name in gains), 1.0)
         servo.laws += [name for name in inputs_of(component) if name.startswith(_MOTION)]
@@ -86,7 +86,7 @@ def read_servo(chain: Sequence[Element], gains: Mapping[str, float], rate: float
     return servo
 
 
-def _add_actuator(servo: Servo, component: Element, gain: float, rate: float) -> None:
+def _add_actuator(servo: JsbsimServo, component: Element, gain: float, rate: float) -> None:
     corner, limit = _number(component, "lag"), _number(component, "rate_limit")
     if corner > 0.0:
         servo.lag += 1.0 / corner

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
-from sysid_node.sim.importing.expansion import Axis
+from sysid_node.sim.importing.expansion import TableAxis
 from sysid_node.sim.importing.jsbsim.program import Loads, Program
-from sysid_node.sim.importing.jsbsim.surfaces import Surface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ class UnsteadyTerms:
 class CoefficientModel:
     """The model near one steady flight; ``program`` runs it with surfaces that the caller sets."""
 
-    def __init__(self, program: Program, surfaces: Sequence[Surface], steady: SteadyFlight) -> None:
+    def __init__(self, program: Program, surfaces: Sequence[JsbsimSurface], steady: SteadyFlight) -> None:
         self._program, self._steady = program, steady
         self._surfaces = {CONTROL_SYMBOLS[s.name]: s for s in surfaces}
         self._area, self._span, self._chord = program.geometry
@@ -113,7 +113,7 @@ class CoefficientModel:
         slopes = (air1 - air0) / (rate1 - rate0)
         return UnsteadyTerms(np.where(np.abs(slopes) > 1e-4, slopes, 0.0))
 
-    def axes(self, aerodynamics: Sequence[Element]) -> dict[str, Axis]:
+    def axes(self, aerodynamics: Sequence[Element]) -> dict[str, TableAxis]:
         """The variables with their nodes: regular ones, and the points of the model's tables."""
         points_of_tables = self._points_of_tables(aerodynamics)
         centre, speed = self.centre, self._steady.state.airspeed
@@ -121,17 +121,19 @@ class CoefficientModel:
         for name, regular in (("alpha", _ALPHA), ("beta", _BETA)):
             low, high = _LARGEST[name]
             points = [x for x in points_of_tables.get(name, []) if low <= x <= high]
-            axes[name] = Axis.of([*regular, *points], centre[name], 0.004)
+            axes[name] = TableAxis.of([*regular, *points], centre[name], 0.004)
         for name, size in _RATES.items():
-            axes[name] = Axis.of(size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), 0.0, 0.1 * size)
+            axes[name] = TableAxis.of(size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), 0.0, 0.1 * size)
         speeds = [x for x in points_of_tables.get("V", []) if 0.6 * speed <= x <= 1.4 * speed]
-        axes["V"] = Axis.of([*(speed * np.array(_SPEEDS)), *speeds], speed, 0.01 * speed)
+        axes["V"] = TableAxis.of([*(speed * np.array(_SPEEDS)), *speeds], speed, 0.01 * speed)
         for symbol, surface in self._surfaces.items():
             low, high = float(surface.deflection[0]), float(surface.deflection[-1])
             points = [x for x in points_of_tables.get(symbol, []) if low <= x <= high]
             middle = 0.0 if low < 0.0 < high else 0.5 * (low + high)
             regular = np.concatenate([np.linspace(low, middle, 4), np.linspace(middle, high, 4)])
-            axes[symbol] = Axis.of([*regular, *points], float(np.clip(centre[symbol], low, high)), 0.01 * (high - low))
+            axes[symbol] = TableAxis.of(
+                [*regular, *points], float(np.clip(centre[symbol], low, high)), 0.01 * (high - low)
+            )
         return axes
 
     def _points_of_tables(self, aerodynamics: Sequence[Element]) -> dict[str, list[float]]:

@@ -14,19 +14,19 @@ from sysid_node.aircraft.model import (
     Derivative,
     Geometry,
     Inertia,
-    Reference,
+    ReferenceCondition,
     Sensors,
     Throttle,
     UncertainValue,
 )
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
-from sysid_node.sim.importing.expansion import Axis, Expansion, expand, largest_error
+from sysid_node.sim.importing.expansion import Expansion, TableAxis, expand, largest_error
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.jsbsim.actuators import Servo
+from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo
 from sysid_node.sim.importing.jsbsim.coefficients import CoefficientModel
 from sysid_node.sim.importing.jsbsim.files import ModelFiles
 from sysid_node.sim.importing.jsbsim.program import Program
-from sysid_node.sim.importing.jsbsim.surfaces import Surface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
 from sysid_node.sim.importing.jsbsim.survey import surveyed
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
@@ -42,7 +42,7 @@ class JsbsimModel:
     """A model as read: its files, controls, steady flight, and the aircraft."""
 
     files: ModelFiles
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[JsbsimSurface, ...]
     steady: SteadyFlight
     imported: Imported
 
@@ -71,7 +71,7 @@ def read_model(model: str, airspeed: float | None = None, altitude: float | None
     return JsbsimModel(survey.files, survey.surfaces, survey.steady, imported)
 
 
-def _tolerance(model: CoefficientModel, axes: Mapping[str, Axis]) -> Array:
+def _tolerance(model: CoefficientModel, axes: Mapping[str, TableAxis]) -> Array:
     """What may be left out of each coefficient (6,)."""
     sizes = {**_ORDINARY, "V": 0.1 * model.centre["V"]}
     rows = []
@@ -86,11 +86,11 @@ def _tolerance(model: CoefficientModel, axes: Mapping[str, Axis]) -> Array:
 def _aircraft(
     files: ModelFiles,
     program: Program,
-    surfaces: Sequence[Surface],
+    surfaces: Sequence[JsbsimSurface],
     steady: SteadyFlight,
     model: CoefficientModel,
     expansion: Expansion,
-    servos: Mapping[str, Servo],
+    servos: Mapping[str, JsbsimServo],
 ) -> Aircraft:
     state = steady.state
     controls = {
@@ -109,7 +109,7 @@ def _aircraft(
         mass=program.mass,
         inertia=Inertia(**program.inertia),
         geometry=Geometry(*program.geometry),
-        reference=Reference(state.airspeed, model.steady_loads.density),
+        reference=ReferenceCondition(state.airspeed, model.steady_loads.density),
         controls=controls,
         derivatives={name: Derivative(value) for name, value in expansion.derivatives.items()},
         throttle=throttle,
@@ -121,7 +121,7 @@ def _aircraft(
 
 
 def _effects(
-    model: CoefficientModel, servos: Mapping[str, Servo], powered: bool
+    model: CoefficientModel, servos: Mapping[str, JsbsimServo], powered: bool
 ) -> dict[str, dict[str, UncertainValue]]:
     effects: dict[str, dict[str, UncertainValue]] = {}
     for control, servo in servos.items():
@@ -136,10 +136,10 @@ def _effects(
 
 def _notes(
     program: Program,
-    surfaces: Sequence[Surface],
+    surfaces: Sequence[JsbsimSurface],
     steady: SteadyFlight,
     model: CoefficientModel,
-    servos: Mapping[str, Servo],
+    servos: Mapping[str, JsbsimServo],
 ) -> list[str]:
     """What the file does not hold, or what a user should know, a sentence each."""
     notes = []
@@ -174,7 +174,7 @@ def _notes(
     return notes
 
 
-def _remainder(model: CoefficientModel, expansion: Expansion, axes: Mapping[str, Axis]) -> list[str]:
+def _remainder(model: CoefficientModel, expansion: Expansion, axes: Mapping[str, TableAxis]) -> list[str]:
     """What terms of three variables leave, where it is not negligible."""
     error, size = largest_error(model, expansion, axes, 0.25, 150)
     shares = error / np.maximum(size, 1e-12)

@@ -27,7 +27,7 @@ _REST = 3.0
 
 
 @dataclass(frozen=True)
-class Surface:
+class JsbsimSurface:
     """One control: its deflection, and everything that the aerodynamics read as functions of it."""
 
     name: str
@@ -43,7 +43,7 @@ class Surface:
         """The properties at a deflection (rad)."""
         return {name: float(np.interp(deflection, self.deflection, values)) for name, values in self.properties.items()}
 
-    def flipped(self) -> Surface:
+    def flipped(self) -> JsbsimSurface:
         """The same surface with deflections of the other sign."""
         mirrored = {name: values[::-1] for name, values in self.properties.items()}
         return replace(
@@ -64,7 +64,7 @@ class Surface:
         return float(np.abs(self.deflection).max())
 
 
-def find_surfaces(program: Program, aerodynamics: Sequence[Element], state: Flight, rate: float) -> list[Surface]:
+def find_surfaces(program: Program, aerodynamics: Sequence[Element], state: Flight, rate: float) -> list[JsbsimSurface]:
     """The model's controls; ``program`` runs the model with its own flight control system at ``rate`` (Hz)."""
     read = sorted(name for name in properties_read(aerodynamics) if program.has(name))
     surfaces = []
@@ -77,7 +77,9 @@ def find_surfaces(program: Program, aerodynamics: Sequence[Element], state: Flig
     return surfaces
 
 
-def gains_to(program: Program, surface: Surface, names: Sequence[str], state: Flight, rate: float) -> dict[str, float]:
+def gains_to(
+    program: Program, surface: JsbsimSurface, names: Sequence[str], state: Flight, rate: float
+) -> dict[str, float]:
     """The surface's rad per unit of each property that moves along with it, at rest."""
     command = COMMANDS[surface.name]
     known = [surface.position, *(name for name in names if name != surface.position and program.has(name))]
@@ -95,7 +97,7 @@ def properties_read(aerodynamics: Sequence[Element]) -> set[str]:
 
 def _probe(
     program: Program, name: str, command: str, read: Sequence[str], state: Flight, rate: float
-) -> Surface | None:
+) -> JsbsimSurface | None:
     """The control of a command; None where the command moves nothing that the aerodynamics read."""
     candidates = [p for p in _POSITIONS[name] if program.has(p)]
     names = list(dict.fromkeys([*read, *candidates]))
@@ -113,7 +115,7 @@ def _probe(
     rising = order[np.append(True, np.diff(columns[position][order]) > 1e-9)]
     at_rest, other = (_rest(program, s, {command: 0.0}, [position], rate)[0] for s in (state, _elsewhere(state)))
     deflection = columns[position][rising] * unit
-    return Surface(
+    return JsbsimSurface(
         name,
         position,
         unit,

@@ -10,10 +10,10 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from sysid_node.errors import InputError
-from sysid_node.sim.importing.jsbsim.actuators import Servo, chain_to, read_servo
+from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo, chain_to, read_servo
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model, find_model, outputs_of, sections
 from sysid_node.sim.importing.jsbsim.program import Flight, Program, never_destroy_programs
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, Surface, find_surfaces, gains_to
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface, find_surfaces, gains_to
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, default_airspeeds, find_trim, no_trim
 
 #: Altitude (m) where none is given: above ground effect.
@@ -35,13 +35,13 @@ class ServoChain:
 
 
 @dataclass(frozen=True)
-class Survey:
+class ModelSurvey:
     """What is known of a model before its coefficients are expanded."""
 
     files: ModelFiles
-    surfaces: tuple[Surface, ...]  # with the aircraft file's signs
+    surfaces: tuple[JsbsimSurface, ...]  # with the aircraft file's signs
     steady: SteadyFlight
-    servos: Mapping[str, Servo]  # by control
+    servos: Mapping[str, JsbsimServo]  # by control
     chains: Mapping[str, ServoChain]  # by control
     mass: float  # kg
     inertia: Mapping[str, float]  # kg m^2
@@ -50,7 +50,7 @@ class Survey:
     engines: int
 
 
-def survey_model(model: str, airspeed: float | None = None, altitude: float | None = None) -> Survey:
+def survey_model(model: str, airspeed: float | None = None, altitude: float | None = None) -> ModelSurvey:
     """A model's controls, steady flight, servos and masses. Raises InputError."""
     with surveyed(model, airspeed, altitude) as (survey, _, _):
         return survey
@@ -59,7 +59,7 @@ def survey_model(model: str, airspeed: float | None = None, altitude: float | No
 @contextmanager
 def surveyed(
     model: str, airspeed: float | None, altitude: float | None
-) -> Iterator[tuple[Survey, Program, list[Element]]]:
+) -> Iterator[tuple[ModelSurvey, Program, list[Element]]]:
     """A model's survey, JSBSim with its surfaces free, and its aerodynamics. Raises InputError where JSBSim stops."""
     files = find_model(model)
     try:
@@ -74,7 +74,7 @@ def surveyed(
 
 def _survey(
     files: ModelFiles, place: Path, airspeed: float | None, altitude: float
-) -> tuple[Survey, Program, list[Element]]:
+) -> tuple[ModelSurvey, Program, list[Element]]:
     parts = sections(files)
     aerodynamics = [part for part in parts if part.tag == "aerodynamics"]
     systems = [part for part in parts if part.tag != "aerodynamics"]
@@ -94,7 +94,7 @@ def _survey(
     surfaces = _usual_signs(program, surfaces, steady)
     steady = SteadyFlight(steady.state, {s.name: s.sign * steady.deflections[s.name] for s in surfaces})
     cg = (program.fdm["inertia/cg-x-in"], program.fdm["inertia/cg-y-in"], program.fdm["inertia/cg-z-in"])
-    survey = Survey(
+    survey = ModelSurvey(
         files,
         tuple(surfaces),
         steady,
@@ -109,7 +109,9 @@ def _survey(
     return survey, program, aerodynamics
 
 
-def _steady(files: ModelFiles, program: Program, surfaces: Sequence[Surface], states: list[Flight]) -> SteadyFlight:
+def _steady(
+    files: ModelFiles, program: Program, surfaces: Sequence[JsbsimSurface], states: list[Flight]
+) -> SteadyFlight:
     for state in states:
         found = find_trim(program, surfaces, state)
         if found is not None:
@@ -117,7 +119,7 @@ def _steady(files: ModelFiles, program: Program, surfaces: Sequence[Surface], st
     raise no_trim(files.name, states[0].airspeed)
 
 
-def _usual_signs(program: Program, surfaces: Sequence[Surface], steady: SteadyFlight) -> list[Surface]:
+def _usual_signs(program: Program, surfaces: Sequence[JsbsimSurface], steady: SteadyFlight) -> list[JsbsimSurface]:
     """The surfaces with the aircraft file's signs: a positive deflection pitches down, rolls and yaws left."""
     place = {"elevator": 4, "aileron": 3, "rudder": 5}
 
@@ -131,7 +133,9 @@ def _usual_signs(program: Program, surfaces: Sequence[Surface], steady: SteadyFl
     return [s.flipped() if moment(s.name, 0.02) > moment(s.name, -0.02) else s for s in surfaces]
 
 
-def _servo(program: Program, surface: Surface, systems: Sequence[Element], state: Flight) -> tuple[Servo, ServoChain]:
+def _servo(
+    program: Program, surface: JsbsimSurface, systems: Sequence[Element], state: Flight
+) -> tuple[JsbsimServo, ServoChain]:
     """The servo of a control; ``program`` runs the model with its own flight control system."""
     chain = chain_to(surface.position, systems, COMMANDS[surface.name])
     names = [name for component in chain for name in outputs_of(component)]

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
-from sysid_node.sim.importing.jsbsim.surfaces import Surface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class SteadyFlight:
     deflections: dict[str, float]
 
 
-def find_trim(program: Program, surfaces: Sequence[Surface], state: Flight) -> SteadyFlight | None:
+def find_trim(program: Program, surfaces: Sequence[JsbsimSurface], state: Flight) -> SteadyFlight | None:
     """The steady flight at the state's airspeed and altitude; None where there is none."""
     powered = program.powered
     names = ["alpha", "phi", "theta", *(s.name for s in surfaces), *(["throttle"] if powered else [])]
@@ -53,7 +54,7 @@ def default_airspeeds(program: Program, state: Flight) -> list[float]:
     area, _, _ = program.geometry
     program.put(replace(state, airspeed=50.0), {})
     density = program.loads().density
-    return [float(np.sqrt(2.0 * program.mass * 9.80665 / (density * area * lift))) for lift in (0.4, 0.25, 0.6, 0.15)]
+    return [float(np.sqrt(2.0 * program.mass * GRAVITY / (density * area * lift))) for lift in (0.4, 0.25, 0.6, 0.15)]
 
 
 def _state(state: Flight, at: dict[str, float]) -> Flight:
@@ -64,7 +65,7 @@ def _state(state: Flight, at: dict[str, float]) -> Flight:
 
 def _solve(  # type: ignore[no-untyped-def]
     program: Program,
-    surfaces: Sequence[Surface],
+    surfaces: Sequence[JsbsimSurface],
     state: Flight,
     names: list[str],
     start: Array,
