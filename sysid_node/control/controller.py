@@ -51,7 +51,7 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> ControllerState:
     """
     pitch, lateral = (adaptation.init(axis) for axis in axes(aircraft, settings.actuator_lag, settings.delay))
     flown = law.init(aircraft, settings)
-    checks = InputChecks(np.minimum(flown.limits, settings.largest_excitation))
+    checks = InputChecks(np.minimum(flown.design.limits, settings.largest_excitation))
     return ControllerState(settings, (pitch, lateral), flown, checks, TrackingWatch(settings.largest_tracking_error))
 
 

@@ -37,16 +37,23 @@ MOST_INTEGRAL = 1.0  # rad s
 PRESSURES = (0.4, 2.5)  # range of dynamic pressure, relative to the reference, in which gains are scheduled
 
 
+@dataclass(frozen=True)
+class LawDesign:
+    """What does not change in flight."""
+
+    aircraft: Aircraft
+    settings: ControllerSettings
+    limits: Array  # (3,) rad, of the surfaces
+    most_thrust: float  # N
+    derivatives: Mapping[str, float]  # the file's, with what lookup tables add near level flight
+
+
 @dataclass
 class LawState:
     """The state of the control law."""
 
-    aircraft: Aircraft
-    settings: ControllerSettings
-    limits: Array  # (3,) rad
-    most_thrust: float  # N
+    design: LawDesign
     behind: DelayedReference
-    believed: Mapping[str, float]  # the file's derivatives with what lookup tables add near level flight
     reference: ReferenceState | None = None
     airspeed: float = math.nan  # m/s, filtered
     density: float = math.nan
@@ -57,9 +64,8 @@ class LawState:
     gains: tuple[Array, ...] = ()  # (m, n) of both axes, the last
     pending: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback within the actuators' delay
     wanted: ReferenceMotion | None = None  # the delayed reference, with which the motion is compared
-    at_limit: NDArray[np.bool_] = field(
-        default_factory=lambda: np.zeros(3, bool)
-    )  # surfaces at the end of their travel
+    #: Surfaces at the end of their travel.
+    at_limit: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(3, bool))
 
 
 def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
@@ -68,8 +74,8 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
     weight = aircraft.mass * GRAVITY
     limits = np.array([aircraft.controls[c].limit or settings.command_limit for c in ("elevator", "aileron", "rudder")])
     most = 0.0 if throttle is None else throttle.max_thrust or 2.0 * weight
-    behind = DelayedReference(settings.actuator_lag, settings.delay)
-    return LawState(aircraft, settings, limits, most, behind, linear_derivatives(aircraft))
+    design = LawDesign(aircraft, settings, limits, most, linear_derivatives(aircraft))
+    return LawState(design, DelayedReference(settings.actuator_lag, settings.delay))
 
 
 def step(
@@ -83,13 +89,13 @@ def step(
     """The command now, ``step`` (s) after the last one; ``excitation`` (3,) rad is added to it."""
     scales = _condition(law, measured, points, step)
     pressure = _pressure(law)
-    level, trim = trimmed(law.aircraft, pressure)
-    speed = law.aircraft.reference.airspeed
-    points = reference.limited(points, level, speed, law.settings)
+    level, trim = trimmed(law.design.aircraft, pressure)
+    speed = law.design.aircraft.reference.airspeed
+    points = reference.limited(points, level, speed, law.design.settings)
     if law.reference is None:
         law.reference = ReferenceState(_finite(measured.theta, level), _finite(measured.phi, 0.0))
     pitch, side = ({name: float(value) for name, value in axis.named(f.values).items()} for axis, f in flown)
-    s = law.settings
+    s = law.design.settings
     flight = reference.FlightCondition(
         law.airspeed, level, scales.force * side.get("CY_beta", 0.0), s.bandwidth, s.largest_pitch, s.largest_roll
     )
@@ -109,7 +115,7 @@ def step(
 
 def _condition(law: LawState, measured: Measurements, points: SetPoints, step: float) -> DimensionalScales:
     """The filtered flight condition; without a measured airspeed the last one, or the set-point."""
-    known = law.aircraft.reference
+    known = law.design.aircraft.reference
     if math.isnan(law.airspeed):
         law.airspeed = _finite(measured.airspeed, _finite(points.airspeed, known.airspeed))
         law.density = known.air_density
@@ -118,12 +124,12 @@ def _condition(law: LawState, measured: Measurements, points: SetPoints, step: f
     law.airspeed = min(max(law.airspeed, 0.5 * known.airspeed), 2.0 * known.airspeed)
     if 0.1 < measured.density < 2.0:
         law.density = measured.density
-    return DimensionalScales.of(law.aircraft, law.airspeed, law.density)
+    return DimensionalScales.of(law.design.aircraft, law.airspeed, law.density)
 
 
 def _pressure(law: LawState) -> float:
     """Dynamic pressure relative to the reference, within ``PRESSURES``."""
-    known = law.aircraft.reference
+    known = law.design.aircraft.reference
     share = law.density * law.airspeed**2 / (known.air_density * known.airspeed**2)
     return min(max(share, PRESSURES[0]), PRESSURES[1])
 
@@ -196,18 +202,18 @@ def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -
 
     A surface moves by its whole travel at most, whatever the feedforward has asked for.
     """
-    feedback = np.clip(feedback, -2.0 * law.limits, 2.0 * law.limits)
-    late = reference.delayed(law.pending, time, feedback, law.settings.delay)
-    law.surfaces += (1.0 - math.exp(-step / law.settings.actuator_lag)) * (late - law.surfaces)
+    feedback = np.clip(feedback, -2.0 * law.design.limits, 2.0 * law.design.limits)
+    late = reference.delayed(law.pending, time, feedback, law.design.settings.delay)
+    law.surfaces += (1.0 - math.exp(-step / law.design.settings.actuator_lag)) * (late - law.surfaces)
 
 
 def _limited(law: LawState, wanted: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
     """The command (3,) within its limits of amplitude and rate, and which surfaces are limited."""
-    within = np.clip(wanted, -law.limits, law.limits)
+    within = np.clip(wanted, -law.design.limits, law.design.limits)
     if law.command is not None:
-        reach = law.settings.command_rate * step
+        reach = law.design.settings.command_rate * step
         within = np.clip(within, law.command - reach, law.command + reach)
-    law.command, law.at_limit = within, np.abs(within) >= law.limits
+    law.command, law.at_limit = within, np.abs(within) >= law.design.limits
     return within, np.abs(within - wanted) > 1e-9
 
 
@@ -222,18 +228,18 @@ def _thrust(
     law: LawState, measured: Measurements, points: SetPoints, late: ReferenceMotion, level: float, step: float
 ) -> float:
     """Thrust (N): drag in level flight, weight along the climb, and feedback of the airspeed."""
-    if law.most_thrust == 0.0:
+    if law.design.most_thrust == 0.0:
         return 0.0
-    d = law.believed
-    load: float = dynamic_pressure(law.density, law.airspeed) * law.aircraft.geometry.S
-    weight = law.aircraft.mass * GRAVITY
+    d = law.design.derivatives
+    load: float = dynamic_pressure(law.density, law.airspeed) * law.design.aircraft.geometry.S
+    weight = law.design.aircraft.mass * GRAVITY
     drag = d.get("CD_0", 0.0) + d.get("CD_alpha", 0.0) * level + d.get("CD_k", 0.0) * (weight / load) ** 2
     error = _finite(points.airspeed - measured.airspeed, 0.0)
     wanted = load * drag + weight * math.sin(late.theta - level - late.alpha) + law.thrust
-    wanted += SPEED_GAIN * law.aircraft.mass * error
-    given = min(max(wanted, 0.0), law.most_thrust)
+    wanted += SPEED_GAIN * law.design.aircraft.mass * error
+    given = min(max(wanted, 0.0), law.design.most_thrust)
     if given == wanted:
-        law.thrust += SPEED_INTEGRAL * law.aircraft.mass * error * step
+        law.thrust += SPEED_INTEGRAL * law.design.aircraft.mass * error * step
     return given
 
 

@@ -167,7 +167,9 @@ class AdaptiveController(LoopNode):
         counts, before = self._state.checks.counts, self._checked
         present |= {f"input {what}": f"{n - before[what]} times" for what, n in counts.items() if n > before[what]}
         self._checked = Counter(counts)
-        for name, steps, limit in zip(CONTROLS, self._steps_at_limit.tolist(), self._state.law.limits, strict=True):
+        for name, steps, limit in zip(
+            CONTROLS, self._steps_at_limit.tolist(), self._state.law.design.limits, strict=True
+        ):
             if 2 * steps > self._steps:
                 present[name] = f"at its limit of {limit:g} rad"
         self._steps, self._steps_at_limit = 0, np.zeros(len(CONTROLS), int)
