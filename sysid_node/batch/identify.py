@@ -26,7 +26,7 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
-from sysid_node.batch.systematic.flight_posterior import flight_posterior
+from sysid_node.batch.systematic.flight_posterior import FlightPosterior, flight_posterior
 from sysid_node.batch.systematic.sensitivities import LikelihoodResponse, RegressionResponse, Response
 from sysid_node.batch.systematic.systematic_errors import on_time, with_systematic_errors
 from sysid_node.errors import InputError
@@ -94,9 +94,42 @@ def identify(
         raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     if not records:
         raise InputError("no flight to identify from; give at least one")
-    records, holdout = _named(records), _named(holdout)
+    flights = _prepared(aircraft, _named(records), _named(holdout), settings)
+    fit, predict = _fitted_with_systematic_errors(method, flights, settings)
+    figures: FiguresByFlight = {}
+    for record in flights.holdout:
+        coefficients = predicted_coefficients(flights.aircraft, fit.values, [record], settings.low_pass)
+        figures[record.name] = _figures_of_flight(flights.aircraft, record, [*coefficients, *predict(record)])
+    return Identification(
+        replace(fit, remarks=(*flights.remarks, *fit.remarks)),
+        predicted_coefficients(flights.aircraft, fit.values, flights.records, settings.low_pass),
+        figures,
+        flights.selections,
+    )
+
+
+@dataclass(frozen=True)
+class _PreparedFlights:
+    """Flights with sensors and clocks corrected, and the derivatives that are to be estimated from them."""
+
+    aircraft: Aircraft
+    recorded: Sequence[FlightRecord]  # with corrected sensors, clocks as recorded
+    records: Sequence[FlightRecord]  # with corrected clocks
+    holdout: Sequence[FlightRecord]
+    posterior: FlightPosterior | None  # of the imperfections
+    selections: Mapping[str, StepwiseSelection]
+    remarks: Sequence[str]
+
+
+def _prepared(
+    aircraft: Aircraft,
+    records: Sequence[FlightRecord],
+    holdout: Sequence[FlightRecord],
+    settings: BatchSettings,
+) -> _PreparedFlights:
+    """What is fitted: the flights after all corrections that the settings and the aircraft file ask for."""
     remarks: list[str] = []
-    selections: dict[str, StepwiseSelection] = {}
+    selections: Mapping[str, StepwiseSelection] = {}
     if settings.correct_sensors:
         found = check_sensors(aircraft, records, settings.segment or 10.0)
         records, holdout = found.corrected, [corrected(record, found.fit.values) for record in holdout]
@@ -112,26 +145,25 @@ def identify(
         records, holdout = on_time(aircraft, records, posterior), on_time(aircraft, holdout, posterior)
     elif _uncertain(aircraft):
         remarks.append(_NOT_CONSIDERED)
+    return _PreparedFlights(aircraft, recorded, records, holdout, posterior, selections, remarks)
+
+
+def _fitted_with_systematic_errors(
+    method: str, flights: _PreparedFlights, settings: BatchSettings
+) -> tuple[BatchFit, Callable[[FlightRecord], Sequence[ModelResponse]]]:
+    """The fit, its intervals widened by what the tolerances leave open, and the fitted model's outputs of a flight."""
+    aircraft, records = flights.aircraft, flights.records
     try:
         fit, predict, response = _fitted(method, aircraft, records, settings)
-        if posterior is not None:
-            fit = with_systematic_errors(aircraft, recorded, fit, posterior, response())
+        if flights.posterior is not None:
+            fit = with_systematic_errors(aircraft, flights.recorded, fit, flights.posterior, response())
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         names = ", ".join(record.name for record in records)
         raise InputError(
             f"{names}: {method} finds no solution ({' '.join(str(error).split())}); the motion does not determine the "
             "model: give flights that excite it, or a simpler model"
         ) from error
-    figures: FiguresByFlight = {}
-    for record in holdout:
-        responses = [*predicted_coefficients(aircraft, fit.values, [record], settings.low_pass), *predict(record)]
-        figures[record.name] = _figures_of_flight(aircraft, record, responses)
-    return Identification(
-        replace(fit, remarks=(*remarks, *fit.remarks)),
-        predicted_coefficients(aircraft, fit.values, records, settings.low_pass),
-        figures,
-        selections,
-    )
+    return fit, predict
 
 
 def refuse_unused(method: str, settings: Mapping[str, object]) -> None:
