@@ -69,6 +69,12 @@ class Priors:
         "1 sigma of a derivative of a simulator's file (ideal: true) that states none, as a share of its size: "
         "tables of an imported model are right within about a hundredth",
     )
+    reality: float = _threshold(
+        0.1,
+        "1",
+        "1 sigma of what a real derivative may be off such a file's, as a share of its size, from which the prior is "
+        "widened where the derivatives of a coefficient are the candidate",
+    )
     scale: float = _threshold(3.0, "1", "1 sigma of a candidate's parameter, as a multiple of its plausible scale")
     inferred_angle: float = _threshold(0.01, "rad", "1 sigma of the mean error of a flow angle that no vane measured")
     gusty: float = _threshold(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from bench.withheld.jsbsim.reality import Reality, Withheld
+from bench.withheld.jsbsim.drawing import Withheld
+from bench.withheld.jsbsim.reality import Reality
 from bench.withheld.plants.instruments import SUITES, Log, readings, record
 from bench.withheld.plants.pilot import RATE as PILOT_RATE
 from bench.withheld.plants.pilot import Pilot
@@ -19,32 +22,40 @@ from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 RATE, LOOK = 400.0, 2  # Hz, and steps between two looks at the motion
 SECONDS, HEIGHT = 44.0, 300.0
 
-#: The flight that is fitted and the one held out.
+
+@dataclass(frozen=True)
+class World:
+    """What flies: the user's model, its aircraft file, and what reality has beyond it."""
+
+    survey: ModelSurvey
+    aircraft: Aircraft
+    withheld: Withheld
+
+
+#: The two flights of reality, and of the simulator: the first is fitted, the second held out.
 MANOEUVRES = ("3211:repeat=2", "multisine")
 
 
-def write_flights(
-    folder: Path, survey: ModelSurvey, aircraft: Aircraft, withheld: Withheld, turbulence: str, seed: int
-) -> None:
-    """Bags ``fitted`` and ``held`` of two flights. Raises DivergedError."""
-    for place, name in enumerate(("fitted", "held")):
+def write_flights(folder: Path, names: Sequence[str], world: World, turbulence: str, noise: float, seed: int) -> None:
+    """Two flights as bags of these names, with ``noise`` times the instruments'. Raises DivergedError."""
+    effects = {**world.withheld.of_instruments(), "saturation": _clipped(world.withheld)}
+    for place, name in enumerate(names):
         random = np.random.default_rng([seed, place])
-        log = flown(survey, aircraft, withheld, turbulence, MANOEUVRES[place], random)
-        seen = readings(log, aircraft, {})
-        streams = record(log, seen, aircraft, {}, SUITES["research"], 1.0, random)
+        log = flown(world, turbulence, MANOEUVRES[place], random)
+        seen = readings(log, world.aircraft, effects)
+        streams = record(log, seen, world.aircraft, effects, SUITES["research"], noise, random)
         write_streams(folder / name, streams)
 
 
-def flown(
-    survey: ModelSurvey,
-    aircraft: Aircraft,
-    withheld: Withheld,
-    turbulence: str,
-    manoeuvre: str,
-    random: np.random.Generator,
-) -> Log:
+def _clipped(withheld: Withheld) -> dict[str, float]:
+    share = withheld.unlisted.get("saturation")
+    return {withheld.clipped: share} if share else {}
+
+
+def flown(world: World, turbulence: str, manoeuvre: str, random: np.random.Generator) -> Log:
     """One flight at ``RATE``. Raises DivergedError."""
-    reality = Reality(survey, aircraft, withheld, RATE)
+    aircraft = world.aircraft
+    reality = Reality(world.survey, aircraft, world.withheld, RATE)
     air, own = random.spawn(2)
     plan = parse_manoeuvre(manoeuvre, aircraft, RATE, SECONDS)
     planned = {name: plan.deflections[name] for name in reality.controls}

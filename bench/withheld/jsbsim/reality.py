@@ -12,17 +12,14 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from bench.withheld.jsbsim.drawing import Withheld
 from bench.withheld.plants.motion import DivergedError, Instant
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model
 from sysid_node.sim.importing.jsbsim.program import FOOT, POUND, SLUG, Program
 from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS
 from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
-from sysid_node.sim.importing.jsbsim.trim import find_trim
-
-#: A withheld effect: by name, its numbers. ``servo``: control, lag (s), delay (s), rate (rad/s), play (rad), bias
-#: (rad), lost (share). ``coefficient``: a name such as Cm_alpha, and what is added. ``mass``: share. ``cg``: m forward.
-Withheld = Mapping[str, Mapping[str, float | str]]
+from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, find_trim
 
 _AXES = {"Cl": ("ROLL", "bw-ft"), "Cm": ("PITCH", "cbarw-ft"), "Cn": ("YAW", "bw-ft")}
 _STATES = {
@@ -40,12 +37,16 @@ def edited(survey: ModelSurvey, folder: Path, withheld: Withheld) -> ModelFiles:
     files = copy_model(survey.files, folder, ())
     tree = ElementTree.parse(files.main)
     root = tree.getroot()
-    for name, value in withheld.get("coefficient", {}).items():
+    effects = withheld.effects
+    for name, value in effects.get("derivative_error", {}).items():
         _coefficient(root, name, value)
-    if "mass" in withheld:
-        _point_mass(root, withheld["mass"]["share"] * survey.mass, survey.cg_in)
-    if "cg" in withheld:  # a load taken from here and put there: mass is moved, none is added
-        load, arm = 0.1 * survey.mass, withheld["cg"]["forward"] / 0.1
+    if "rotor" in withheld.unlisted:
+        _rotor(root, survey, withheld.unlisted["rotor"])
+    more = effects.get("mass_error", {}).get("error", 0.0)
+    if more:
+        _point_mass(root, more * survey.mass, survey.cg_in)
+    if "cg_shift" in effects:  # a load taken from here and put there: mass is moved, none is added
+        load, arm = 0.1 * survey.mass * (1.0 + more), effects["cg_shift"]["x"] / 0.1
         x, y, z = survey.cg_in
         _point_mass(root, -load, survey.cg_in)
         _point_mass(root, load, (x - arm / 0.0254, y, z))
@@ -84,6 +85,20 @@ def _term(axis: Element, name: str, properties: list[str], value: float, turn: s
     SubElement(product, "value").text = repr(value)
 
 
+def _rotor(root: Element, survey: ModelSurvey, share: float) -> None:
+    """A rotor's momentum along x: it pitches the aircraft by yaw rate and yaws it by pitch rate."""
+    aerodynamics = root.find("aerodynamics")
+    assert aerodynamics is not None
+    S, _, cbar = survey.geometry
+    speed = survey.steady.state.airspeed
+    momentum = share * _DAMPING * 0.25 * _DENSITY * speed * S * cbar**2 * _FOOT_POUNDS
+    for axis, state, sign in (("PITCH", "r", -1.0), ("YAW", "q", 1.0)):
+        product = SubElement(SubElement(_axis(aerodynamics, axis), "function", name=f"aero/withheld/rotor-{axis}"),
+                             "product")  # fmt: skip
+        SubElement(product, "property").text = f"velocities/{state}-rad_sec"
+        SubElement(product, "value").text = repr(sign * momentum)
+
+
 def _point_mass(root: Element, mass: float, place_in: tuple[float, float, float]) -> None:
     balance = root.find("mass_balance")
     assert balance is not None
@@ -94,12 +109,16 @@ def _point_mass(root: Element, mass: float, place_in: tuple[float, float, float]
         SubElement(place, axis).text = repr(value)
 
 
+#: By which a rotor is scaled: a usual damping in pitch, -Cm_q, and the air's density, kg/m^3.
+_DAMPING, _DENSITY, _FOOT_POUNDS = 10.0, 1.2, 1.0 / 1.3558179483
+
+
 class Servo:
     """A servo between the command and JSBSim: delay, lag, free play, rate limit, offset, lost effect, in this order."""
 
     def __init__(self, values: Mapping[str, float], start: float, step: float) -> None:
         self._values, self._step = values, step
-        self._late = deque([start] * (round(values.get("delay", 0.0) / step) + 1))
+        self._late = deque([start] * (round(values.get("command_delay", 0.0) / step) + 1))
         self._lagged = self._linked = self._position = start
 
     def move(self, command: float) -> float:
@@ -107,14 +126,16 @@ class Servo:
         values, step = self._values, self._step
         self._late.append(command)
         command = self._late.popleft()
-        lag = values.get("lag", 0.0)
+        lag = values.get("actuator_lag", 0.0)
         self._lagged += (command - self._lagged) * (1.0 - math.exp(-step / lag) if lag else 1.0)
-        half = 0.5 * values.get("play", 0.0)
+        half = 0.5 * values.get("actuator_backlash", 0.0)
         off = self._lagged - self._linked
         self._linked += math.copysign(max(abs(off) - half, 0.0), off)
-        reach = values.get("rate", math.inf) * step
+        reach = values.get("actuator_rate_limit", math.inf) * step
         self._position += min(max(self._linked - self._position, -reach), reach)
-        return (self._position + values.get("bias", 0.0)) * (1.0 - values.get("lost", 0.0))
+        return (self._position + values.get("actuator_bias", 0.0)) * (
+            1.0 - values.get("control_effectiveness_loss", 0.0)
+        )
 
 
 class Reality:
@@ -132,7 +153,7 @@ class Reality:
         self._surfaces = {s.name: s for s in survey.surfaces}
         self.cg = self._moved()
 
-    def _trim(self):  # type: ignore[no-untyped-def]
+    def _trim(self) -> SteadyFlight:
         """The steady flight of this reality, with its surfaces free."""
         survey = self._survey
         with tempfile.TemporaryDirectory() as place:
@@ -153,9 +174,7 @@ class Reality:
     def start(self) -> Instant:
         """Back to the trim; the motion there."""
         step = 1.0 / self._rate
-        given = self._withheld.get("servo", {})
-        own = {k: v for k, v in given.items() if k != "control"}
-        self._servos = {n: Servo(own if n == given.get("control") else {}, self.trim[n], step) for n in self.controls}
+        self._servos = {n: Servo(self._withheld.servo(n), self.trim[n], step) for n in self.controls}
         self._program.put(self._trimmed.state, self._properties(self.trim, self._trimmed.state.throttle))
         self._program.step(round(2.0 * self._rate))
         self.cg = self._moved()
@@ -165,12 +184,13 @@ class Reality:
         found = {}
         for name, surface in self._surfaces.items():
             found |= {COMMANDS[name]: surface.command_for(deflections[name])}
-        return found | {"fcs/throttle-cmd-norm": throttle}
+        return found | {f"fcs/throttle-cmd-norm[{i}]": throttle for i in range(max(self._survey.engines, 1))}
 
     def step(self, commands: Mapping[str, float], gusts: Sequence[float], share: float) -> None:
         """One step on with commands (rad, thrust N) in a share of the gusts (m/s, body axes)."""
         fdm = self._program.fdm
         moved = {name: self._servos[name].move(commands[name]) for name in self.controls}
+        moved["elevator"] += self._withheld.unlisted.get("crossfeed", 0.0) * (moved["aileron"] - self.trim["aileron"])
         self._program.drive(self._properties(moved, min(max(commands["thrust"] / self._full, 0.0), 1.0)))
         if any(gusts[:3]):
             phi, theta, psi = (float(fdm[f"attitude/{a}-rad"]) for a in ("phi", "theta", "psi"))

@@ -110,6 +110,16 @@ def derivative_tolerances(aircraft: Aircraft) -> dict[str, float]:
     return {name: THRESHOLDS.priors.ideal * size for name, size in known if size > _ROUNDING}
 
 
+def _expected_differences(aircraft: Aircraft) -> dict[str, float]:
+    """1 sigma by which reality's derivatives may be off a simulator's file that states no tolerance, by name.
+
+    How well a file holds its simulator says nothing of how well the simulator agrees with reality.
+    """
+    if any(d.tolerance for d in aircraft.derivatives.values()):
+        return {}
+    return {name: THRESHOLDS.priors.reality * abs(d.value) for name, d in aircraft.derivatives.items()}
+
+
 def nuisances_of(
     aircraft: Aircraft,
     model: ResidualModel,
@@ -146,7 +156,7 @@ def nuisances_of(
     of_aircraft = ("derivative_error", "unsteady_aerodynamics", *CLOCKS, *(f"{name}" for name in believed))
     shared = np.array([name.startswith(of_aircraft) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
-    given = {f"derivative_error.{name}": size for name, size in room.items()}
+    given = {f"derivative_error.{name}": size for name, size in (room or _expected_differences(aircraft)).items()}
     wider = [max(given[n] / s, 1.0) if n in given else 1.0 for n, s in sigma.items()]
     factors = THRESHOLDS.priors.widening * np.array(wider)
     return Nuisances(tuple(names.index(n) for n in sigma), *numbers, shared, factors=factors)

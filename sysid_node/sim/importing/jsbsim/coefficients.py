@@ -14,6 +14,7 @@ from sysid_node.aircraft.names import CONTROL_SYMBOLS
 from sysid_node.sim.importing.expansion import TableAxis
 from sysid_node.sim.importing.jsbsim.program import Loads, Program
 from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
+from sysid_node.sim.importing.jsbsim.throttle import thrust_by_throttle
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
 Array = NDArray[np.float64]
@@ -43,10 +44,9 @@ class CoefficientModel:
         self._put({}, steady.state.phi)
         self.steady_loads: Loads = program.loads()
         self.mach_per_speed = program.mach / steady.state.airspeed
-        force = self.steady_loads.engine
-        self.thrust = float(math.hypot(force[0], force[2])) if program.powered else 0.0
-        self.inclination = math.atan2(-force[2], force[0]) if self.thrust > 0.0 else 0.0
-        self.arm = float(force[4]) / self.thrust if self.thrust > 0.0 else 0.0
+        engine = thrust_by_throttle(program, steady.state, self.steady_loads.engine)
+        self.thrust = engine.slope * steady.state.throttle
+        self.inclination, self.arm, self.motor_lag = engine.inclination, engine.arm, engine.lag
         self.unsteady = self._unsteady()
 
     @property
@@ -57,7 +57,7 @@ class CoefficientModel:
         return {**angles, **{symbol: self._steady.deflections[s.name] for symbol, s in self._surfaces.items()}}
 
     def __call__(self, points: Mapping[str, Array]) -> Array:
-        """Coefficients (N, 6): all loads but the steady flight's thrust, and without terms in the rate of alpha."""
+        """Coefficients (N, 6): all loads but what the throttle adds, and without terms in the rate of alpha."""
         size = len(next(iter(points.values())))
         names = list(points)
         rows = np.column_stack([points[name] for name in names])

@@ -131,17 +131,17 @@ class Program:
             fdm[f"ic/{axis}-fps"] = value / FOOT
         for axis, value in zip("pqr", state.rates, strict=True):
             fdm[f"ic/{axis}-rad_sec"] = value
-        self._levers(state.throttle)
+        self.levers(state.throttle)
         self.drive(properties)
         fdm.run_ic()
 
     def _settle(self, throttle: float) -> None:
         """Engines into their steady running at this throttle and airspeed."""
         self.suspend()
-        self._levers(throttle)
+        self.levers(throttle)
         self.fdm.run()
         self.fdm["propulsion/set-running"] = -1  # at full throttle, whatever the levers say
-        self._levers(throttle)
+        self.levers(throttle)
         self.fdm.run()
         self.fdm.get_propulsion().get_steady_state()
         self.fdm.run()
@@ -157,7 +157,8 @@ class Program:
         if self.fdm.integration_suspended():
             self.fdm.set_dt(1.0 / self._rate)
 
-    def _levers(self, throttle: float) -> None:
+    def levers(self, throttle: float) -> None:
+        """Throttle of all engines (0..1), mixture and propeller forward."""
         if self.powered and not self.engines:
             self.fdm[_LEVER] = throttle
         for i in range(self.engines):
@@ -250,6 +251,12 @@ class Program:
         for _ in range(frames):
             self.fdm.run()
         self.resume()
+
+    def run_for(self, seconds: float) -> None:
+        """Fly on; the next steady flight settles its engines anew."""
+        self._settled = None
+        for _ in range(round(seconds * self._rate)):
+            self.fdm.run()
 
     def read(self, names: Sequence[str]) -> Array:
         """Values of properties."""

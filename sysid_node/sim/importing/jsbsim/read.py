@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 #: A table's smallest part, as a share of what each variable changes in an ordinary flight.
 _SHARE = 5e-4
+#: 1 sigma of the engine's lag, as a share: real engines lag more at one throttle than at another.
+_LAG_SHARE = 0.2
 _ORDINARY = {"alpha": 0.1, "beta": 0.1, "p": 0.05, "q": 0.005, "r": 0.05}
 
 
@@ -127,6 +129,8 @@ def _effects(
     for control, servo in servos.items():
         for effect, size in servo.effects().items():
             effects.setdefault(effect, {})[control] = UncertainValue(size)
+    if model.motor_lag:
+        effects["motor_lag"] = {"time_constant": UncertainValue(model.motor_lag, _LAG_SHARE * model.motor_lag)}
     lift, moment = model.unsteady.slopes[[0, 4]]
     if lift or moment:
         terms = {"CL_alphadot": lift, "Cm_alphadot": moment}
@@ -164,9 +168,9 @@ def _notes(
         notes.append(f"Terms of {', '.join(left)} in the rate of alpha are left out; a file has those of CL and Cm.")
     if program.powered:
         notes.append(
-            f"Thrust is {model.thrust:.0f} N at throttle {steady.state.throttle:.2f} and {steady.state.airspeed:.1f} "
-            "m/s, and proportional to the throttle; how it changes with airspeed is in the tables over V, at this "
-            "throttle. How fast engine and propeller change their speed is not held."
+            f"Thrust changes by {model.thrust / steady.state.throttle:.0f} N per unit of throttle at throttle "
+            f"{steady.state.throttle:.2f} and {steady.state.airspeed:.1f} m/s, with a lag of {model.motor_lag:.2f} s; "
+            "what it is beyond that, and how it changes with airspeed, is in the drag and its table over V."
         )
     notes.append(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."

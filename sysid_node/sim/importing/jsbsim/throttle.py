@@ -1,0 +1,86 @@
+"""How a JSBSim model's thrust follows its throttle near a steady flight: its slope, its direction, and its lag."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.sim.importing.jsbsim.program import Flight, Program
+
+Array = NDArray[np.float64]
+
+#: Change of the throttle from the steady flight's, both ways, for the slope and for the lag: a turbine changes its
+#: speed at a steady rate, and an ordinary flight moves the throttle little. The least change of thrust, N.
+_STEP, _SMALL, _LEAST = 0.1, 0.02, 1e-6
+
+#: How long the engine runs before a step of the throttle and is watched after it, s, and how often, Hz.
+_RUNNING, _WATCHED, _RATE = 0.2, 6.0, 50.0
+
+#: Lags below this count as none, s.
+_SHORTEST = 0.02
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Thrust in proportion to the throttle: N at 1.0, its angle above the x axis (rad), its arm (m) and its lag (s)."""
+
+    slope: float
+    inclination: float = 0.0
+    arm: float = 0.0
+    lag: float = 0.0
+
+
+def thrust_by_throttle(program: Program, state: Flight, steady: Array) -> Engine:
+    """The engine near a steady flight, whose load by the engine (6,) is ``steady``; a slope of zero: unpowered.
+
+    The slope is that of the thrust over the throttle. Where the thrust does not grow with the throttle, or is no
+    engine's, it is the steady thrust over the steady throttle.
+    """
+    if not program.powered or state.throttle <= 0.0:
+        return Engine(0.0)
+    proportional = _along(steady, state.throttle)
+    if not program.engines:
+        return proportional
+    low, high = max(state.throttle - _STEP, 0.0), min(state.throttle + _STEP, 1.0)
+    change = _steady_load(program, state, high) - _steady_load(program, state, low)
+    _steady_load(program, state, state.throttle)
+    if change[0] < _LEAST:
+        return proportional
+    return replace(_along(change, high - low), lag=_lag(program, state))
+
+
+def _along(load: Array, throttle: float) -> Engine:
+    thrust = math.hypot(load[0], load[2])
+    if thrust <= 0.0:
+        return Engine(0.0)
+    return Engine(thrust / throttle, math.atan2(-load[2], load[0]), float(load[4]) / thrust)
+
+
+def _steady_load(program: Program, state: Flight, throttle: float) -> Array:
+    program.put(replace(state, throttle=throttle), {})
+    return program.loads().engine
+
+
+def _lag(program: Program, state: Flight) -> float:
+    """Time (s) after which a step of the throttle has changed the thrust by 1 - 1/e of what it does in the end."""
+    low, high = max(state.throttle - _SMALL, 0.0), min(state.throttle + _SMALL, 1.0)
+    flown = [_course(program, state, low, throttle) for throttle in (low, high)]
+    change = flown[1] - flown[0]  # the airspeed falls in both flights alike
+    late = np.flatnonzero(change >= (1.0 - math.exp(-1.0)) * change[-1])
+    lag = float(late[0] / _RATE) if change[-1] > 0.0 and late.size else 0.0
+    return lag if lag > _SHORTEST else 0.0
+
+
+def _course(program: Program, state: Flight, before: float, after: float) -> Array:
+    """Thrust (N,) in flight from steady running at one throttle, with another from the first moment on."""
+    program.put(replace(state, throttle=before), {})
+    program.run_for(_RUNNING)  # JSBSim's turbine follows the first throttle in flight at once
+    program.levers(after)
+    thrust = []
+    for _ in range(round(_WATCHED * _RATE)):
+        thrust.append(program.loads().engine[0])
+        program.run_for(1.0 / _RATE)
+    return np.array(thrust)
