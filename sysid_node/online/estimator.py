@@ -175,11 +175,14 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
 
 
 def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
-    """The sample, and behind it the controls' excess where the model is ``commanded``."""
-    if not model.commanded:
-        return sample, ()
+    """The sample, and behind it the controls' excess where the model is ``commanded``.
+
+    A recorded flight has a place for the excess in all its samples, in those before commands were told, too.
+    """
     count = len(model.lower_limits)
-    return sample[:count], sample[count:]
+    if len(sample) == count:
+        return sample, ()
+    return sample[:count], sample[count:] if model.commanded else ()
 
 
 def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float]) -> None:

@@ -97,3 +97,15 @@ def test_a_heavier_aircraft_is_noticed_between_renewals() -> None:
     found = run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(0.1, 48.0, 0.1))
     statuses = {d.status for estimates in found for d in estimates.derivatives.values() if estimates.time > 36.0}
     assert statuses - {"ok", "converging"}
+
+
+def test_commands_may_be_told_in_the_midst_of_a_flight_without_thrust() -> None:
+    """Samples of a flight that holds commands have places for the deflections' excess from the beginning."""
+    time, samples = flight(3, 4.0)
+    samples[:, THRUST] = np.nan
+    wide = np.hstack([samples, np.zeros((time.size, len(AIRCRAFT.controls)))])
+    settings, due = OnlineSettings(settle_time=0.0), time[[150, -1]]
+    before, _ = run(AIRCRAFT, settings, time, samples, due)
+    early, late = run(AIRCRAFT, settings, time, wide, due, commands_from=200)
+    assert repr(early) == repr(before)
+    assert math.isfinite(late.derivatives["Cm_de"].value)
