@@ -4,8 +4,9 @@ Two types of ten tails, 10 to 15 flights a tail over a year. A type's derivative
 tails about their type, flights about their tail; estimates have statistical errors, correlated within a coefficient and
 now and then four times as large, and systematic ones, of which half the variance is the type's and half the tail's.
 The events: one tail wears, one has a slow servo, one a mis-set vane after maintenance, and the simulator lacks one
-effect that all have. A flight's diagnosis names a cause that is there in 85 of 100 flights, a confused alternative in
-some of these, and in 4 of 100 a cause that is not there. Nothing of how the estimates are judged enters here.
+effect that all have. Every tail is inspected once, on a day that is drawn. A flight's diagnosis names a cause that is
+there in 85 of 100 flights, a confused alternative in some of these, and in 4 of 100 a cause that is not there. Nothing
+of how the estimates are judged enters here.
 """
 
 from __future__ import annotations
@@ -64,8 +65,10 @@ def draw_fleet(
     truth = Truth({}, {}, {}, {}, str(worn), str(slow), str(vane), since, _drifting(str(worn), str(vane)), {})
     for aircraft, file in files.items():
         flights += _fly_type(generator, aircraft, file, tails, truth, events)
-    notes = (MaintenanceNote(str(vane), _date(since), "nose boom replaced"),) if events else ()
-    return FleetResults(tuple(sorted(flights, key=lambda f: (f.tail, f.date))), (), notes), truth
+    notes = [MaintenanceNote(str(vane), _date(since), "nose boom replaced")] if events else []
+    days = np.random.default_rng([seed, 25]).uniform(0, 365, len(names))
+    notes += [MaintenanceNote(tail, _date(day), "inspected") for tail, day in zip(names.values(), days, strict=True)]
+    return FleetResults(tuple(sorted(flights, key=lambda f: (f.tail, f.date))), (), tuple(notes)), truth
 
 
 def _drifting(worn: str, vane: str) -> frozenset[tuple[str, str]]:

@@ -16,7 +16,7 @@ import argparse
 import csv
 import datetime
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -68,10 +68,15 @@ def fly(folder: Path, truth: dict[str, Any]) -> None:
         if not path.exists():
             _fly_one(simulators[flight["aircraft"]], flight, truth, path)
             print(flight["name"], flush=True)
+    write_catalogue(folder, truth["flights"])
+
+
+def write_catalogue(folder: Path, flights: Sequence[Mapping[str, Any]]) -> None:
+    """Write ``catalogue.csv`` for flights with their name, aircraft, tail and day of the year."""
     with (folder / "catalogue.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["path", "aircraft", "tail", "date"])
-        for f in truth["flights"]:
+        for f in flights:
             date = (START + datetime.timedelta(days=f["day"])).isoformat()
             writer.writerow([f"logs/{f['name']}", f["aircraft"], f["tail"], date])
 

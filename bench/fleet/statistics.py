@@ -170,13 +170,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--events", type=int, default=150, help="fleets with the events")
     parser.add_argument("--quiet-fleets", type=int, default=150, help="fleets without")
+    parser.add_argument("--first-seed", type=int, default=0, help="seed of the first fleet of either kind")
     parser.add_argument("--ledger", type=Path, default=Path("out/fleet_statistics.jsonl"))
     parser.add_argument("--page", type=Path, help="page to fill, e.g. docs/results/fleet.md")
     args = parser.parse_args()
     args.ledger.parent.mkdir(parents=True, exist_ok=True)
     done = {(row["events"], row["seed"]) for row in _read(args.ledger)}
-    wanted = [(events, seed) for seed in range(max(args.events, args.quiet_fleets)) for events in (True, False)]
-    wanted = [(e, seed) for e, seed in wanted if seed < (args.events if e else args.quiet_fleets)]
+    numbers = range(max(args.events, args.quiet_fleets))
+    wanted = [
+        (e, args.first_seed + k)
+        for k in numbers
+        for e in (True, False)
+        if k < (args.events if e else args.quiet_fleets)
+    ]
     for events, seed in wanted:
         if (events, seed) not in done:
             row = judge_fleet(seed, events=events)

@@ -126,10 +126,11 @@ def _show_plan(flights: list[PlannedFlight]) -> None:
 def _show(found: FleetReport, out: Path) -> None:
     """Print how many flights gave a result, why the others did not, and what the flights tell together."""
     from sysid_node.report.wording.fleet import findings  # noqa: PLC0415  # with the results there, it is quick
+    from sysid_node.report.wording.numbers import plural  # noqa: PLC0415
 
     results = found.results
-    tails = {flight.tail for flight in results.flights}
-    print(f"{len(results.flights)} flights of {len(tails)} aircraft, {len(results.refusals)} refused")
+    tails = {(flight.aircraft, flight.tail) for flight in results.flights}
+    print(f"{plural(len(results.flights), 'flight')} of {len(tails)} aircraft, {len(results.refusals)} refused")
     for refusal in results.refusals[:_SHOWN]:
         print(f"  refused {refusal.flight}: {refusal.reason}")
     if len(results.refusals) > _SHOWN:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from sysid_node.fleet.catalogue.catalogue import CatalogueFlight
 from sysid_node.fleet.plan import Plan
 from sysid_node.fleet.results import FleetResults, FlightResult, Refusal
@@ -26,7 +28,8 @@ def assembled(plan: Plan, state: FleetState) -> FleetResults:
         else:
             refusals.append(found)
     flights.sort(key=lambda one: (one.tail, one.date, one.flight))
-    return FleetResults(tuple(flights), tuple(refusals), plan.catalogue.maintenance)
+    notes = tuple(replace(note, aircraft=plan.type_of(note.aircraft)) for note in plan.catalogue.maintenance)
+    return FleetResults(tuple(flights), tuple(refusals), notes)
 
 
 def _result(plan: Plan, flight: CatalogueFlight, entry: FlightEntry | None) -> FlightResult | Refusal:

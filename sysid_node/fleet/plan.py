@@ -40,6 +40,11 @@ class Plan:
         """The aircraft of a flight; None where its file has a fault."""
         return self._aircraft.loaded(entry.aircraft)[0] if entry.aircraft else None
 
+    def type_of(self, file: str) -> str:
+        """The name in an aircraft file, or of a shipped one; what is given where it has a fault."""
+        aircraft = self._aircraft.loaded(file)[0] if file else None
+        return aircraft.name if aircraft is not None else file
+
     def _with_aircraft_fault(self, entry: CatalogueFlight) -> CatalogueFlight:
         if entry.fault or not entry.aircraft:
             return entry

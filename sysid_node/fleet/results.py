@@ -68,11 +68,16 @@ class Refusal:
 
 @dataclass(frozen=True)
 class MaintenanceNote:
-    """What was done to an aircraft, and when (UTC)."""
+    """What was done to an aircraft, and when (UTC); ``aircraft`` is its type, empty for any with that tail."""
 
     tail: str
     date: datetime.datetime
     text: str
+    aircraft: str = ""
+
+    def concerns(self, aircraft: str, tail: str) -> bool:
+        """Whether it was done to this tail of this type."""
+        return self.tail == tail and self.aircraft in ("", aircraft)
 
 
 @dataclass(frozen=True)

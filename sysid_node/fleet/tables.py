@@ -84,7 +84,8 @@ def document(results: FleetResults, settings: Mapping[str, object]) -> dict[str,
             for o in results.refusals
         ],
         "maintenance": [
-            {"tail": note.tail, "date": note.date.isoformat(), "text": note.text} for note in results.maintenance
+            {"aircraft": note.aircraft, "tail": note.tail, "date": note.date.isoformat(), "text": note.text}
+            for note in results.maintenance
         ],
     }
 

@@ -25,6 +25,7 @@ def write(
 ) -> None:
     """Write ``report.html``, the tables, and ``tails/<tail>.yaml`` for every tail whose type has a file in ``files``.
 
+    Where two types have a tail of one name, its file is ``tails/<type>-<tail>.yaml``.
     The folder must be there; files of the same names are replaced. Raises InputError where one cannot be written.
     """
     report = FleetReport(results, summary, files or {})
@@ -41,7 +42,8 @@ def _write_tails(folder: Path, report: FleetReport) -> None:
         if aircraft in report.files:
             folder.mkdir(exist_ok=True)
             text = dump_aircraft(tail_aircraft(report.files[aircraft], tail, priors))
-            (folder / f"{file_name(tail)}.yaml").write_text(text, encoding="utf-8")
+            name = f"{aircraft}-{tail}" if report.summary.is_ambiguous(tail) else tail
+            (folder / f"{file_name(name)}.yaml").write_text(text, encoding="utf-8")
 
 
 def file_name(tail: str) -> str:

@@ -34,7 +34,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "a,made.yaml,7,,2026-05-03,\n"
         "b,made.yaml,8,pod,2026-05-04T10:00:00Z,\n"
         "c.ulg,made.yaml,8,,2026-05-05,\n"
-        ",,7,,2026-05-01,new servo\n"
+        ",made.yaml,7,,2026-05-01,new servo\n"
     )
     assert main(arguments(folder)) == 0
     return folder
@@ -61,7 +61,9 @@ def test_a_fleet_gives_the_replays_estimates_with_their_covariance(fleet: Path) 
     ]
     assert [refusal["flight"] for refusal in found["refusals"]] == ["c.ulg"]
     assert "c.ulg" in found["refusals"][0]["reason"]
-    assert found["maintenance"] == [{"tail": "7", "date": "2026-05-01T00:00:00+00:00", "text": "new servo"}]
+    assert found["maintenance"] == [
+        {"aircraft": "made", "tail": "7", "date": "2026-05-01T00:00:00+00:00", "text": "new servo"}
+    ]
     flight = load(fleet / "a", fleet / "made.yaml")
     single = replay(flight, {"frequencies": "0.2:0.2:2.0", "publish_rate": 1.0}, judge_faults=False)
     rows = [row for row in csv.DictReader((fleet / "out" / "estimates.csv").open()) if row["flight"] == "a"]

@@ -12,7 +12,8 @@ from sysid_node.fleet.results import FleetResults, MaintenanceNote, Refusal
 from sysid_node.fleet.statistics.series import DAY
 from sysid_node.fleet.statistics.summarise import summarise
 from sysid_node.report.fleet import file_name, write
-from sysid_node.report.wording.fleet import date_words, tail_sentence
+from sysid_node.report.results.fleet_report import FleetReport
+from sysid_node.report.wording.fleet import date_words, findings, tail_sentence
 
 GAP = {
     "verdict": "explained",
@@ -98,6 +99,30 @@ def test_a_drift_in_a_technicians_words(written):
         tail_sentence("t3", [drift])
         == "t3: aileron power \u221218\u202f% since 1 January 2026; the others are unchanged."
     )
+
+
+def test_two_types_may_have_a_tail_of_the_same_name(tmp_path):
+    """Each keeps its own drift, maintenance, sentence and aircraft file."""
+    both = [replace(f, aircraft=aircraft, flight=f"{aircraft}/{f.flight}")
+            for aircraft, worn in (("cdrw", "t3"), ("kestrel", None))
+            for f in fleet(worn=worn, wear=-0.04, tails=5)]  # fmt: skip
+    note = MaintenanceNote("t3", START.replace(month=3, day=15), "new servo", "kestrel")
+    files = {name: load_aircraft(name) for name in ("cdrw", "kestrel")}
+    results = FleetResults(tuple(sorted(both, key=lambda f: (f.tail, f.date))), (), (note,))
+    report = FleetReport(results, summarise(results, files), files)
+    assert [(d.aircraft, d.tail, d.name) for d in report.drifts] == [("cdrw", "t3", "Cl_da")]
+    (sentence,) = findings(report)
+    assert sentence.startswith("t3 (cdrw): aileron power")
+    assert "new servo" not in sentence
+    assert report.maintenance("cdrw", "t3") == []
+    write(results, report.summary, tmp_path, files)
+    values = {
+        name: load_aircraft(tmp_path / "tails" / f"{name}-t3.yaml").derivatives["Cl_da"].value
+        for name in ("cdrw", "kestrel")
+    }
+    assert values["cdrw"] == pytest.approx(values["kestrel"] - 0.04, abs=0.015)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count('id="tail-cdrw-t3"') == page.count('id="tail-kestrel-t3"') == 1
 
 
 def test_dates_and_names():

@@ -57,7 +57,7 @@ def read_catalogue(path: str | Path, aircraft: str | None = None) -> Catalogue:
     if not found:
         raise InputError(f"catalogue {path}: has no flights; give a line for each")
     base = path.absolute().parent
-    notes = [_note(row) for row in found if row["maintenance"]]
+    notes = [_note(row, base) for row in found if row["maintenance"]]
     flights = [flight for row in found if row["path"] for flight in _flights(row, base, aircraft or default)]
     return _unique(Catalogue(tuple(flights), tuple(sorted(notes, key=lambda note: (note.tail, note.date)))))
 
@@ -95,9 +95,9 @@ def _yaml_rows(path: Path, text: str) -> tuple[Iterable[_Row], str]:
     rows = [_yaml_row(f"catalogue {path}, flights[{i}]", entry) for i, entry in enumerate(content["flights"])]
     for i, entry in enumerate(content.get("maintenance") or []):
         where = f"catalogue {path}, maintenance[{i}]"
-        if not isinstance(entry, dict) or set(entry) != {"tail", "date", "text"}:
-            raise InputError(f"{where}: expected the keys tail, date and text")
-        values = {"tail": _text(entry["tail"]), "date": _text(entry["date"]), "maintenance": _text(entry["text"])}
+        if not isinstance(entry, dict) or set(entry) - {"aircraft"} != {"tail", "date", "text"}:
+            raise InputError(f"{where}: expected the keys tail, date, text, and perhaps aircraft")
+        values = {"maintenance" if key == "text" else key: _text(value) for key, value in entry.items()}
         rows.append(_checked(_Row(where, values)))
     return rows, _text(content.get("aircraft"))
 
@@ -132,9 +132,10 @@ def _checked(row: _Row) -> _Row:
     return row
 
 
-def _note(row: _Row) -> MaintenanceNote:
+def _note(row: _Row, base: Path) -> MaintenanceNote:
+    aircraft = _aircraft_path(row["aircraft"], base) if row["aircraft"] else ""
     try:
-        return MaintenanceNote(row["tail"], date_of(row["date"]), row["maintenance"])
+        return MaintenanceNote(row["tail"], date_of(row["date"]), row["maintenance"], aircraft)
     except ValueError as error:
         raise InputError(f"{row.where}: {error}") from None
 

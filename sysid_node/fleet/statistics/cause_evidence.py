@@ -3,7 +3,8 @@
 The model of a group of causes that flights confuse, so that at most one of them is there (K causes):
 
 * With probability ``shared`` (divided by K) a cause is in all tails of the type: the simulator lacks it.
-* Else it is one tail's own, with probability ``own`` for each tail, from its first flight on or from a later one.
+* Else it is one tail's own, with probability ``own`` for each tail, from its first flight on or from a later one. A
+  later one is likelier to be the first after maintenance, or after a step of the tail's derivatives.
 * Else it is one flight's own (or a false diagnosis), with probability ``single`` for each flight.
 * A flight fails to show a cause that is there with probability ``failing``.
 
@@ -15,13 +16,14 @@ single flight bound what one flight can add. Sums over the unknown states are ex
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
 
 from sysid_node.fleet.statistics.diagnoses import FlightDiagnosis
+from sysid_node.fleet.statistics.series import DAY
 from sysid_node.flight.record import Array
 
 
@@ -35,6 +37,7 @@ class CausePriors:
     failing: float = 0.2  # that a flight does not show what is there: of 30 in moderate turbulence five did not
     missed: float = 0.3  # likelihood ratio of a diagnosis that does not list the cause
     from_start: float = 0.5  # that a tail's own cause is there from its first flight on
+    at_change: float = 0.5  # that one which begins later begins at a known change of the tail, where there is one
 
 
 PRIORS = CausePriors()
@@ -64,13 +67,21 @@ class GroupBelief:
     tails: tuple[TailEvidence, ...]
 
 
-def pooled(labels: Sequence[str], diagnoses: Sequence[FlightDiagnosis], priors: CausePriors = PRIORS) -> GroupBelief:
+def pooled(
+    labels: Sequence[str],
+    diagnoses: Sequence[FlightDiagnosis],
+    changes: Mapping[str, Sequence[float]] | None = None,
+    priors: CausePriors = PRIORS,
+) -> GroupBelief:
     """Probabilities that the type shares a cause of the group, and that a tail has it alone, given all flights.
 
-    ``diagnoses`` are those of one type, in the order of their dates within a tail.
+    ``diagnoses`` are those of one type, in the order of their dates within a tail. ``changes`` are by tail the days
+    since 1970 of maintenance and of steps of the derivatives.
     """
-    names = dict.fromkeys(d.flight.tail for d in diagnoses)
-    tails = tuple(_tail(tail, labels, [d for d in diagnoses if d.flight.tail == tail], priors) for tail in names)
+    tails = tuple(
+        _tail(tail, labels, [d for d in diagnoses if d.flight.tail == tail], (changes or {}).get(tail, ()), priors)
+        for tail in dict.fromkeys(d.flight.tail for d in diagnoses)
+    )
     K = len(labels)
     gains, owns = np.array([t.gain for t in tails]), np.array([t.own for t in tails])  # (J, K)
     without = _any_own(owns, priors)  # (J,) log likelihood of each tail where the type shares nothing
@@ -87,18 +98,36 @@ def _any_own(owns: Array, priors: CausePriors) -> Array:
     return np.asarray(logsumexp(choices, axis=1))
 
 
-def _tail(tail: str, labels: Sequence[str], diagnoses: Sequence[FlightDiagnosis], priors: CausePriors) -> TailEvidence:
+def _tail(
+    tail: str,
+    labels: Sequence[str],
+    diagnoses: Sequence[FlightDiagnosis],
+    changes: Sequence[float],
+    priors: CausePriors,
+) -> TailEvidence:
     ratio = np.array([[_ratio(label, d, priors) for label in labels] for d in diagnoses])  # (n, K)
     present = np.log((1.0 - priors.failing) * ratio + priors.failing)
     chance = priors.single / len(labels)
     absent = np.log1p(chance * (ratio - 1.0).sum(axis=1))
     gain = present - absent[:, None]
-    n = len(diagnoses)
     from_each = np.cumsum(gain[::-1], axis=0)[::-1]  # (n, K): with the cause from this flight on
-    weight = np.full(n, (1.0 - priors.from_start) / max(n - 1, 1))
-    weight[0] = priors.from_start if n > 1 else 1.0
-    weighed = from_each + np.log(weight)[:, None]
+    day = np.array([d.flight.date.timestamp() / DAY for d in diagnoses])
+    weighed = from_each + np.log(_beginnings(day, changes, priors))[:, None]
     return TailEvidence(tail, gain.sum(axis=0), logsumexp(weighed, axis=0), tuple(map(int, weighed.argmax(axis=0))))
+
+
+def _beginnings(day: Array, changes: Sequence[float], priors: CausePriors) -> Array:
+    """Probability (n,) that a tail's own cause begins with the flight of a ``day`` (n,), given that it has one."""
+    n = day.size
+    if n == 1:
+        return np.ones(1)
+    later = np.full(n - 1, 1.0 / (n - 1))
+    first = np.searchsorted(day, np.asarray(changes, dtype=float))
+    known = np.unique(first[(first > 0) & (first < n)])
+    if known.size:
+        later *= 1.0 - priors.at_change
+        later[known - 1] += priors.at_change / known.size
+    return np.concatenate([[priors.from_start], (1.0 - priors.from_start) * later])
 
 
 def _ratio(label: str, diagnosis: FlightDiagnosis, priors: CausePriors) -> float:

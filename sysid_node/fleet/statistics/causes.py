@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,14 +70,21 @@ class PooledCause:
         return "tail" if any(t.own >= LISTED for t in self.tails) else "flight"
 
 
-def pooled_causes(flights: Sequence[FlightResult]) -> list[PooledCause]:
-    """Every cause that some flight gave an even chance, by type, the likeliest to be shared first."""
+def pooled_causes(
+    flights: Sequence[FlightResult], changes: Mapping[tuple[str, str], Sequence[float]] | None = None
+) -> list[PooledCause]:
+    """Every cause that some flight gave an even chance, by type, the likeliest to be shared first.
+
+    ``changes`` are by type and tail the days since 1970 of maintenance and of steps of the derivatives, with which a
+    tail's own cause is likelier to begin.
+    """
     diagnoses = diagnoses_of(sorted(flights, key=lambda f: (f.tail, f.date)))
     found: list[PooledCause] = []
     for aircraft in sorted({d.flight.aircraft for d in diagnoses}):
         of_type = [d for d in diagnoses if d.flight.aircraft == aircraft]
+        known = {key[1]: days for key, days in (changes or {}).items() if key[0] == aircraft}
         for group in confused_groups(of_type):
-            belief = pooled(group, of_type)
+            belief = pooled(group, of_type, known)
             found += [_pooled(aircraft, belief, k, of_type) for k in range(len(group)) if _matters(belief, k, of_type)]
     return sorted(found, key=lambda c: (c.aircraft, -c.shared, c.label))
 

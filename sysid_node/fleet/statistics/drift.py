@@ -46,24 +46,23 @@ class Drift:
     significant: bool = False
 
 
-def find_drift(series: DerivativeSeries, omega: float, freedom: int) -> Drift | None:
-    """The largest drift in the ``series`` of one tail, or None where it has fewer than five flights.
+def find_drift(series: DerivativeSeries, omega: float, freedom: int, maintenance: Sequence[float] = ()) -> Drift | None:
+    """The most significant drift in the ``series`` of one tail, or None where it has fewer than five flights.
 
-    ``omega`` is the scatter of flights of one tail beyond their statistical errors, ``freedom`` (at least 1) its
-    degrees of freedom. A systematic error is one unknown in all flights of the tail; where it enters flights
-    differently, it adds correlated differences.
+    ``omega`` is the scatter of flights of one tail beyond their statistical errors, as other tails show it, and
+    ``freedom`` (at least 1) its degrees of freedom. ``maintenance`` are days since 1970 at which something was done to
+    the tail: a step at such a date needs no search. A systematic error is one unknown in all flights of the tail; where
+    it enters flights differently, it adds correlated differences.
     """
     if series.count < LEAST_FLIGHTS:
         return None
-    courses = _courses(series)
-    covariance = np.diag(series.statistical**2 + omega**2) + np.outer(series.systematic, series.systematic)
-    tests = compare_contrasts(series.value, covariance, np.array([c.values for c in courses]), freedom)
-    best = int(np.argmax(np.abs(tests.statistic)))
+    courses = _courses(series, maintenance)
+    variance, tests = _tested(series, courses, series.statistical**2 + omega**2, freedom)
+    best = tests.best
     chosen = courses[best]
-    weight = 1.0 / (series.statistical**2 + omega**2)
     change = float(tests.amplitude[best])
-    before = float(np.average(series.value - change * chosen.values, weights=weight))
-    first, last = _dates(series, courses, tests, best)
+    before = float(np.average(series.value - change * chosen.values, weights=1.0 / variance))
+    first, last = _dates(series, courses, tests)
     since = float(series.day[chosen.place]) if chosen.kind == "step" else float(series.day[0])
     return Drift(
         series.aircraft, series.tails[0], series.name, chosen.kind, change, float(tests.error[best]), before,
@@ -71,21 +70,48 @@ def find_drift(series: DerivativeSeries, omega: float, freedom: int) -> Drift | 
     )  # fmt: skip
 
 
+def _tested(
+    series: DerivativeSeries, courses: Sequence[_Course], variance: Array, freedom: int
+) -> tuple[Array, ContrastTests]:
+    """The tests, and the variances (n,) of the flights that they were made with.
+
+    A tail whose flights scatter significantly more about the best course than the variances say (chi-square, 5 %) is
+    tested by its own scatter.
+    """
+    systematic = np.outer(series.systematic, series.systematic)
+    values, questions = np.array([c.values for c in courses]), [c.question for c in courses]
+    tests = compare_contrasts(series.value, np.diag(variance) + systematic, values, questions, freedom)
+    left = series.count - 2
+    inverse = np.linalg.inv(np.diag(variance) + systematic)
+    residual = series.value - tests.amplitude[tests.best] * values[tests.best]
+    residual -= inverse.sum(axis=0) @ residual / inverse.sum()
+    excess = float(residual @ inverse @ residual) / left
+    if excess * left <= stats.chi2.ppf(0.95, left):
+        return variance, tests
+    own = excess * variance
+    return own, compare_contrasts(series.value, np.diag(own) + systematic, values, questions, min(freedom, left))
+
+
 @dataclass(frozen=True)
 class _Course:
     kind: str
     values: Array  # (n,)
+    question: str  # that is asked by the course, alone or with others
     place: int = 0  # of the first flight after a step
     configuration: str = ""
 
 
-def _courses(series: DerivativeSeries) -> list[_Course]:
+def _courses(series: DerivativeSeries, maintenance: Sequence[float]) -> list[_Course]:
     """A step before each flight that leaves two on either side, a straight line, and each other configuration."""
     n, day = series.count, series.day
-    steps = [_Course("step", (np.arange(n) >= k).astype(float), k) for k in range(_SIDE, n - _SIDE + 1)]
-    found = [step for step in steps if day[step.place] > day[step.place - 1]]
+    known = set(np.searchsorted(day, np.asarray(maintenance, dtype=float)).tolist())
+    found = [
+        _Course("step", (np.arange(n) >= k).astype(float), "maintenance" if k in known else "step", k)
+        for k in range(_SIDE, n - _SIDE + 1)
+        if day[k] > day[k - 1]
+    ]
     if day[-1] > day[0]:
-        found.append(_Course("trend", (day - day[0]) / (day[-1] - day[0])))
+        found.append(_Course("trend", (day - day[0]) / (day[-1] - day[0]), "trend"))
     return found + _configurations(series.configuration)
 
 
@@ -93,13 +119,15 @@ def _configurations(names: Sequence[str]) -> list[_Course]:
     """Contrasts of each configuration with all others; none where a tail has one configuration only."""
     words = sorted(set(names), key=lambda name: (-names.count(name), name))
     other = [word for word in words[1:] if names.count(word) >= _SIDE]
-    return [_Course("configuration", np.array([float(name == word) for name in names]), 0, word) for word in other]
+    return [
+        _Course("configuration", np.array([float(name == word) for name in names]), "configuration", 0, word)
+        for word in other
+    ]
 
 
-def _dates(
-    series: DerivativeSeries, courses: Sequence[_Course], tests: ContrastTests, best: int
-) -> tuple[float, float]:
+def _dates(series: DerivativeSeries, courses: Sequence[_Course], tests: ContrastTests) -> tuple[float, float]:
     """Days between which the step lies: those of steps whose likelihood is within 95 % of the best; else all days."""
+    best = tests.best
     if courses[best].kind != "step":
         return float(series.day[0]), float(series.day[-1])
     near = tests.statistic**2 > tests.statistic[best] ** 2 - _HALF_NORMAL**2

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 
+#: False ones among the drifts, the tails that stand out and the derivatives that differ from the file, at most.
+FALSE_RATE = 0.05
+
 
 def adjusted(p_values: Array) -> Array:
     """P-values (N,) adjusted by Benjamini & Hochberg (1995), J. R. Statist. Soc. B 57:289.

@@ -29,6 +29,7 @@ from sysid_node.flight.record import Array
 _POINTS = 40  # of the grid, a side
 _ZOOMS = 3
 _LEVEL = 0.95
+LEAST_FREEDOM = 10  # of the other tails' flights, from which a tail is held against them alone
 _TINY = 1e-9  # smallest share of the systematic variance, so that it can be divided by
 
 
@@ -235,6 +236,34 @@ def scatter_of_others(
     sums = _by_tail(data, tau, np.array([omega]), 1.0)[:, :, 0, :]  # (6, T, J)
     without = _of_sums(sums.sum(axis=-1, keepdims=True) - sums, 1.0)  # (T, J)
     return np.asarray(tau[without.argmax(axis=0)])
+
+
+@dataclass(frozen=True)
+class FlightScatter:
+    """The scatter (J,) of flights of one tail, as the other tails show it, with its degrees of ``freedom`` (J,)."""
+
+    value: Array
+    freedom: NDArray[np.intp]
+
+
+def flight_scatter_of_others(
+    value: Array, statistical: Array, systematic: Array, tail: NDArray[np.intp]
+) -> FlightScatter:
+    """The scatter of flights fitted without each tail in turn, with a level of its own for every tail.
+
+    A tail that changes over time does not widen the scatter that it is held against. Where the other tails have less
+    than ``LEAST_FREEDOM`` degrees of freedom, all tails count.
+    """
+    data = _Data.of(value, statistical, systematic, tail)
+    flights = np.bincount(tail, minlength=data.J)
+    level = np.bincount(tail, data.y) / flights
+    omega = np.linspace(0.0, 1.0, 200) ** 2 * 4.0 * float(np.sqrt(np.mean((data.y - level[tail]) ** 2)))
+    each = _of_sums(_by_tail(data, np.zeros(1), omega, 1.0)[:, 0], 1.0)  # (W, J)
+    total, degrees = each.sum(axis=1, keepdims=True), flights.sum() - data.J
+    freedom = degrees - (flights - 1)
+    enough = freedom >= LEAST_FREEDOM
+    found = omega[np.where(enough, total - each, total).argmax(axis=0)]
+    return FlightScatter(np.asarray(found), np.where(enough, freedom, max(degrees, 1)))
 
 
 def _estimates(data: _Data, found: _Profile, tails: Scatter) -> RandomEffects:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy import stats
@@ -12,15 +11,14 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.fleet.results import FleetResults, FlightResult
 from sysid_node.fleet.statistics.causes import pooled_causes
-from sysid_node.fleet.statistics.drift import Drift, find_drift
-from sysid_node.fleet.statistics.false_discovery import adjusted
+from sysid_node.fleet.statistics.drift import Drift
+from sysid_node.fleet.statistics.false_discovery import FALSE_RATE, adjusted
+from sysid_node.fleet.statistics.fleet_drift import TailKey, fleet_drifts, known_changes, without_drift
 from sysid_node.fleet.statistics.joint import JointEffects, fit_joint
 from sysid_node.fleet.statistics.population import Population, population_of
 from sysid_node.fleet.statistics.prior import TailPrior, tail_prior
-from sysid_node.fleet.statistics.random_effects import fit_random_effects
-from sysid_node.fleet.statistics.series import DerivativeSeries, series_by_type
+from sysid_node.fleet.statistics.series import series_by_type
 from sysid_node.fleet.statistics.summary import (
-    FALSE_RATE,
     FileDifference,
     FleetSummary,
     Key,
@@ -28,12 +26,8 @@ from sysid_node.fleet.statistics.summary import (
     count_reasons,
 )
 
-#: Rounds of testing for drift; after the first, the scatter of flights is taken without the drifts that were found.
-_ROUNDS = 2
 #: Tolerances of the file and errors beyond which a difference from it is not expected.
 _EXPECTED = 2.0
-
-TailKey = tuple[str, str, str]  # type, tail and derivative
 
 
 def summarise(results: FleetResults, files: Mapping[str, Aircraft] | None = None) -> FleetSummary:
@@ -45,8 +39,8 @@ def summarise(results: FleetResults, files: Mapping[str, Aircraft] | None = None
     summary.
     """
     series = series_by_type(results.flights)
-    drifts = _drifts(series)
-    populations = {key: population_of(_without_drift(each, drifts)) for key, each in series.items()}
+    drifts = fleet_drifts(series, results.maintenance)
+    populations = {key: population_of(without_drift(each, drifts)) for key, each in series.items()}
     tails: dict[str, tuple[str, ...]] = {}
     for flight in results.flights:
         tails[flight.aircraft] = tuple(sorted({*tails.get(flight.aircraft, ()), flight.tail}))
@@ -58,40 +52,10 @@ def summarise(results: FleetResults, files: Mapping[str, Aircraft] | None = None
         _deviations(populations),
         drifts,
         _differences(populations, files or {}),
-        tuple(pooled_causes(results.flights)),
+        tuple(pooled_causes(results.flights, known_changes(tails, drifts, results.maintenance))),
         _priors(populations, drifts),
         count_reasons([refusal.reason for refusal in results.refusals]),
     )
-
-
-def _drifts(series: Mapping[Key, DerivativeSeries]) -> dict[TailKey, Drift]:
-    """The largest drift of every tail and derivative, those marked that are significant over the whole fleet."""
-    found: dict[TailKey, Drift] = {}
-    for _ in range(_ROUNDS):
-        tested: dict[TailKey, Drift] = {}
-        for key, each in series.items():
-            steady = _without_drift(each, found)
-            fit = fit_random_effects(steady.value, steady.statistical, steady.systematic, steady.tail, bracket=False)
-            for tail in each.tails:
-                drift = find_drift(each.of_tail(tail), float(np.nan_to_num(fit.flights.value)), max(fit.freedom, 1))
-                if drift is not None:
-                    tested[key[0], tail, key[1]] = drift
-        levels = adjusted(np.array([drift.p_value for drift in tested.values()]))
-        found = {
-            key: replace(drift, adjusted_p=float(p), significant=bool(p <= FALSE_RATE))
-            for (key, drift), p in zip(tested.items(), levels, strict=True)
-        }
-    return found
-
-
-def _without_drift(series: DerivativeSeries, drifts: Mapping[TailKey, Drift]) -> DerivativeSeries:
-    """The estimates as they would be had no tail drifted from its first state; only significant drifts are removed."""
-    value = series.value.copy()
-    for j, tail in enumerate(series.tails):
-        drift = drifts.get((series.aircraft, tail, series.name))
-        if drift is not None and drift.significant:
-            value[series.tail == j] -= drift.change * drift.course
-    return series.with_values(value)
 
 
 def _joint(flights: Sequence[FlightResult], tails: Mapping[str, Sequence[str]]) -> list[JointEffects]:

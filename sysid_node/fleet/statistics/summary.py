@@ -13,13 +13,11 @@ import numpy as np
 
 from sysid_node.fleet.statistics.causes import PooledCause
 from sysid_node.fleet.statistics.drift import Drift
+from sysid_node.fleet.statistics.false_discovery import FALSE_RATE
 from sysid_node.fleet.statistics.joint import JointEffects
 from sysid_node.fleet.statistics.population import Population
 from sysid_node.fleet.statistics.prior import TailPrior
 from sysid_node.fleet.statistics.series import DAY
-
-#: False ones among the drifts, the tails that stand out and the derivatives that differ from the file, at most.
-FALSE_RATE = 0.05
 
 Key = tuple[str, str]  # type and derivative
 
@@ -69,6 +67,10 @@ class FleetSummary:
     causes: tuple[PooledCause, ...]
     priors: Mapping[tuple[str, str], Mapping[str, TailPrior]]  # by type and tail, then by derivative
     refusals: Mapping[str, int]  # by reason
+
+    def is_ambiguous(self, tail: str) -> bool:
+        """Whether several types have a tail of this name."""
+        return sum(tail in tails for tails in self.tails.values()) > 1
 
     def to_json(self) -> dict[str, Any]:
         """All as lists, numbers and text; NaN is None and dates are ISO 8601."""

@@ -38,6 +38,11 @@ class FleetReport:
         order = list(self.files[aircraft].derivatives) if aircraft in self.files else []
         return sorted(found, key=lambda p: order.index(p.series.name) if p.series.name in order else len(order))
 
-    def maintenance(self, tail: str) -> list[MaintenanceNote]:
-        """The notes of one tail, by date."""
-        return sorted((note for note in self.results.maintenance if note.tail == tail), key=lambda note: note.date)
+    def maintenance(self, aircraft: str, tail: str) -> list[MaintenanceNote]:
+        """The notes of one tail of a type, by date."""
+        notes = (note for note in self.results.maintenance if note.concerns(aircraft, tail))
+        return sorted(notes, key=lambda note: note.date)
+
+    def tail_name(self, aircraft: str, tail: str) -> str:
+        """A tail's name, with its type where another type has a tail of the same name."""
+        return f"{tail} ({aircraft})" if self.summary.is_ambiguous(tail) else tail

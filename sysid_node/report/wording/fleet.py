@@ -72,8 +72,8 @@ def account_words(cause: PooledCause) -> str:
 def findings(report: FleetReport) -> list[str]:
     """What has changed, tail by tail, and whose each cause is: a sentence each."""
     drifting = [
-        tail_sentence(tail, list(found), report.maintenance(tail))
-        for (_, tail), found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
+        tail_sentence(report.tail_name(*key), list(found), report.maintenance(*key))
+        for key, found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
     ]
     causes = [f"{c.label} ({c.aircraft}): {account_words(c)}" for c in report.summary.causes if c.account != "flight"]
     return [*drifting, *causes]

@@ -44,12 +44,13 @@ def test_yaml_with_a_default_aircraft_file_beside_it(tmp_path: Path) -> None:
         "  - a.csv\n"
         "  - {path: a.csv, flight: again, aircraft: types/own.yaml, tail: 12, date: 2026-05-03}\n"
         "maintenance:\n"
-        "  - {tail: 12, date: 2026-05-01, text: new wing}\n"
+        "  - {aircraft: types/own.yaml, tail: 12, date: 2026-05-01, text: new wing}\n"
     )
     first, second = read_catalogue(tmp_path / "fleet.yaml").flights
     assert (first.flight, first.aircraft, first.tail) == ("a.csv", "cdrw", "")
     assert (second.flight, second.aircraft, second.tail) == ("again", str(tmp_path / "types/own.yaml"), "12")
-    assert read_catalogue(tmp_path / "fleet.yaml").maintenance[0].text == "new wing"
+    (note,) = read_catalogue(tmp_path / "fleet.yaml").maintenance
+    assert (note.text, note.aircraft) == ("new wing", str(tmp_path / "types/own.yaml"))
 
 
 def test_a_folder_takes_the_aircraft_above_a_log_and_the_tail_of_its_folder(tmp_path: Path) -> None:

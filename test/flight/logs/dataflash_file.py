@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-_CODES = {"Q": "Q", "f": "f", "B": "B", "H": "H", "M": "B", "N": "16s", "Z": "64s", "n": "4s"}
+_CODES = {"Q": "Q", "f": "f", "B": "B", "H": "H", "M": "B", "N": "16s", "Z": "64s", "n": "4s", "I": "I"}
 
 
 class Kind(NamedTuple):
@@ -26,6 +26,7 @@ KINDS = {
     "RCOU": Kind("QHHHHHH", ("TimeUS", "C1", "C2", "C3", "C4", "C5", "C6")),
     "STAT": Kind("QBB", ("TimeUS", "isFlying", "Armed")),
     "MODE": Kind("QMB", ("TimeUS", "Mode", "ModeNum")),
+    "GPS": Kind("QIH", ("TimeUS", "GMS", "GWk")),
     "XKF4": Kind("QBB", ("TimeUS", "C", "PI")),
     "AOA": Kind("Qff", ("TimeUS", "AOA", "SSA")),
 }

@@ -1,5 +1,6 @@
 """The same simulated flight as PX4 and as ArduPilot would log it, at the rates that a test asks for."""
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -73,10 +74,13 @@ def px4_log(
     vehicle_type: int = 2,
     jump: float = 0.0,
     torque: float = 0.0,
+    start: datetime.datetime | None = None,
+    vehicle: str = "",
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
-    ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly.
+    ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly. ``start`` is the date that
+    its GPS receiver states, and ``vehicle`` the autopilot's number.
     """
     record = flight()
     us = microseconds(record)
@@ -110,11 +114,14 @@ def px4_log(
         fine = picked(record, torque)
         scaled = fractions(record)[fine][:, :3] * np.array([0.5, 0.8, 1.2])
         topics.append(Topic("vehicle_torque_setpoint", us[fine], {"xyz[3]": ("float", scaled)}))
+    if start is not None:
+        utc = {"time_utc_usec": ("uint64_t", np.array([round(start.timestamp() * 1e6)]))}
+        topics.append(Topic("sensor_gps", us[:1], utc))
     parameters = {} if old else _px4_parameters(elevons=elevons)
     kept = [topic for topic in topics if topic.name not in drop]
     release = 0x010B0200 if old else 0x010E0000
     jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
-    write_ulog(path, kept, parameters, release, jumping)
+    write_ulog(path, kept, parameters, release, jumping, vehicle)
     return record
 
 
@@ -145,9 +152,18 @@ def _px4_parameters(*, elevons: bool) -> dict[str, float]:
 
 
 def dataflash_log(
-    path: Path, rates: Rates = FULL_RATES, *, firmware: str = "ArduPlane V4.5.0", flying: int = 1
+    path: Path,
+    rates: Rates = FULL_RATES,
+    *,
+    firmware: str = "ArduPlane V4.5.0",
+    flying: int = 1,
+    start: datetime.datetime | None = None,
+    board: str = "",
 ) -> FlightRecord:
-    """A DataFlash log of the flight, with a second IMU that is wrong and not the primary."""
+    """A DataFlash log of the flight, with a second IMU that is wrong and not the primary.
+
+    ``start`` is the GPS receiver's time at the first message and ``board`` the line with the board's number.
+    """
     record = flight()
     us = microseconds(record).tolist()
     at = {name: picked(record, rate) for name, rate in rates.items()}
@@ -157,7 +173,8 @@ def dataflash_log(
     pulses = pulses_of(fractions(record))
     kelvin = 288.15
     rows = {
-        "MSG": [(us[0], f"{firmware} (abcd)")],
+        "MSG": [(us[0], f"{firmware} (abcd)"), *([(us[0], board)] if board else [])],
+        "GPS": [] if start is None else [(us[0], *_gps_time(start))],
         "PARM": [(us[0], name, value) for name, value in _ardupilot_parameters().items()],
         "STAT": [(us[0], flying, 1)],
         "MODE": [(us[0], 5, 5)],
@@ -175,6 +192,12 @@ def dataflash_log(
     }  # fmt: skip
     write_dataflash(path, rows)
     return record
+
+
+def _gps_time(date: datetime.datetime) -> tuple[int, int]:
+    """Milliseconds of the week, and the week, of GPS time, which is 18 s ahead of UTC."""
+    seconds = (date - datetime.datetime(1980, 1, 6, tzinfo=datetime.UTC)).total_seconds() + 18.0
+    return round(1e3 * (seconds % 604800)), int(seconds // 604800)
 
 
 def pulses_of(commands: np.ndarray) -> np.ndarray:

@@ -23,15 +23,22 @@ class Topic(NamedTuple):
 
 
 def write_ulog(
-    path: Path, topics: list[Topic], parameters: Mapping[str, float], release: int, clock: Clock | None = None
+    path: Path,
+    topics: list[Topic],
+    parameters: Mapping[str, float],
+    release: int,
+    clock: Clock | None = None,
+    vehicle: str = "",
 ) -> None:
-    """A ULog file with all samples in the order of their times, written by pyulog.
+    """A ULog file with all samples in the order of their times, written by pyulog; ``vehicle`` is its unique number.
 
     ``clock`` gives the stamp of a time; with one, the file is not passed through pyulog, which sorts by stamps.
     """
     body = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", int(min(t.us.min() for t in topics))))
     body += _message("B", bytes(40))
     body += _info("char[3] sys_name", b"PX4") + _info("uint32_t ver_sw_release", struct.pack("<I", release))
+    if vehicle:
+        body += _info(f"char[{len(vehicle)}] sys_uuid", vehicle.encode())
     for topic in {t.name: t for t in topics}.values():
         fields = "".join(f"{_declared(name, kind)};" for name, (kind, _) in topic.fields.items())
         body += _message("F", f"{topic.name}:uint64_t timestamp;{fields}".encode())

@@ -9,8 +9,9 @@ import numpy as np
 
 from sysid_node.fleet.results import FlightResult
 from sysid_node.fleet.statistics.drift import Drift
+from sysid_node.fleet.statistics.false_discovery import FALSE_RATE
 from sysid_node.fleet.statistics.series import DAY
-from sysid_node.fleet.statistics.summary import FALSE_RATE, iso_date
+from sysid_node.fleet.statistics.summary import iso_date
 from sysid_node.report.drawing.figures import BLUE, GREY_BAND, INK, VERMILION, Figure, axis, packed
 from sysid_node.report.results.fleet_report import FleetReport
 from sysid_node.report.wording.fleet import drift_words, tail_sentence
@@ -22,12 +23,13 @@ _MOST = 40  # figures; the map marks every drift
 def context(report: FleetReport) -> dict[str, Any]:
     """Sentences by tail, and a figure for each drift."""
     tails = [
-        (tail, tail_sentence(tail, list(found), report.maintenance(tail)))
-        for (_, tail), found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
+        (key[1], tail_sentence(report.tail_name(*key), list(found), report.maintenance(*key)))
+        for key, found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
     ]
     flights = {flight.flight: flight for flight in report.results.flights}
     figures = [
-        (symbol(d.name), f"{d.tail}: {drift_words(d)}", figure(report, d, flights)) for d in report.drifts[:_MOST]
+        (symbol(d.name), f"{report.tail_name(d.aircraft, d.tail)}: {drift_words(d)}", figure(report, d, flights))
+        for d in report.drifts[:_MOST]
     ]
     return {
         "tails": tails,
@@ -59,11 +61,14 @@ def figure(report: FleetReport, drift: Drift, flights: dict[str, FlightResult]) 
         "name": "fitted", "line": {"color": VERMILION, "width": 1.6, "shape": shape},
         "hoverinfo": "skip",
     }  # fmt: skip
-    shapes = [_vertical(iso_date(note.date.timestamp() / DAY)) for note in report.maintenance(drift.tail)]
+    shapes = [
+        _vertical(iso_date(note.date.timestamp() / DAY)) for note in report.maintenance(drift.aircraft, drift.tail)
+    ]
     if drift.kind == "step":
         shapes.append(_between(iso_date(drift.first), iso_date(drift.last)))
     layout = {"xaxis": axis("date", type="date"), "yaxis": axis(drift.name), "shapes": shapes, "hovermode": "closest"}
-    return Figure(f"{drift.name} of tail {drift.tail} over dates", [points, course], layout, height=240)
+    tail = report.tail_name(drift.aircraft, drift.tail)
+    return Figure(f"{drift.name} of tail {tail} over dates", [points, course], layout, height=240)
 
 
 def _vertical(date: str) -> dict[str, Any]:

@@ -24,7 +24,7 @@ def flights(report: FleetReport) -> dict[str, Any]:
     for flight in report.results.flights:
         of_tail.setdefault((flight.tail, flight.aircraft), []).append(_row(flight, owed.get(flight.flight, [])))
     tails = [
-        (tail, aircraft, plural(len(rows), "flight"), rows, report.maintenance(tail))
+        (tail, aircraft, plural(len(rows), "flight"), rows, report.maintenance(aircraft, tail))
         for (tail, aircraft), rows in of_tail.items()
     ]
     return {"tails": tails}

@@ -19,8 +19,8 @@ def opening(report: FleetReport) -> dict[str, Any]:
     summary = report.summary
     tails = sum(len(names) for names in summary.tails.values())
     drifting = [
-        tail_sentence(tail, list(found), report.maintenance(tail))
-        for (_, tail), found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
+        tail_sentence(report.tail_name(*key), list(found), report.maintenance(*key))
+        for key, found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
     ]
     causes = [f"{c.label} ({c.aircraft}): {account_words(c)}" for c in summary.causes if c.account != "flight"]
     facts = [
@@ -44,7 +44,8 @@ def _odd(report: FleetReport, k: int) -> str:
     mean = report.summary.populations[found.aircraft, found.name].fit.mean
     share = f"{number(100 * abs(found.distance / mean), 2)}\u202f%" if mean else number(abs(found.distance), 2)
     weaker = "weaker" if found.distance * mean < 0 else "stronger"
-    return f"{found.tail}: {short_meaning(found.name)} is {share} {weaker} than that of the other tails."
+    tail = report.tail_name(found.aircraft, found.tail)
+    return f"{tail}: {short_meaning(found.name)} is {share} {weaker} than that of the other tails."
 
 
 def _shortened(sentences: list[str]) -> list[str]:
