@@ -2,7 +2,7 @@
 
     python -m bench.fleet.diagnosed fly out/diagnosed/1 --seed 1
     sysid fleet out/diagnosed/1/catalogue.csv --gap --out out/diagnosed/1/fleet
-    python -m bench.fleet.diagnosed judge out/diagnosed/1 [more folders] [--page docs/results/fleet.md]
+    python -m bench.fleet.diagnosed judge out/diagnosed/1 [more folders]
 
 Three tails of the file kestrel, four flights each over a year, in still air or light turbulence. Tails differ from the
 file by 4 % (1 sigma) in all derivatives. All have one effect that the file lacks, drawn from `SHARED`; its size is
