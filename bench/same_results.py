@@ -1,8 +1,8 @@
 """Whether two versions of the package say the same of the same flights.
 
-    python bench/same_results.py inputs FLIGHTS                     # make the flights, once
-    python bench/same_results.py record FLIGHTS OUT [--tree DIR]    # run every case with the package in DIR
-    python bench/same_results.py compare BEFORE AFTER               # hold two such records against each other
+    python -m bench.same_results inputs FLIGHTS                     # make the flights, once
+    python -m bench.same_results record FLIGHTS OUT [--tree DIR]    # run every case with the package in DIR
+    python -m bench.same_results compare BEFORE AFTER               # hold two such records against each other
 
 A case is one command of ``sysid`` on bundled, simulated or real flights. Every number in its JSON files and its tables
 is compared to 1e-9 of its size, every word exactly. Real flights are left out, with a line that says so, where their
@@ -122,8 +122,7 @@ def _without_vanes(bag: Path, log: Path) -> None:
 
 def _real(flights: Path, folder: Path) -> None:
     """The records that ``gap_real_flights.py`` diagnoses, and what it believes of their aircraft."""
-    import gap_real_flights as real  # noqa: PLC0415
-
+    from bench.gap import real_flights as real  # noqa: PLC0415
     from sysid_node.aircraft.dump import dump_aircraft  # noqa: PLC0415
     from sysid_node.flight.csv import read_csv, write_csv  # noqa: PLC0415
 

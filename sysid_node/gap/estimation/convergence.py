@@ -16,6 +16,10 @@ _ROUNDS = 8
 #: Change of the deviance from one round to the next below which the fit counts as converged.
 _CONVERGED = 0.3
 
+#: Change of the deviance below which the point has hardly moved, so that the next round takes the slopes of the
+#: round before. Slopes change by a small share of the step then, and the fit by less than that share of the step.
+_NEAR = 10.0
+
 #: Evaluations of the small nonlinear problem in each round.
 _EVALUATIONS = 12
 
@@ -27,8 +31,10 @@ def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
     returned. Raises LinAlgError where the prediction diverges.
     """
     best, least, last = fit, np.inf, np.inf
+    near: VariableProjection | None = None
     for _ in range(rounds):
-        fit = _one_round(fit)
+        problem = VariableProjection(fit, near)
+        fit = _one_round(problem)
         residuals = [flight.residual for flight in fit.flights]
         fit = fit.with_powers([residual_power(m, r) for m, r in zip(fit.models, residuals, strict=True)])
         raw = ((np.abs(residual) ** 2).mean(axis=0) for residual in residuals)
@@ -38,21 +44,21 @@ def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
             best, least = fit, deviance
         if not abs(deviance - last) >= _CONVERGED:
             break
+        near = problem if abs(deviance - last) < _NEAR else None
         last = deviance
     return linearised(best)
 
 
-def _one_round(fit: CandidateFit) -> CandidateFit:
+def _one_round(problem: VariableProjection) -> CandidateFit:
     """The fit with the candidates' parameters and the nuisance parameters at their best for the weights it has."""
-    problem = VariableProjection(fit)
-    values = fit.values
+    fit, values = problem.fit, problem.fit.values
     if values.size:
         low, high = bounds(fit.simulator, fit.indices)
         start = np.clip(problem.joint_start(values, low, high), low + 1e-9, high - 1e-9)
         if not np.isfinite(problem.residual_and_slopes(start)).all():
             raise np.linalg.LinAlgError("the prediction diverges")
         solution = least_squares(
-            problem.residual_and_slopes, start, problem.jacobian, bounds=(low, high),
+            problem.residual, start, problem.jacobian, bounds=(low, high),
             x_scale=fit.simulator.scales[list(fit.indices)], max_nfev=_EVALUATIONS, ftol=1e-4, xtol=1e-4, gtol=1e-6,
         )  # fmt: skip
         values = solution.x

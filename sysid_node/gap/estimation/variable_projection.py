@@ -16,10 +16,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.bounded_least_squares import bounded_least_squares
-from sysid_node.gap.estimation.candidate_fit import CandidateFit
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.spectral_weights import amplitudes, real_rows, spectral_deviance
 from sysid_node.gap.residuals.parameter_priors import prior
+from sysid_node.gap.residuals.windowed_spectra import Complex
 
 #: Weighted residual beyond which a prediction counts as divergent.
 _DIVERGENT = 1e100
@@ -37,15 +38,22 @@ class VariableProjection:
     Nuisance parameters that would go beyond their limits are put there and stay: an active set, found anew for each
     linearisation. They are counted in units of their prior standard deviations. Their priors are then a unit matrix, so
     that the normal equations are well conditioned even where the flight says little about some of them.
+
+    ``near`` is the problem of the same fit at a point nearby, whose slopes are taken instead of new ones.
     """
 
-    def __init__(self, fit: CandidateFit) -> None:
-        self.fit = fit
+    def __init__(self, fit: CandidateFit, near: VariableProjection | None = None) -> None:
+        self.fit, self._held = fit, near is not None
+        self._own_slopes: list[Complex] = []  # (W, L, 12, K) by flight where the fit stands, once needed
+        self._known: list[Complex] = []  # (W, L, 12, k) by flight, of the first k values, where others are added
+        self._value_slopes: list[Complex] = near._value_slopes if near else []  # (W, L, 12, K) by flight, the last ones
+        self.slopes: list[Complex] = (  # (W, L, 12, K) by flight, by the nuisance parameters
+            near.slopes if near else [f.model.slopes(f.point, list(f.nuisances.indices)) for f in fit.flights]
+        )
         blocks = []
-        for number, flight in enumerate(fit.flights):
-            indices = list(flight.nuisances.indices)
-            slopes = real_rows(flight.model.slopes(flight.point, indices), flight.weights)
-            blocks.append(flight.nuisances.among_all(slopes.reshape(-1, len(indices)), number, len(fit.flights)))
+        for number, (flight, by_nuisance) in enumerate(zip(fit.flights, self.slopes, strict=True)):
+            columns = real_rows(by_nuisance, flight.weights).reshape(-1, len(flight.nuisances.indices))
+            blocks.append(flight.nuisances.among_all(columns, number, len(fit.flights)))
         self.now, self.spread, self.limit = fit.stacked
         self.matrix = np.vstack([*(block * self.spread for block in blocks), np.eye(self.now.size)])
         self.gram = self.matrix.T @ self.matrix
@@ -119,8 +127,13 @@ class VariableProjection:
         return bool((pull[~self.free] >= 0.0).all() and (np.abs(moved) <= self.limit * (1.0 + _AT_LIMIT)).all())
 
     def with_candidate(self, candidate: Candidate) -> VariableProjection:
-        """The same problem with one candidate more, without the nuisance parameters that it is or replaces."""
+        """The same problem with one candidate more, without the nuisance parameters that it is or replaces.
+
+        The slopes by the values that it has already are those of the fit, wherever the candidate stands.
+        """
         other, simulator, nuisances = copy(self), self.fit.simulator, self.fit.nuisances
+        self._own_slopes = self._own_slopes or self._slopes_by_value(self.fit.values)
+        other._held, other._known, other._value_slopes = False, self._own_slopes, []
         other.indices = [*self.fit.indices, *candidate.indices]
         other.centre, other.sigma = prior(simulator, other.indices)
         kept = nuisances.without(frozenset({candidate.effect}), simulator.names).indices
@@ -140,9 +153,7 @@ class VariableProjection:
         """Weighted residuals of all flights at these values, nuisances where they are, then the nuisances' priors."""
         rows = []
         for flight in self.fit.flights:
-            point = flight.point.copy()
-            point[self.indices] = values
-            rows.append(real_rows(flight.model.residual(point), flight.weights).ravel())
+            rows.append(real_rows(flight.model.residual(self._point(flight, values)), flight.weights).ravel())
         return np.concatenate([*rows, -self.now / self.spread]) - self.shifted_rows
 
     def residual(self, values: Array) -> Array:
@@ -166,13 +177,23 @@ class VariableProjection:
 
     def _columns(self, values: Array) -> Array:
         """Weighted slopes (R, K) of what is predicted with respect to the values, nuisance parameters held."""
-        blocks = []
-        for flight in self.fit.flights:
-            point = flight.point.copy()
-            point[self.indices] = values
-            slopes = real_rows(flight.model.slopes(point, self.indices), flight.weights)
-            blocks.append(slopes.reshape(-1, values.size))
+        if not (self._held and self._value_slopes):
+            self._value_slopes = self._slopes_by_value(values)
+        pairs = zip(self._value_slopes, self.fit.flights, strict=True)
+        blocks = [real_rows(slopes, flight.weights).reshape(-1, values.size) for slopes, flight in pairs]
         return np.vstack([*blocks, np.zeros((self.now.size, values.size))])
+
+    def _slopes_by_value(self, values: Array) -> list[Complex]:
+        """Slopes (W, L, 12, K) by flight with respect to the values, where these stand at ``values`` (K,)."""
+        known = self._known or [np.empty((*f.model.measured.shape, 0), complex) for f in self.fit.flights]
+        new, pairs = self.indices[known[0].shape[3] :], zip(self.fit.flights, known, strict=True)
+        return [np.concatenate([k, f.model.slopes(self._point(f, values), new)], axis=3) for f, k in pairs]
+
+    def _point(self, flight: FlightFit, values: Array) -> Array:
+        """All parameters (P,) of a flight at these values (K,), nuisance parameters where they are."""
+        point = flight.point.copy()
+        point[self.indices] = values
+        return point
 
     def deviance(self, rows: Array) -> float:
         """Minus twice the log posterior density of a ``residual`` (R,), up to a constant, the spectrum profiled out.
@@ -197,8 +218,7 @@ class VariableProjection:
         moved = np.clip(self.now + self._nuisance_step(values), -self.limit, self.limit)
         points = []
         for number, flight in enumerate(self.fit.flights):
-            point = flight.point.copy()
-            point[self.indices] = values
+            point = self._point(flight, values)
             indices = list(flight.nuisances.indices)
             point[indices] = self.fit.simulator.neutral()[indices] + moved[flight.nuisances.places(number)]
             points.append(point)
