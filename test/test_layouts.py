@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.flight.bag.message_types import type_store
 
 LAYOUTS = Path(__file__).parents[1] / "config" / "layouts"
@@ -40,6 +41,22 @@ def strings(value: Any) -> Iterator[str]:
         yield value
 
 
+#: A message path as docs.foxglove.dev describes it: fields, indices, slices and filters.
+PATH = re.compile(r'/\w+(/\w+)*(\.\w+(\[(-?\d+|\d*:\d*)\])?(\{\w+==("[^"]*"|-?\d+)\})?)*')
+#: What a panel keeps, as Lichtblick, the open branch of Foxglove, declares it (PlotConfig, RawMessagesPanelConfig,
+#: DiagnosticSummaryConfig); the two programs have a key of their own for a panel's title.
+KEPT = {
+    "Plot": {
+        "foxglovePanelTitle", "lichtblickPanelTitle", "paths", "showLegend", "legendDisplay", "showPlotValuesInLegend",
+        "showXAxisLabels", "showYAxisLabels", "isSynced", "xAxisVal", "sidebarDimension",
+    },
+    "RawMessages": {
+        "diffEnabled", "diffMethod", "diffTopicPath", "expansion", "showFullMessageForDiff", "topicPath",
+    },
+    "DiagnosticSummary": {"minLevel", "pinnedIds", "topicToRender", "hardwareIdFilter", "sortByLevel"},
+}  # fmt: skip
+
+
 def topic_of(path: str) -> str:
     """The longest known topic with which a path begins."""
     found = [t for t in TOPICS if path == t or path.startswith((t + ".", t + "/"))]
@@ -64,12 +81,41 @@ def test_foxglove_paths_exist(layout: Path) -> None:
     paths = list(strings(content["configById"]))
     assert len(paths) > 10
     for path in paths:
+        assert PATH.fullmatch(path), path
         topic = topic_of(path)
         wanted = re.findall(r'name=="(\w+)"', path)
         assert set(wanted) <= set(load_aircraft("cdrw").derivatives)
         plain = re.sub(r"\[[^\]]*\]|\{[^}]*\}", "", path[len(topic) :])
         require_fields(TOPICS[topic], [name for name in plain.split(".") if name])
     assert set(re.findall(r'"(\w+!\w+)"', json.dumps(content["layout"]))) == set(content["configById"])
+
+
+@pytest.mark.parametrize("layout", sorted(LAYOUTS.glob("foxglove_*.json")), ids=lambda path: path.stem)
+def test_foxglove_panels_have_the_keys_that_are_read(layout: Path) -> None:
+    """Every curve has a name and a colour, and those of the gap are the coefficients in the message's order."""
+    for name, panel in json.loads(layout.read_text())["configById"].items():
+        kind = name.partition("!")[0]
+        assert set(panel) == KEPT[kind], name
+        if kind != "Plot":
+            continue
+        assert panel["foxglovePanelTitle"] == panel["lichtblickPanelTitle"] != ""
+        labels = [path["label"] for path in panel["paths"]]
+        assert len(set(labels)) == len(labels)
+        assert all(re.fullmatch("#[0-9a-f]{6}", path["color"]) for path in panel["paths"])
+        if "model_gap" in panel["paths"][0]["value"]:
+            assert labels == list(COEFFICIENTS)
+
+
+@pytest.mark.parametrize("layout", sorted(LAYOUTS.glob("plotjuggler_*.xml")), ids=lambda path: path.stem)
+def test_plotjuggler_splitters_are_as_it_restores_them(layout: Path) -> None:
+    """PlotJuggler 3 divides a splitter into ``count`` parts, with a share of ``sizes`` for each."""
+    tabs = ET.parse(layout).getroot().find("tabbed_widget[@parent='main_window']")
+    assert tabs is not None
+    for splitter in tabs.iter("DockSplitter"):
+        assert splitter.attrib["orientation"] in "|-"
+        assert int(splitter.attrib["count"]) == len(splitter) == len(splitter.attrib["sizes"].split(";"))
+        assert {part.tag for part in splitter} <= {"DockArea", "DockSplitter"}
+    assert all(len(tab.findall("Container/DockSplitter")) == 1 for tab in tabs.findall("Tab"))
 
 
 @pytest.mark.parametrize("layout", sorted(LAYOUTS.glob("plotjuggler_*.xml")), ids=lambda path: path.stem)
