@@ -2,6 +2,8 @@
 
 import ctypes
 import gc
+import html
+import json
 import os
 import re
 import shutil
@@ -66,6 +68,35 @@ def browse(tmp_path) -> Callable[[Path], Page]:
         )
 
     return page
+
+
+#: Widths of a phone, a tablet or half a window, and a desk's screen, in CSS pixels.
+WIDTHS = (360, 768, 1280)
+
+
+@pytest.fixture
+def looked_at(tmp_path) -> Callable[..., list[dict]]:
+    """Opens reports in frames of every width of ``WIDTHS``, ``dark`` or light, and says what is seen in each."""
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("no Chromium or Chrome found")
+
+    def look(*paths: Path, dark: bool = False) -> list[dict]:
+        reports = json.dumps([[path.parent.name, path.read_text(encoding="utf-8")] for path in paths])
+        given = "const reports = {}, widths = {};".format(reports.replace("</", r"<\/"), json.dumps(WIDTHS))
+        host = tmp_path / "host.html"
+        frames = (ROOT / "test" / "report" / "frames.html").read_text(encoding="utf-8")
+        host.write_text(frames.replace("// given", given), encoding="utf-8")
+        scheme = [f"--blink-settings=preferredColorScheme={0 if dark else 1}"]
+        command = [chromium, *_BROWSER_FLAGS, *scheme, "--window-size=1400,900", f"--user-data-dir={tmp_path / 'look'}"]
+        done = subprocess.run(
+            [*command, "--dump-dom", host.as_uri()], capture_output=True, text=True, timeout=300, check=True
+        )
+        found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
+        assert found, done.stderr[-2000:]
+        return list(json.loads(html.unescape(found[1])))
+
+    return look
 
 
 #: Memory of a test worker from which freed memory is given back, and from which compiled programs are let go, MB. The

@@ -66,7 +66,12 @@ def figure(report: FleetReport, drift: Drift, flights: dict[str, FlightResult]) 
     ]
     if drift.kind == "step":
         shapes.append(_between(iso_date(drift.first), iso_date(drift.last)))
-    layout = {"xaxis": axis("date", type="date"), "yaxis": axis(drift.name), "shapes": shapes, "hovermode": "closest"}
+    layout = {
+        "xaxis": axis("date", type="date", nticks=4),
+        "yaxis": axis(drift.name),
+        "shapes": shapes,
+        "hovermode": "closest",
+    }
     tail = report.tail_name(drift.aircraft, drift.tail)
     return Figure(f"{drift.name} of tail {tail} over dates", [points, course], layout, height=240)
 

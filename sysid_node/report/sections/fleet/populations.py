@@ -124,7 +124,7 @@ def over_dates(report: FleetReport, population: Population) -> Figure:
         rows = np.flatnonzero(series.tail == place)
         traces.append(_points([days[row] for row in rows], values[rows], tail, colour, line=True))
     layout = {
-        "xaxis": axis("date", type="date"), "yaxis": axis(series.name), "hovermode": "closest",
+        "xaxis": axis("date", type="date", nticks=4), "yaxis": axis(series.name), "hovermode": "closest",
         "showlegend": bool(marked),
     }  # fmt: skip
     return Figure(f"{series.name} of {series.aircraft} over the dates of the flights", traces, layout, height=260)
