@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -28,6 +29,41 @@ _BROWSER_FLAGS = (
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
     *("--enable-logging=stderr", "--virtual-time-budget=20000", "--host-resolver-rules=MAP * ~NOTFOUND"),
 )
+
+
+#: Folders whose tests share compiled programs and costly fixtures. One worker runs all of a folder, so that nothing is
+#: compiled or flown twice; the tests of other folders are distributed by file.
+_TOGETHER = ("test/gap/", "test/batch/", "test/sim/")
+
+#: What takes longest. It begins first, so that no worker ends long after the other.
+_FIRST = (
+    *("test/gap/", "test/docs/test_snippets.py", "test/batch/", "test/sim/", "test/ros/test_closed_loop.py"),
+    *("test/cli/test_loop.py", "test/cli/test_demo.py", "test/ros/", "test/cli/", "test/fleet/", "test/bench/"),
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes longest first; the order is otherwise kept."""
+
+    def rank(item: pytest.Item) -> int:
+        return next((k for k, begin in enumerate(_FIRST) if item.nodeid.startswith(begin)), len(_FIRST))
+
+    items.sort(key=rank)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """The distribution of ``--dist loadfile``, with whole folders in one worker."""
+    from xdist.scheduler import LoadFileScheduling  # noqa: PLC0415
+
+    class ByFolderOrFile(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return next(filter(nodeid.startswith, _TOGETHER), super()._split_scope(nodeid))
+
+    if config.getoption("dist") != "loadfile":
+        return None
+    config.option.loadscopereorder = False  # by number of tests
+    return ByFolderOrFile(config, log)
 
 
 @pytest.fixture(scope="session")
