@@ -22,6 +22,12 @@ from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, find_trim
 
 _AXES = {"Cl": ("ROLL", "bw-ft"), "Cm": ("PITCH", "cbarw-ft"), "Cn": ("YAW", "bw-ft")}
+#: Of a model in body axes: the axes of a coefficient, each with a sign and the function of alpha that turns it.
+_BODY = {
+    "CL": (("X", 1.0, "sin"), ("Z", -1.0, "cos")),
+    "CD": (("X", -1.0, "cos"), ("Z", -1.0, "sin")),
+    "CY": (("Y", 1.0, ""),),
+}
 _STATES = {
     "alpha": ("aero/alpha-rad",),
     "beta": ("aero/beta-rad",),
@@ -54,6 +60,16 @@ def edited(survey: ModelSurvey, folder: Path, withheld: Withheld) -> ModelFiles:
     return files
 
 
+def _without_lags(files: ModelFiles, controls: Sequence[str]) -> None:
+    """Takes the lags of servos out of a model: all that moves such a control follows its command outside JSBSim."""
+    tree = ElementTree.parse(files.main)
+    for actuator in tree.iter("actuator"):
+        if any(control in actuator.get("name", "") for control in controls):
+            for lag in actuator.findall("lag"):
+                actuator.remove(lag)
+    tree.write(files.main)
+
+
 def _coefficient(root: Element, name: str, value: float) -> None:
     coefficient, _, state = name.partition("_")
     aerodynamics = root.find("aerodynamics")
@@ -65,9 +81,8 @@ def _coefficient(root: Element, name: str, value: float) -> None:
         axis = {"CL": "LIFT", "CD": "DRAG", "CY": "SIDE"}[coefficient]
         _term(_axis(aerodynamics, axis), name, list(_STATES[state]), value)
     else:
-        assert coefficient == "CD"
-        for axis, turn in (("X", "cos"), ("Z", "sin")):
-            _term(_axis(aerodynamics, axis), f"{name}-{axis}", list(_STATES[state]), -value, turn)
+        for axis, sign, turn in _BODY[coefficient]:
+            _term(_axis(aerodynamics, axis), f"{name}-{axis}", list(_STATES[state]), sign * value, turn)
 
 
 def _axis(aerodynamics: Element, name: str) -> Element:
@@ -145,7 +160,9 @@ class Reality:
         self._survey, self._withheld, self._rate = survey, withheld, rate
         self.controls = tuple(aircraft.controls)
         with tempfile.TemporaryDirectory() as place:
-            self._program = Program(edited(survey, Path(place), withheld), rate)
+            files = edited(survey, Path(place), withheld)
+            _without_lags(files, [name for name in self.controls if withheld.servo(name)])
+            self._program = Program(files, rate)
         self._trimmed = self._trim()
         throttle = aircraft.throttle
         self._full = (throttle.max_thrust or 1.0) if throttle else 1.0
@@ -174,11 +191,18 @@ class Reality:
     def start(self) -> Instant:
         """Back to the trim; the motion there."""
         step = 1.0 / self._rate
-        self._servos = {n: Servo(self._withheld.servo(n), self.trim[n], step) for n in self.controls}
+        self._servos = {n: Servo(self._servo(n), self.trim[n], step) for n in self.controls}
         self._program.put(self._trimmed.state, self._properties(self.trim, self._trimmed.state.throttle))
         self._program.step(round(2.0 * self._rate))
         self.cg = self._moved()
         return self.instant()
+
+    def _servo(self, control: str) -> dict[str, float]:
+        """What moves a control between its command and JSBSim: nothing where nothing of it is withheld."""
+        withheld = dict(self._withheld.servo(control))
+        if withheld:
+            withheld["actuator_lag"] = withheld.get("actuator_lag", 0.0) + self._survey.servos[control].lag
+        return withheld
 
     def _properties(self, deflections: Mapping[str, float], throttle: float) -> dict[str, float]:
         found = {}
