@@ -169,8 +169,9 @@ def _notes(
     if program.powered:
         notes.append(
             f"Thrust changes by {model.thrust / steady.state.throttle:.0f} N per unit of throttle at throttle "
-            f"{steady.state.throttle:.2f} and {steady.state.airspeed:.1f} m/s, with a lag of {model.motor_lag:.2f} s; "
-            "what it is beyond that, and how it changes with airspeed, is in the drag and its table over V."
+            f"{steady.state.throttle:.2f} and {steady.state.airspeed:.1f} m/s"
+            + (f", with a lag of {model.motor_lag:.2f} s" if model.motor_lag else "")
+            + "; what it is beyond that, and how it changes with airspeed, is in the drag and its table over V."
         )
     notes.append(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."
