@@ -55,6 +55,23 @@ def thor(folder: Path) -> Aircraft:
     return _aircraft(folder, "thor", ReferenceCondition(17.0, 1.2), list(CONTROLS), beliefs, Throttle("throttle"))
 
 
+def cessna_longitudinal(folder: Path) -> Aircraft:
+    """Sizes as the records have them; the true model is not published."""
+    beliefs = _of("CL", {"0": 0.3, "alpha": 5.0, "q": 5.0, "de": 0.4}) | _of("CD", {"0": 0.03, "alpha": 0.3})
+    beliefs |= _of("Cm", {"0": 0.02, "alpha": -0.8, "q": -19.0, "de": -1.4})
+    return _aircraft(folder, "cessna", ReferenceCondition(80.0, 1.112), ["elevator"], beliefs, Throttle("throttle"))
+
+
+def cessna_lateral(folder: Path, moved: Sequence[str] = ("aileron", "rudder")) -> Aircraft:
+    """Sizes as the records have them; the true model is not published. Only the controls that were moved."""
+    beliefs = _of("CY", {"0": 0.02, "beta": -0.8, "p": 0.02, "r": 0.3, "da": 0.02, "dr": 0.2})
+    beliefs |= _of("Cl", {"0": 0.02, "beta": -0.1, "p": -0.45, "r": 0.2, "da": -0.19, "dr": 0.03})
+    beliefs |= _of("Cn", {"0": 0.02, "beta": 0.14, "p": -0.05, "r": -0.3, "da": -0.01, "dr": -0.1})
+    rested = [CONTROLS[name] for name in ("aileron", "rudder") if name not in moved]
+    kept = {name: d for name, d in beliefs.items() if name.partition("_")[2] not in rested}
+    return _aircraft(folder, "cessna", ReferenceCondition(80.0, 1.112), moved, kept)
+
+
 def _of(coefficient: str, values: Mapping[str, float]) -> dict[str, Derivative]:
     return {f"{coefficient}_{regressor}": Derivative(value) for regressor, value in values.items()}
 

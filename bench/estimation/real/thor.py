@@ -9,15 +9,19 @@ from scipy.signal import butter, filtfilt
 
 from bench.estimation.real import aircraft
 from bench.estimation.real.hfb320 import moved
-from bench.estimation.real.replaying import replay, replays
+from bench.estimation.real.ordinary import estimated, ordinary
+from bench.estimation.real.replaying import Found, replay, replays
 from bench.estimation.real.showing import show
 from bench.pages import table
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.record import FlightRecord
+from sysid_node.online.types import DerivativeEstimate
+from sysid_node.report.wording.sources import source_words
 
 PAIRS = (("da", "p"), ("de", "q"), ("dr", "r"))  # a command, and the rate that it turns
 LAG = 0.05  # s by which the commands are ahead of the surfaces, as the correlations have it
 BAND = (0.5, 5.0)  # Hz, in which command and response are compared
+SERVO = 0.04  # s: how late the responses are known to be
 REACH = 0.3  # s of delay that are tried, both ways
 
 
@@ -57,3 +61,29 @@ def section(folder: Path) -> str:
         for c in known.model_structure
     ]
     return f"{delays}\n\n{table(('', *(head for column in columns for head in (column, 'status'))), rows)}"
+
+
+def ordinary_section(folder: Path) -> str:
+    """Of the page: from commands, by an aircraft file with tolerances that says nothing of the servos."""
+    flight, known = flown(folder), aircraft.thor(folder)
+    silent = estimated(flight, ordinary(known), "commands")
+    stated = estimated(flight, ordinary(known, dict.fromkeys(known.controls, SERVO)), "commands")
+    rows = []
+    for name, published in known.derivatives.items():
+        cells = [text for k in (silent, stated) for text in _cells(k.estimates.derivatives[name])]
+        shares = silent.estimates.budget.get(name, {})
+        largest = ", ".join(f"{source_words(key)[0]} {100 * x:.0f} %" for key, x in list(shares.items())[:1])
+        rows.append(
+            [name, f"{published.value:.4g}", *cells, largest if silent.estimates.derivatives[name].valid else ""]
+        )
+    heads = ("", "published", "file silent", "status", f"file: servos {1e3 * SERVO:.0f} ms", "status")
+    times = [
+        [name, *(f"{1e3 * s.value:.0f} ± {1e3 * s.standard_error:.0f}" for s in (silent.estimates.servos[name], late))]
+        for name, late in stated.estimates.servos.items()
+    ]
+    servos = table(("servo, ms", "file silent", f"file: {1e3 * SERVO:.0f} ms"), times)
+    return f"{servos}\n\n{table((*heads, 'largest in the budget, file silent'), rows)}"
+
+
+def _cells(d: DerivativeEstimate) -> list[str]:
+    return [show(Found(d.value, d.standard_error, d.status)), d.status]
