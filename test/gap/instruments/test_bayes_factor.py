@@ -17,7 +17,7 @@ def tried(aircraft, make_flight):
     """Nuisances alone and with a candidate, fitted to a flight in moderate turbulence."""
 
     def fits(effects, label):
-        flight = make_flight(effects, seed=9, turbulence="moderate", duration=40.0)
+        flight = make_flight(effects, seed=9, turbulence="moderate", duration=29.0)
         model = residual_model_of(Simulator(aircraft, 50.0), flight)
         nuisances = nuisances_of(aircraft, model)
         fitter = CandidateFitter(nuisances, Checkpoint())

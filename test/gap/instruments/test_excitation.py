@@ -19,7 +19,7 @@ def seen(aircraft, make_flight):
     """A flight of some manoeuvre in light turbulence, derivatives off."""
     simulator, wrong = Simulator(aircraft, 50.0), {"derivative_error": {"Cm_alpha": 0.015, "Cl_p": 0.03}}
     return lambda manoeuvre: residual_model_of(
-        simulator, make_flight(wrong, seed=5, turbulence="light", manoeuvre=manoeuvre, duration=40.0)
+        simulator, make_flight(wrong, seed=5, turbulence="light", manoeuvre=manoeuvre, duration=29.0)
     )
 
 

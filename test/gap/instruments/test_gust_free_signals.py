@@ -52,7 +52,7 @@ def test_a_servos_response_is_explained_by_lags(plain_model: ResidualModel) -> N
 def test_without_external_excitation_there_are_none(aircraft, make_flight) -> None:
     """In light turbulence an autopilot alone moves the surfaces."""
     wrong = {"derivative_error": {"Cm_alpha": 0.015, "Cl_p": 0.03}}
-    flight = make_flight(wrong, seed=5, turbulence="light", manoeuvre=[], duration=40.0)
+    flight = make_flight(wrong, seed=5, turbulence="light", manoeuvre=[], duration=29.0)
     model = residual_model_of(Simulator(aircraft, 50.0), flight)
     for by in EVERY:
         assert [table.size for table in by(model)] == [0, 0]

@@ -85,7 +85,7 @@ def test_gusts_that_pass_for_derivatives_make_no_structure_of_sharp_steps() -> N
     aircraft, steps = load_aircraft("kestrel"), (("elevator", 0.05, 1.0), ("aileron", 0.06, 3.8), ("rudder", 0.11, 6.0))
     doublets = [f"doublet:{name}:amplitude={size}:width=0.4:start={at}:every=8:repeat=5" for name, size, at in steps]
     flight = fly(aircraft, {}, seed=4, turbulence="light", manoeuvre=doublets, duration=44.0)
-    model = residual_model_of(Simulator(aircraft, 50.0), flight)
+    model = residual_model_of(Simulator(aircraft, 25.0), flight)
     fit = converged(unfitted([model], nuisances_of(aircraft, model)))
     roll = COEFFICIENTS.index("Cl")
     assert overidentification_of(fit, by=gust_free_instruments).deviations[roll] > THRESHOLDS.instruments.chance
