@@ -29,7 +29,7 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.streams import Streams
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.sim import Simulator

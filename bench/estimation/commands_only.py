@@ -25,7 +25,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.streams import Streams
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import DerivativeEstimate, Estimates

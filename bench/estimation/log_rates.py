@@ -29,7 +29,7 @@ from sysid_node.flight.logs.log_streams import flight_of_log
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import COMMANDS, Stamps, Streams, in_order_of_logging
 from sysid_node.flight.truth import read_truth
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates

@@ -29,7 +29,7 @@ from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.recorded_flight import Episode, RecordedEstimates, judge
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import SLOWER
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden

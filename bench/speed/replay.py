@@ -27,7 +27,7 @@ from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.report.files.estimates_bag import write_estimates
 

@@ -25,7 +25,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online import estimator
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.validity import judge

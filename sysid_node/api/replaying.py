@@ -1,8 +1,10 @@
-"""A flight identified as the live node does: the same functions, message for message."""
+"""A flight identified as the live node does: the same functions, message for message, in a memory that is bounded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,50 +16,62 @@ from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
 from sysid_node.errors import InputError
 from sysid_node.faults.model.reference_model import identifier_estimates
-from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, judge
+from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, RecordedMonitor
 from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
-from sysid_node.flight.align import counts_by_reason, why_nothing_aligned
+from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
-from sysid_node.flight.logs.opening import carried_by, open_streams, recorded_commands
-from sysid_node.flight.record import FlightRecord
-from sysid_node.flight.streams import Stamps, Streams
+from sysid_node.flight.logs.opening import carried_by
+from sysid_node.flight.pieces import FlightPiece, FlightPieces, flight_pieces
+from sysid_node.flight.record import Array
+from sysid_node.flight.streams import ImuStream, Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
-from sysid_node.online.alignment import flow_angle_filter
-from sysid_node.online.alignment.schedule import due_times
-from sysid_node.online.alignment.whole_record import AlignedSamples, align_streams
+from sysid_node.online import estimator
+from sysid_node.online.alignment import flow_angle_filter, schedule
+from sysid_node.online.alignment.in_pieces import AlignedSamples, PieceAlignment
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
-from sysid_node.online.replay import run_to_end
+from sysid_node.online.estimates.log import EstimatesLog
+from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.estimates_bag import write_estimates
 from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import REPORT, write_run
 from sysid_node.report.results.from_replay import replay_result
+from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import RunResult
 
 PUBLISH_RATE = 20.0  # Hz, the node's default
 ESTIMATES_BAG = "estimates"
 TABLE_ROWS = 600  # times at which the tables and the report show estimates; the bag holds all
+REPORT_EVERY = 512  # samples between reports of progress
 
-#: Share of a replay's time at which the search for faults begins, for the progress bar.
-_FAULTS_FROM = 0.7
+WAITING = 20_000  # IMU messages that may wait for their neighbours in other topics
+
+#: Parts of the work on a piece: the shares of time at which they begin and end, and what is done.
+_IDENTIFYING, _FAULTS = (0.0, 0.7, "identifying"), (0.7, 1.0, "looking for faults")
 
 Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, repr=False)
 class Replay(EstimatedRun):
-    """What a bag gave: aligned samples, and the estimates as the live node would have published them."""
+    """What a bag gave: the estimates as the live node would have published them.
+
+    ``history`` lies on the disk and is read where it is looked at; of its estimates ``final`` alone has a budget.
+    """
 
     aircraft: Aircraft
     settings: OnlineSettings
     publish_rate: float  # Hz
-    aligned: AlignedSamples
+    samples: RecordedSamples
+    flow: flow_angle_filter.FlowAngleFilter
+    commands_from: float  # s, time of the first sample whose deflections follow from commands; inf where none do
+    rejected: Mapping[str, int]  # "<topic>: <reason>" -> messages left out
     history: Sequence[Estimates]
     stamps_ns: Stamps  # (K,) header stamps at which each of ``history`` (K,) fell due
     final: Estimates  # after the last sample, whether or not one was due
-    streams: Streams
+    frame_id: str  # of the IMU's messages
     truth: Truth  # empty where it is not known
     covariance: EstimateCovariance | None  # of ``final``; None where nothing was estimated
     faults: FaultVerdict | None = None  # None: nothing was judged
@@ -68,35 +82,21 @@ class Replay(EstimatedRun):
         every = max(len(self.history) // TABLE_ROWS, 1)
         # While the estimator settles nothing is included yet, and estimates have the same time.
         shown = {estimates.time: estimates for estimates in (*self.history[every - 1 :: every], self.final)}
-        flow = flow_angle_filter.init(self.aircraft)
-        time, gap = self.aligned.time, self.settings.max_gap
-        commanded = self.aligned.commands_from < time.size
+        commanded = math.isfinite(self.commands_from)
         carried = carried_in_words(self.aircraft, self.settings.actuators, commanded)
         result = replay_result(
             self.aircraft,
             self.settings,
-            time=time,
-            samples=flow_angle_filter.complete_many(flow, time, self.aligned.samples, gap),
+            recorded=self.samples,
             history=list(shown.values()),
-            rejected=counts_by_reason(self.aligned.rejected),
+            rejected=self.rejected,
             truth=self.truth.values,
             truth_since=self.truth.since,
             faults=self.faults,
-            remarks=[*flow_angle_filter.remarks(flow), *([carried] if carried else [])],
+            remarks=[*flow_angle_filter.remarks(self.flow), *([carried] if carried else [])],
         )
         publishing = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
-        signals = replace(result.signals, flight=self._with_attitude(result.signals.flight))
-        return replace(result, settings={**result.settings, **publishing}, signals=signals)
-
-    def _with_attitude(self, flight: FlightRecord | None) -> FlightRecord | None:
-        """The flight with roll, pitch and heading, of which the estimator takes none, where they were recorded."""
-        stamps, angles = self.streams.imu.arrival.stamp_ns, self.streams.imu.attitude
-        if flight is None or not np.isfinite(angles).any():
-            return flight
-        order = np.argsort(stamps, kind="stable")
-        rows = order[np.searchsorted(stamps[order], self.aligned.stamps)]
-        columns = dict(zip(("phi", "theta", "psi"), angles[rows].T, strict=True))
-        return replace(flight, columns={**flight.columns, **columns})
+        return replace(result, settings={**result.settings, **publishing})
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write what ``sysid replay`` writes; returns the path of the report.
@@ -120,7 +120,7 @@ class Replay(EstimatedRun):
             self.stamps_ns,
             aircraft=self.aircraft.name,
             method=self.settings.method,
-            frame_id=self.streams.imu.frame_id,
+            frame_id=self.frame_id,
             faults=self.faults.reports if self.faults else (),
         )
 
@@ -135,59 +135,139 @@ def replay(
     """Identifies a flight's derivatives from its bag as the live node would have, and looks for faults.
 
     ``settings``: any parameter of the node, e.g. ``{"method": "iv_rft", "window": 20.0, "publish_rate": 5.0}``; the
-    rest is as by default. ``progress`` is called with the share done (0..1) and what is being done.
+    rest is as by default. ``progress`` is called with the share done (0..1) and what is being done. The bag is read in
+    pieces, so that the memory that is needed does not grow with the flight.
 
     Raises InputError where a setting is wrong, the bag cannot be read, lacks a joint of the aircraft, or gives no
     sample.
     """
     chosen, publish_rate = replay_settings(settings or {})
-    tell: Progress = progress or (lambda share, doing: None)
     truth = truth_at_end(flight.path)
-    found = _estimated(flight, chosen, publish_rate, truth, lambda s: tell(_FAULTS_FROM * s, "identifying"))
-    if not judge_faults:
-        return found
-    later = _judged(found, flight.path, lambda s: tell(_FAULTS_FROM + (1 - _FAULTS_FROM) * s, "looking for faults"))
-    return replace(found, faults=later)
+    tell: Progress = progress or (lambda share, doing: None)
+    with flight_pieces(flight.path, flight.aircraft, flight.topics, flight.body_frame) as found:
+        running = _Run(flight.aircraft, chosen, publish_rate, found, judge_faults, tell)
+        for piece in found.pieces:
+            running.take(piece)
+    return running.result(truth)
 
 
-def _estimated(
-    flight: FlightFile, settings: OnlineSettings, publish_rate: float, truth: Truth, progress: Callable[[float], None]
-) -> Replay:
-    """Decodes, aligns and identifies."""
-    streams = open_streams(flight.path, flight.aircraft, flight.topics, flight.body_frame)
-    Actuation.of(flight.aircraft).require(streams.actuators.names, streams.name)
-    carried = carried_by(streams, settings.actuators)
-    aligned = align_streams(flight.aircraft, streams, settings.max_gap, carried)
-    if not aligned.time.size:
-        raise InputError(why_nothing_aligned(streams, aligned.rejected))
-    time = aligned.time
-    due = due_times(time, aligned.wait, publish_rate)
-    last = float(time[-1])
-    history, state = run_to_end(
-        flight.aircraft,
-        settings,
-        time,
-        aligned.samples,
-        np.union1d(due, time[-1:]),
-        lambda t: progress(t / last if last else 1.0),
-        aligned.commands_from,
-    )
-    published = history if due.size and due[-1] == last else history[:-1]
-    stamps = aligned.stamps[np.searchsorted(time, due)]
-    covariance = estimate_covariance(state)
-    return Replay(
-        flight.aircraft, settings, publish_rate, aligned, published, stamps, history[-1], streams, truth, covariance
-    )
+class _Run:
+    """A replay that is under way."""
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        settings: OnlineSettings,
+        publish_rate: float,
+        flight: FlightPieces,
+        judge_faults: bool,
+        progress: Progress,
+    ) -> None:
+        self.aircraft, self.settings, self.publish_rate = aircraft, settings, publish_rate
+        self.flight, self.progress = flight, progress
+        self.alignment: PieceAlignment | None = None
+        self.state, self.schedule = estimator.init(aircraft, settings), schedule.Schedule(publish_rate)
+        self.monitor = RecordedMonitor(aircraft, FaultSettings()) if judge_faults else None
+        self.history, self.stamps, self.latest = EstimatesLog(), array("q"), Estimates(math.nan, {}, {})
+        self.samples, self.flow = RecordedSamples(aircraft, flight.imu_messages), flow_angle_filter.init(aircraft)
+        self.attitudes = _Attitudes()
+        self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
+        self.joints: tuple[str, ...] = ()
+        self.commands_from, self.frame_id = math.inf, ""
+        self.due = math.nan  # s, time of the last sample at which estimates fell due
+        self.done = 0  # messages
+
+    def take(self, piece: FlightPiece) -> None:
+        """The next messages."""
+        streams = piece.streams
+        if self.alignment is None:
+            carried = carried_by(streams, self.settings.actuators)
+            self.alignment = PieceAlignment(self.aircraft, self.settings.max_gap, carried)
+        self.joints, self.frame_id = streams.actuators.names, streams.imu.frame_id or self.frame_id
+        self.spans = joined_spans(self.spans, stamp_spans(streams))
+        count = sum(len(stream.arrival) for stream in streams.by_topic.values())
+        aligned, known = self.alignment.take(streams, last=piece.last), len(self.stamps)
+        self._identify(aligned, count)
+        self._keep(aligned, streams)
+        if self.monitor is not None:
+            self.monitor.hear(streams, piece.commands, self._published(known), lambda s: self._tell(s, count, _FAULTS))
+        self.done += count
+
+    def _identify(self, aligned: AlignedSamples, count: int) -> None:
+        """Update the estimator with every sample, and estimate where that falls due."""
+        begin = aligned.commands_from
+        columns = (part.tolist() for part in (aligned.time, aligned.samples, aligned.wait))
+        for i, (moment, sample, wait) in enumerate(zip(*columns, strict=True)):
+            if i == begin and not self.state.model.commanded:
+                self.state = estimator.begin_with_commands(self.state, moment)
+                self.commands_from = moment
+            estimator.update(self.state, moment, sample)
+            if schedule.due(self.schedule, moment, wait):
+                self.latest = estimate(self.state, moment)
+                self.history.append(self.latest)
+                self.stamps.append(int(aligned.stamps[i]))
+                self.due = moment
+            if i % REPORT_EVERY == 0:
+                self._tell(i / aligned.time.size, count, _IDENTIFYING)
+
+    def _keep(self, aligned: AlignedSamples, streams: Streams) -> None:
+        """What the report shows of the samples."""
+        complete = flow_angle_filter.complete_many(self.flow, aligned.time, aligned.samples, self.settings.max_gap)
+        self.samples.add(aligned.time, complete, self.attitudes.at(streams.imu, aligned.stamps))
+
+    def _published(self, first: int) -> Iterator[RecordedEstimates]:
+        """The estimates from a place on, for the fault monitor."""
+        for stamp, one in zip(self.stamps[first:], self.history[first:], strict=True):
+            yield RecordedEstimates(stamp, identifier_estimates(one.derivatives.values(), one.servos.values()))
+
+    def _tell(self, share: float, count: int, part: tuple[float, float, str]) -> None:
+        """Tell the progress: the ``share`` that is done of a part of the work on a piece of ``count`` messages."""
+        begin, end, doing = part
+        within = begin + (end - begin) * share if self.monitor is not None else share
+        self.progress(min((self.done + within * count) / max(self.flight.messages, 1), 1.0), doing)
+
+    def result(self, truth: Truth) -> Replay:
+        """What was found. Raises InputError where no sample could be aligned."""
+        rejected = self.alignment.rejected if self.alignment is not None else {}
+        last = self.schedule.previous
+        if last is None:
+            Actuation.of(self.aircraft).require(self.joints, self.flight.name)
+            raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected))
+        self.progress(1.0, _FAULTS[2] if self.monitor is not None else _IDENTIFYING[2])
+        return Replay(
+            aircraft=self.aircraft,
+            settings=self.settings,
+            publish_rate=self.publish_rate,
+            samples=self.samples,
+            flow=self.flow,
+            commands_from=self.commands_from,
+            rejected=counts_by_reason(rejected),
+            history=self.history,
+            stamps_ns=np.array(self.stamps, np.int64),
+            final=self.latest if self.due == last else estimate(self.state, last),
+            frame_id=self.frame_id,
+            truth=truth,
+            covariance=estimate_covariance(self.state),
+            faults=self.monitor.verdict if self.monitor is not None else None,
+        )
 
 
-def _judged(found: Replay, bag: Path, progress: Callable[[float], None]) -> FaultVerdict:
-    """What the fault monitor, hearing the same messages and these estimates, would have said in flight."""
-    pairs = zip(found.stamps_ns.tolist(), found.history, strict=True)
-    published = (
-        RecordedEstimates(stamp, identifier_estimates(estimates.derivatives.values(), estimates.servos.values()))
-        for stamp, estimates in pairs
-    )
-    return judge(found.aircraft, FaultSettings(), found.streams, recorded_commands(bag), published, progress)
+class _Attitudes:
+    """The attitude that IMU messages hold, of which the estimator takes none."""
+
+    def __init__(self) -> None:
+        self._stamps, self._angles = np.empty(0, np.int64), np.empty((0, 3))
+
+    def at(self, imu: ImuStream, stamps: Stamps) -> Array:
+        """Roll, pitch and heading (N, 3) rad of the messages stamped ``stamps`` (N,), the last of which are ``imu``."""
+        known = np.concatenate([self._stamps, imu.arrival.stamp_ns])
+        angles = np.concatenate([self._angles, imu.attitude])
+        self._stamps, self._angles = known[-WAITING:], angles[-WAITING:]
+        if not known.size:
+            return np.full((stamps.size, 3), np.nan)
+        order = np.argsort(known, kind="stable")
+        rows = order[np.minimum(np.searchsorted(known[order], stamps), known.size - 1)]
+        return np.where((known[rows] == stamps)[:, np.newaxis], angles[rows], np.nan)
 
 
 def replay_settings(values: Mapping[str, object]) -> tuple[OnlineSettings, float]:

@@ -19,17 +19,18 @@ from sysid_node.cli.live.ros_domain import own_domain
 from sysid_node.cli.live.viewing import viewer_beside
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
-from sysid_node.flight.align import why_nothing_aligned
+from sysid_node.flight.align import stamp_spans, why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.streams import Streams
 from sysid_node.flight.topics import INPUT_TOPICS
 from sysid_node.flight.truth import read_truth
-from sysid_node.online.alignment.whole_record import AlignedSamples, align_streams
+from sysid_node.online.alignment.in_pieces import AlignedSamples, align_streams
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.output_folder import output_folder
 from sysid_node.report.files.run_folder import write_run
 from sysid_node.report.results.from_replay import replay_result
+from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import RunResult
 
 if TYPE_CHECKING:
@@ -105,8 +106,7 @@ def _result(flight: DemoFlight, follower: Follower, history: list[Estimates]) ->
     return replay_result(
         flight.aircraft,
         OnlineSettings(),
-        time=flight.aligned.time,
-        samples=flight.aligned.samples,
+        recorded=RecordedSamples.of(flight.aircraft, flight.aligned.time, flight.aligned.samples),
         history=history,
         rejected=_rejected(follower),
         truth=flight.truth,
@@ -118,7 +118,7 @@ def _read(bag: Path, aircraft: Aircraft) -> DemoFlight:
     streams = read_streams(bag)
     aligned = align_streams(aircraft, streams, OnlineSettings().max_gap)
     if not aligned.time.size:
-        raise InputError(why_nothing_aligned(streams, aligned.rejected))
+        raise InputError(why_nothing_aligned(streams.name, stamp_spans(streams), aligned.rejected))
     return DemoFlight(bag, aircraft, streams, aligned, read_truth(bag))
 
 

@@ -203,7 +203,7 @@ def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -
     A surface moves by its whole travel at most, whatever the feedforward has asked for.
     """
     feedback = np.clip(feedback, -2.0 * law.design.limits, 2.0 * law.design.limits)
-    late = reference.delayed(law.pending, time, feedback, law.design.settings.delay)
+    late = reference.delayed(law.pending, time, feedback, law.design.settings.delay, step)
     law.surfaces += (1.0 - math.exp(-step / law.design.settings.actuator_lag)) * (late - law.surfaces)
 
 

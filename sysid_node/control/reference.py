@@ -130,19 +130,23 @@ def _within(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
-def delayed(pending: deque[tuple[float, T]], time: float, value: T, delay: float) -> T:
-    """The value given ``delay`` (s) ago, or the oldest known; ``value`` is the present one, at ``time`` (s)."""
+def delayed(pending: deque[tuple[float, T]], time: float, value: T, delay: float, step: float) -> T:
+    """The value given ``delay`` (s) ago, or the oldest known; ``value`` is the present one, at ``time`` (s).
+
+    ``step`` (s) is the time since the last call. The delay is often a whole or a half number of steps. Then rounding
+    and jitter of the stamps would decide at every call which of two values it is; they do not at a third of a step.
+    """
     if pending and pending[-1][0] > time:
         pending.clear()  # the clock was set back
     pending.append((time, value))
-    while len(pending) > 1 and pending[1][0] <= time - delay:
+    while len(pending) > 1 and pending[1][0] <= time - delay + step / 3.0:
         pending.popleft()
     return pending[0][1]
 
 
 def follow(state: DelayedReference, time: float, wanted: ReferenceMotion, step: float) -> ReferenceMotion:
     """The reference after delay and lag, where ``wanted`` is the present one, at ``time`` (s)."""
-    late = delayed(state.pending, time, wanted, state.delay)
+    late = delayed(state.pending, time, wanted, state.delay, step)
     if state.now is None:
         state.now = late
     share = 1.0 - math.exp(-step / state.lag)

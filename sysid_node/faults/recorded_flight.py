@@ -6,10 +6,10 @@ identifier's estimates are taken directly after the sample with their stamp.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
@@ -23,6 +23,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stream, Streams
 
 _SECOND = 1e9  # ns
+REPORT_EVERY = 512  # messages between reports of progress
 _LONGEST_SILENCE = 300_000_000_000  # ns between two messages; what is longer is not time that passed in the flight
 
 
@@ -72,6 +73,57 @@ class FaultVerdict:
         return [f"nothing that failed was found in the {self.judged:.0f} s that were judged"]
 
 
+class RecordedMonitor:
+    """The monitor of a recording that is heard in pieces, in the order in which they were recorded."""
+
+    def __init__(self, aircraft: Aircraft, settings: FaultMonitorSettings) -> None:
+        self._watch, self._speech = watching.init(aircraft, settings, STALE_AFTER), Announcements()
+        self._reports: list[FaultReport] = []
+        self._pending: deque[RecordedEstimates] = deque()
+        self._clock: tuple[int, int] | None = None  # ns: the last log time, and what to take off log times
+        self._looks = 0
+
+    def hear(
+        self,
+        streams: Streams,
+        commands: Sequence[JointMessage] = (),
+        estimates: Iterable[RecordedEstimates] = (),
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        """Take the next messages, and the estimates that fell due among them.
+
+        ``commands`` are in log order, ``progress`` is told the share of these messages that is done.
+        """
+        self._pending.extend(estimates)
+        watch, messages = self._watch, _messages(streams, commands)
+        for place, (message, now) in enumerate(zip(messages, self._times(messages), strict=True)):
+            while (self._looks + 1) * PERIOD < now:
+                self._looks += 1
+                faults = watching.present_faults(watch, self._looks * PERIOD)
+                if self._speech.due(faults, self._looks * PERIOD):
+                    self._reports.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
+            message.take(watch, now)
+            while self._pending and self._pending[0].stamp_ns <= watch.stamp_ns:
+                watching.on_estimates(watch, self._pending.popleft().known)
+            if progress is not None and place % REPORT_EVERY == 0:
+                progress((place + 1) / len(messages))
+
+    @property
+    def verdict(self) -> FaultVerdict:
+        """On what was heard."""
+        return FaultVerdict(self._watch.judged, self._reports, episodes(self._reports))
+
+    def _times(self, messages: Sequence[_Message]) -> list[float]:
+        """Seconds since the first log time, without jumps: a clock that was set, or a pause of the recorder."""
+        times = []
+        for message in messages:
+            before, shift = self._clock or (message.log_ns, message.log_ns)
+            shift += max(message.log_ns - before - _LONGEST_SILENCE, 0)
+            self._clock = message.log_ns, shift
+            times.append((message.log_ns - shift) / _SECOND)
+        return times
+
+
 def judge(
     aircraft: Aircraft,
     settings: FaultMonitorSettings,
@@ -80,39 +132,10 @@ def judge(
     estimates: Iterable[RecordedEstimates] = (),
     progress: Callable[[float], None] | None = None,
 ) -> FaultVerdict:
-    """The monitor's verdict on a recording.
-
-    ``commands`` are in log order, ``progress`` is told the share that is done.
-    """
-    watch, speech = watching.init(aircraft, settings, STALE_AFTER), Announcements()
-    reports: list[FaultReport] = []
-    remaining = iter(estimates)
-    pending = next(remaining, None)
-    messages = _messages(streams, commands)
-    times = _recorder_time([message.log_ns for message in messages])
-    looks = 0
-    for message, now in zip(messages, times, strict=True):
-        while (looks + 1) * PERIOD < now:
-            looks += 1
-            faults = watching.present_faults(watch, looks * PERIOD)
-            if speech.due(faults, looks * PERIOD):
-                reports.append(FaultReport(watch.stamp_ns, watch.now, tuple(faults)))
-        message.take(watch, now)
-        while pending is not None and pending.stamp_ns <= watch.stamp_ns:
-            watching.on_estimates(watch, pending.known)
-            pending = next(remaining, None)
-        if progress is not None:
-            progress(now / max(times[-1], 1e-9))
-    return FaultVerdict(watch.judged, reports, episodes(reports))
-
-
-def _recorder_time(log_ns: Sequence[int]) -> list[float]:
-    """Seconds since the first of the log times, without jumps: a clock that was set, or a pause of the recorder."""
-    shift, times = log_ns[0], []
-    for before, now in pairwise([log_ns[0], *log_ns]):
-        shift += max(now - before - _LONGEST_SILENCE, 0)
-        times.append((now - shift) / _SECOND)
-    return times
+    """The monitor's verdict on a whole recording; the arguments are those of ``RecordedMonitor.hear``."""
+    monitor = RecordedMonitor(aircraft, settings)
+    monitor.hear(streams, commands, estimates, progress)
+    return monitor.verdict
 
 
 def episodes(reports: Sequence[FaultReport]) -> list[Episode]:

@@ -32,7 +32,7 @@ from sysid_node.flight.commanded import (
     with_excess,
 )
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.flight.streams import Arrival, Stamps, Streams
+from sysid_node.flight.streams import AirDataStream, Arrival, Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 STEP_BACK_NS = 1_000_000_000  # a larger step back means that the clock was set, not that a message was late
@@ -84,14 +84,6 @@ class Alignment:
         """(N,) s, from the first accepted IMU message."""
         return seconds_since(self.imu.stamps[0], self.stamps) if self.used.size else np.empty(0)
 
-    @property
-    def wait(self) -> Array:
-        """(N,) s from each sample to the last message that was needed to align it."""
-        last = np.maximum(
-            *(other.stamps[right[self.used]] for other, right in zip(self.others, self.right, strict=True))
-        )
-        return seconds_since(0, last - self.stamps)
-
 
 def seconds_since(start_ns: int | np.int64, stamps: Stamps) -> Array:
     """Seconds since ``start_ns``, from a difference in whole nanoseconds, which float64 holds exactly for 104 days."""
@@ -99,14 +91,17 @@ def seconds_since(start_ns: int | np.int64, stamps: Stamps) -> Array:
     return time
 
 
-def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> ScreenedMessages:
-    """Leave out messages that have a fault (N,), then those whose stamp is absent, repeated or late."""
+def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_], last: int | None = None) -> ScreenedMessages:
+    """Leave out messages that have a fault (N,), then those whose stamp is absent, repeated or late.
+
+    ``last`` is the latest stamp (ns) among the topic's messages before these; None = these are the first.
+    """
     good = np.array([fault is None for fault in faults], bool) if faults.size else np.empty(0, bool)
     rejected = Counter(faults[~good].tolist())
     stamped = arrival.stamp_ns > 0
     rejected[UNSTAMPED] = int(np.count_nonzero(good & ~stamped))
     kept = np.flatnonzero(good & stamped)
-    step, back = _steps(arrival.stamp_ns[kept])
+    step, back = _steps(arrival.stamp_ns[kept], last)
     rejected[DUPLICATE] = int(np.count_nonzero(step == 0))
     rejected[OUT_OF_ORDER] = int(np.count_nonzero(step < 0))
     fresh = kept[step > 0]
@@ -117,16 +112,20 @@ def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_]) -> Scre
         arrival.order[fresh],
         {reason: count for reason, count in rejected.items() if count},
         int(kept[back[0]]) if back.size else -1,
-        bool((step[1:] > STEP_FORWARD_NS).any()),
+        bool((step > STEP_FORWARD_NS).any()),
     )
 
 
-def _steps(stamps: Stamps) -> tuple[Stamps, NDArray[np.intp]]:
+def _steps(stamps: Stamps, last: int | None) -> tuple[Stamps, NDArray[np.intp]]:
     """The step of each stamp past the latest before it (1 for the first), and the places where a clock was set back."""
     if not stamps.size:
         return stamps, np.empty(0, np.intp)
+    latest = np.maximum.accumulate(stamps if last is None else np.concatenate([[last], stamps]))
     step = np.ones_like(stamps)
-    step[1:] = stamps[1:] - np.maximum.accumulate(stamps)[:-1]
+    if last is None:
+        step[1:] = stamps[1:] - latest[:-1]
+    else:
+        step = stamps - latest[:-1]
     return step, np.flatnonzero(step < -STEP_BACK_NS)
 
 
@@ -150,7 +149,7 @@ def align(
     as in flight. ``servos``: whether the aircraft file's servos follow the commands.
     """
     imu = screen(streams.imu.arrival, streams.imu.values, imu_faults(streams.imu.values))
-    air = _screen_air_data(aircraft, streams)
+    air = screen_air_data(aircraft, streams.air_data)
     thrust_and_controls, faults = Actuation.of(aircraft).of_array(streams.actuators.names, streams.actuators.positions)
     actuators = screen(streams.actuators.arrival, thrust_and_controls, faults)
 
@@ -215,11 +214,11 @@ def _actuated(
     return actuated, begin
 
 
-def _screen_air_data(aircraft: Aircraft, streams: Streams) -> ScreenedMessages:
-    """The accepted air data, with the reference density where the density is not measured."""
-    values = streams.air_data.values
+def screen_air_data(aircraft: Aircraft, stream: AirDataStream, last: int | None = None) -> ScreenedMessages:
+    """The accepted air data, with the reference density where none is measured; ``last`` as of ``screen``."""
+    values = stream.values
     density = np.where(np.isnan(values[:, 3]), aircraft.reference.air_density, values[:, 3])
-    return screen(streams.air_data.arrival, np.column_stack([values[:, :3], density]), air_data_faults(values))
+    return screen(stream.arrival, np.column_stack([values[:, :3], density]), air_data_faults(values), last)
 
 
 def buffer_ns(max_gap: float) -> int:
@@ -286,7 +285,7 @@ def flight_record(
     aligned = align(aircraft, streams, max_gap, carried, afterwards=True, servos=servos)
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
-        raise InputError(why_nothing_aligned(streams, aligned.rejected))
+        raise InputError(why_nothing_aligned(streams.name, stamp_spans(streams), aligned.rejected))
     samples, names = aligned.samples, sample_columns(aircraft)
     if samples.shape[1] > len(names):
         first = len(names) - len(aircraft.controls)
@@ -319,13 +318,30 @@ def _require_one_clock(streams: Streams, aligned: Alignment) -> None:
             )
 
 
-def why_nothing_aligned(streams: Streams, rejected: Mapping[str, Mapping[str, int]]) -> str:
-    """One line: the time spans of the topics where they do not overlap, else the most frequent reasons of rejection."""
+def stamp_spans(streams: Streams) -> dict[str, tuple[float, float]]:
+    """The first and the last header stamp (s) of each topic that has messages."""
     stamps = {topic: stream.arrival.stamp_ns / 1e9 for topic, stream in streams.by_topic.items()}
-    spans = {topic: (t.min(), t.max()) for topic, t in stamps.items()}
+    return {topic: (float(t.min()), float(t.max())) for topic, t in stamps.items() if t.size}
+
+
+def joined_spans(
+    first: Mapping[str, tuple[float, float]], second: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """The spans that hold both, by topic."""
+    both = {topic: (*first.get(topic, ()), *second.get(topic, ())) for topic in {**first, **second}}
+    return {topic: (min(times), max(times)) for topic, times in both.items()}
+
+
+def why_nothing_aligned(
+    name: str, spans: Mapping[str, tuple[float, float]], rejected: Mapping[str, Mapping[str, int]]
+) -> str:
+    """One line: the time spans of the topics where they do not overlap, else the most frequent reasons of rejection.
+
+    ``name`` is the flight's, ``spans`` as of ``stamp_spans``.
+    """
     if max(start for start, _ in spans.values()) > min(stop for _, stop in spans.values()):
         intervals = ", ".join(f"{topic} {start:.3f} to {stop:.3f} s" for topic, (start, stop) in spans.items())
-        return f"{streams.name}: the header stamps do not overlap: {intervals}; stamp all topics with one clock"
+        return f"{name}: the header stamps do not overlap: {intervals}; stamp all topics with one clock"
     worst = sorted(counts_by_reason(rejected).items(), key=lambda item: -item[1])[:3]
     reasons = "; ".join(f"{count} x {reason}" for reason, count in worst) or "fewer than two IMU messages"
-    return f"{streams.name}: no two samples could be aligned: {reasons}; correct the messages or the aircraft file"
+    return f"{name}: no two samples could be aligned: {reasons}; correct the messages or the aircraft file"

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
+
 from sysid_node.flight.bag.message_types import definitions_of, type_store
 from sysid_node.flight.bag.reader import open_bag, reading
 from sysid_node.flight.cdr.decoding import decode
@@ -33,12 +36,17 @@ def read_commands(path: str | Path) -> list[JointMessage]:
     """
     path = Path(path)
     with open_bag(path) as reader, reading(path):
-        chosen = [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]
+        chosen = command_connections(reader)
         found = [(log_ns, data) for _, log_ns, data in reader.messages(chosen)] if chosen else []
-        return _decoded(found)
+        return decoded_commands(found)
 
 
-def _decoded(found: Sequence[tuple[int, bytes]]) -> list[JointMessage]:
+def command_connections(reader: Reader) -> list[Connection]:
+    """The connections of a bag on which commands were recorded; empty where there are none."""
+    return [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]
+
+
+def decoded_commands(found: Sequence[tuple[int, bytes]]) -> list[JointMessage]:
     """The messages from their log times and bytes, by log time."""
     messages = []
     for places, fields in decode(definitions_of(type_store()), COMMANDS_TYPE, [data for _, data in found]):

@@ -76,16 +76,20 @@ class JointStream(Stream):
 
 @dataclass(frozen=True)
 class Streams:
-    """A flight as recorded; ``name`` stands in error messages. Raises InputError where a topic has no messages."""
+    """A flight as recorded, or a ``piece`` of one; ``name`` stands in error messages.
+
+    Raises InputError where a topic of a whole flight has no messages.
+    """
 
     imu: ImuStream
     air_data: AirDataStream
     actuators: JointStream
     name: str = ""
+    piece: bool = False
 
     def __post_init__(self) -> None:
         for topic, stream in self.by_topic.items():
-            if not len(stream.arrival):
+            if not len(stream.arrival) and not self.piece:
                 raise InputError(f"{self.name}: no messages on {topic}; record that topic too")
 
     @property

@@ -115,3 +115,17 @@ def test_new_gains_do_not_move_the_surfaces() -> None:
     after = controller.step(state, sensed, SetPoints(roll=0.2), (0.03, 0.0, 0.0))
     assert after.elevator == pytest.approx(before[0], abs=5e-4)
     assert after[1:3] == pytest.approx(before[1:], abs=5e-3)  # one integral for two surfaces
+
+
+@pytest.mark.parametrize(("rate", "delay"), [(50.0, 0.02), (50.0, 0.01), (200.0, 0.02)])
+def test_a_delay_of_whole_or_half_steps_is_the_same_at_every_step(rate: float, delay: float) -> None:
+    """Answers to a pitch rate that changes its sign with every sample are even, however the stamps are rounded."""
+    state = controller.init(AIRCRAFT, ControllerSettings(delay=delay))
+    rng = np.random.default_rng(1)
+    times = 77.123456789 + np.arange(600) / rate + rng.uniform(-0.05, 0.05, 600) / rate
+    commands = [
+        controller.step(state, level(float(t), q=0.01 * (-1.0) ** k), SetPoints()).elevator for k, t in enumerate(times)
+    ]
+    jumps = np.abs(np.diff(commands))[300:]
+    assert jumps.min() > 0.0
+    assert jumps.max() < 1.1 * jumps.min()

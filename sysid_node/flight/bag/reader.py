@@ -48,10 +48,24 @@ def read_streams(path: str | Path, topics: Mapping[str, str] | None = None, fram
     path, topics = Path(path), topics or topic_names()
     name = f"bag {path.name}"
     with open_bag(path) as reader, reading(path):
-        raw = _read_messages(reader, topics, name)
-        return Streams(
-            _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA]), _joint_stream(raw[ACTUATORS]), name
-        )
+        chosen = input_connections(reader, topics, name)
+        watch = RecordingWatch(name, topics, chosen)
+        raw = read_messages(reader, chosen)
+        watch.take(raw)
+        watch.close()
+        return decoded(raw, frame, name)
+
+
+def decoded(
+    raw: Mapping[str, RawMessages], frame: BodyFrame, name: str, joints: Sequence[str] | None = None
+) -> Streams:
+    """The messages of the input topics as arrays. With ``joints``, those known so far, they are a piece of a flight.
+
+    Raises DamageError where a message is damaged, InputError where there are too many joints.
+    """
+    actuators = _joint_stream(raw[ACTUATORS], joints or ())
+    imu, air_data = _imu_stream(raw[IMU], frame), _air_data_stream(raw[AIR_DATA])
+    return Streams(imu, air_data, actuators, name, piece=joints is not None)
 
 
 @contextmanager
@@ -103,42 +117,61 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _read_messages(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, RawMessages]:
-    """The bytes of all messages of the input topics."""
-    chosen = _choose(reader, topics, bag)
-    messages = read_messages(reader, chosen)
-    for topic, raw in messages.items():
-        if not raw.data:
-            raise InputError(f"{bag}: no messages on {topics[topic]}; record that topic too")
-        missing = sum(connection.msgcount for connection in chosen[topic]) - len(raw.data)
-        if missing > 0:
+class RecordingWatch:
+    """What is wrong with a recording as a whole: topics without messages, messages that lack, a clock that was set."""
+
+    def __init__(self, bag: str, topics: Mapping[str, str], chosen: Mapping[str, Sequence[Connection]]) -> None:
+        self._bag, self._topics = bag, topics
+        self._promised = {topic: sum(connection.msgcount for connection in chosen[topic]) for topic in topics}
+        self._found = dict.fromkeys(topics, 0)
+        self._log_ns: int | None = None  # of the last message
+        self._since = 0.0  # s of the recording so far, without a jump
+        self._jumped = False
+
+    def take(self, raw: Mapping[str, RawMessages]) -> None:
+        """Look at the next messages; warns of the first jump of the recorder's clock."""
+        messages = [raw[topic] for topic in self._topics]
+        for topic, one in zip(self._topics, messages, strict=True):
+            self._found[topic] += len(one.data)
+        order = np.argsort(np.concatenate([one.order for one in messages]))
+        log_ns = np.concatenate([one.log_ns for one in messages])[order]
+        if self._log_ns is not None:
+            log_ns = np.concatenate([[self._log_ns], log_ns])
+        if log_ns.size:
+            self._log_ns = int(log_ns[-1])
+        if not self._jumped:
+            self._look_for_jump(np.diff(log_ns) / 1e9)
+
+    def _look_for_jump(self, step: Array) -> None:
+        jumps = np.flatnonzero((step > RECORDER_JUMP) | (step < -1.0))
+        self._jumped = bool(jumps.size)
+        before = step[: jumps[0]] if jumps.size else step
+        self._since += float(np.clip(before, 0.0, RECORDER_JUMP).sum())
+        if jumps.size:
             warnings.warn(
-                f"{bag}: {missing} of {missing + len(raw.data)} messages on {topics[topic]} that the bag's index "
-                "promises are not in it; it is damaged or was cut short",
+                f"{self._bag}: the recorder's clock jumps by {step[jumps[0]]:.0f} s, {self._since:.1f} s into the "
+                "recording (it was set or the recording was paused); the headers' stamps are used, the jump is left "
+                "out",
                 InputWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
-    _warn_of_recorder_clock(messages, bag)
-    return messages
+
+    def close(self) -> None:
+        """After the last message: raises InputError where a topic had none, warns where some lack."""
+        for topic, found in self._found.items():
+            if not found:
+                raise InputError(f"{self._bag}: no messages on {self._topics[topic]}; record that topic too")
+            if self._promised[topic] > found:
+                warnings.warn(
+                    f"{self._bag}: {self._promised[topic] - found} of {self._promised[topic]} messages on "
+                    f"{self._topics[topic]} that the bag's index promises are not in it; it is damaged or was cut "
+                    "short",
+                    InputWarning,
+                    stacklevel=3,
+                )
 
 
-def _warn_of_recorder_clock(messages: Mapping[str, RawMessages], bag: str) -> None:
-    """Warn where the recorder's clock was set during the recording."""
-    order = np.argsort(np.concatenate([raw.order for raw in messages.values()]))
-    log_ns = np.concatenate([raw.log_ns for raw in messages.values()])[order]
-    step = np.diff(log_ns) / 1e9
-    jumps = np.flatnonzero((step > RECORDER_JUMP) | (step < -1.0))
-    if jumps.size:
-        at = float(np.clip(step[: jumps[0]], 0.0, RECORDER_JUMP).sum())
-        warnings.warn(
-            f"{bag}: the recorder's clock jumps by {step[jumps[0]]:.0f} s, {at:.1f} s into the recording (it was set or"
-            " the recording was paused); the headers' stamps are used, the jump is left out",
-            InputWarning,
-            stacklevel=2,
-        )
-
-
-def _choose(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, list[Connection]]:
+def input_connections(reader: Reader, topics: Mapping[str, str], bag: str) -> dict[str, list[Connection]]:
     """The connections of each input topic. Raises InputError where one is missing or of another type."""
     recorded = {name: {c.msgtype for c in info.connections} for name, info in reader.topics.items()}
     for topic, name in topics.items():
@@ -203,7 +236,7 @@ def _air_data_stream(raw: RawMessages) -> AirDataStream:
     return AirDataStream(_arrival(raw, stamps), values)
 
 
-def _joint_stream(raw: RawMessages) -> JointStream:
+def _joint_stream(raw: RawMessages, known: Sequence[str]) -> JointStream:
     stamps = np.empty(len(raw.data), np.int64)
     parts: list[tuple[NDArray[np.intp], Sequence[str], NDArray[Any]]] = []
     content = ""
@@ -212,7 +245,7 @@ def _joint_stream(raw: RawMessages) -> JointStream:
         parts.append((at, fields.strings("name"), fields.numbers("position")))
         frame_id = fields.strings("header.frame_id")[0]
         content = frame_id if frame_id in (COMMANDS, COMMAND_FRACTIONS) else content
-    names = tuple(dict.fromkeys(name for _, part_names, _ in parts for name in part_names))
+    names = tuple(dict.fromkeys([*known, *(name for _, part_names, _ in parts for name in part_names)]))
     if len(names) > JOINT_LIMIT:
         raise InputError(f"{len(names)} different joints in the messages, over {JOINT_LIMIT}; names must not change")
     place = {name: i for i, name in enumerate(names)}

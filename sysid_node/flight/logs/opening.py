@@ -43,12 +43,12 @@ def read_autopilot_log(path: str | Path, settings: AdapterSettings | None = None
             return read_dataflash(path, text=content is Content.DATAFLASH_TEXT)
         if content is Content.TELEMETRY:
             return read_telemetry(path)
-    if content is Content.ROSBAG1 or (content is Content.ROSBAG2 and _recorded_topics(Path(path))):
+    if content is Content.ROSBAG1 or (content is Content.ROSBAG2 and is_autopilot_bag(Path(path))):
         return read_autopilot_bag(path, settings)
     return None
 
 
-def _recorded_topics(path: Path) -> bool:
+def is_autopilot_bag(path: Path) -> bool:
     """Whether a rosbag2 recording holds an autopilot's topics and no air data of ours."""
     if not path.exists():
         return False

@@ -221,6 +221,28 @@ def stamp_of(state: AlignmentState, time: float) -> int:
     return base.stamp + since - base.since
 
 
+def go_on_from(state: AlignmentState, first: int, last: int, waiting: Sequence[int], values: Sequence[Values]) -> None:
+    """Put a fresh alignment where IMU messages from ``first`` to ``last`` (ns) brought it.
+
+    ``waiting`` are the stamps of the last of them that no sample has been made of, ``values`` what they hold.
+    """
+    state.clock.last, state.since = last, last - first
+    state.bases.append(_Base(0, 0, first))
+    state.waiting.extend(_Waiting(0, *each) for each in zip(waiting, (t - first for t in waiting), values, strict=True))
+
+
+def go_on_after(state: AlignmentState, topic: str, stamps: Sequence[int], values: Sequence[Values]) -> None:
+    """Put a fresh alignment where the last messages of a topic with neighbours brought it; stamps in ns."""
+    neighbours = state.air_data if topic == AIR_DATA else state.actuators
+    before = [*stamps[:1], *stamps[:-1]]
+    spans = (min(now - last, state.gap) for now, last in zip(stamps, before, strict=True))
+    entries = [_Entry(0, *each) for each in zip(stamps, spans, values, strict=True)]
+    if entries:
+        horizon = stamps[-1] - KEPT_BUFFERS * state.buffer
+        neighbours.entries.extend(entry for entry in entries if entry.stamp >= horizon)
+        neighbours.newest, neighbours.clock.last = entries[-1], stamps[-1]
+
+
 def _on_neighbour(
     state: AlignmentState,
     topic: _Neighbours,

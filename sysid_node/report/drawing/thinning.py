@@ -37,6 +37,11 @@ def extremes(values: Array, buckets: int) -> NDArray[np.intp]:
     return np.unique(np.clip(np.concatenate([[0, count - 1], *(start + pick for pick in picks)]), 0, count - 1))
 
 
+def extreme_rows(columns: Array) -> NDArray[np.intp]:
+    """Rows, increasing, that hold the extremes of all columns (N, M), as those of ``extremes`` in one bucket."""
+    return np.unique(np.concatenate([extremes(column, 1) for column in columns.T]))
+
+
 def thin_curve(time: Array, *curves: Array, points: int = MAX_POINTS) -> tuple[Array, ...]:
     """Times and curves, each (N,), at the rows that hold the extremes of every curve."""
     rows = _rows(curves, points)

@@ -14,6 +14,8 @@ from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.fault_messages import FAULTS, FAULTS_TYPE, fault_messages
 
+_AT_ONCE = 1024  # estimates that are serialised together
+
 
 def write_estimates(
     path: Path,
@@ -30,11 +32,13 @@ def write_estimates(
     ``stamps_ns`` (K,) of ``history`` (K,). ``faults`` are put on /fault_monitor/faults alike. Raises InputError where
     the bag exists or cannot be written.
     """
-    messages = EstimatesSerialiser(definitions_of(type_store()), aircraft, method).many(history, stamps_ns, frame_id)
+    serialiser = EstimatesSerialiser(definitions_of(type_store()), aircraft, method)
     with new_bag(path) as writer:
         topic = add_topic(writer, DERIVATIVES, DERIVATIVES_TYPE)
-        for stamp, data in zip(stamps_ns.tolist(), messages, strict=True):
-            writer.write(topic, stamp, data)
+        for first in range(0, len(history), _AT_ONCE):
+            some, stamps = history[first : first + _AT_ONCE], stamps_ns[first : first + _AT_ONCE]
+            for stamp, data in zip(stamps.tolist(), serialiser.many(some, stamps, frame_id), strict=True):
+                writer.write(topic, stamp, data)
         if faults:
             topic = add_topic(writer, FAULTS, FAULTS_TYPE)
             for stamp, data in fault_messages(faults, aircraft):

@@ -14,17 +14,18 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.recorded_flight import FaultVerdict
-from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.flight.record import Array
 from sysid_node.online.frequency.regression_signals import OFFSET, array_signals, layout, momentum_matrix
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.comparison import changes
+from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
 from sysid_node.report.results.servo_remarks import servo_remarks
 from sysid_node.report.results.signals import Response, RunSignals, Spectra
 
-THRUST, AIR_INTERVAL = SAMPLE_COLUMNS.index("thrust"), SAMPLE_COLUMNS.index("air_interval")
+THRUST = SAMPLE_COLUMNS.index("thrust")
 FEWEST = 10  # samples below which nothing is drawn
 POINTS_A_PERIOD = 8  # drawn points of a response in a period of the highest frequency in use
 RESPONSE_NOTE = "Both are averaged over half the shortest period in use; measured moments hold differentiated rates."
@@ -51,8 +52,7 @@ def replay_result(
     aircraft: Aircraft,
     settings: OnlineSettings,
     *,
-    time: Array,
-    samples: Array,
+    recorded: RecordedSamples,
     history: Sequence[Estimates],
     rejected: Mapping[str, int],
     truth: Mapping[str, float] | None = None,
@@ -61,23 +61,20 @@ def replay_result(
     faults: FaultVerdict | None = None,
     remarks: Sequence[str] = (),
 ) -> RunResult:
-    """All that a report needs, from the aligned ``time`` (N,) s, ``samples`` (N, M) and the estimates over time.
-
-    Columns of ``samples`` are ``SAMPLE_COLUMNS``, then the controls in the aircraft's order.
-    """
+    """All that a report needs, from the aligned samples and the estimates over time."""
     noticed = sorted({at for e in history[-1:] for name in e.derivatives for at in changes(history, name)})
-    motion = _motion(aircraft, time, samples, history)
+    motion = _motion(aircraft, *recorded.last, history)
     counted = motion and motion.since(max(noticed, default=0.0))
     return RunResult(
         aircraft=aircraft.name,
         method=settings.method,
         history=history,
         title=title,
-        data=RunData(float(time[-1] - time[0]) if time.size else 0.0, int(time.size), rejected),
+        data=RunData(recorded.seconds, recorded.count, rejected),
         settings=settings.as_dict(),
         references=References(prior_of(aircraft), truth or {}, truth_since or {}),
         signals=RunSignals(
-            _flight(aircraft, time, samples),
+            recorded.flight,
             _spectra(settings, counted) if counted else None,
             _responses(settings, motion) if motion else {},
             RESPONSE_NOTE,
@@ -85,6 +82,7 @@ def replay_result(
         faults=faults,
         remarks=[
             *remarks,
+            *recorded.remarks,
             *(servo_remarks(aircraft, history[-1]) if history else []),
             *_change_remark(noticed),
             *_fault_remarks(faults),
@@ -102,13 +100,6 @@ def _change_remark(noticed: Sequence[float]) -> list[str]:
 def _fault_remarks(faults: FaultVerdict | None) -> list[str]:
     """One remark for each fault."""
     return [f"Something seems to have failed: {one.text}." for one in faults.episodes] if faults else []
-
-
-def _flight(aircraft: Aircraft, time: Array, samples: Array) -> FlightRecord | None:
-    if time.size < 2:
-        return None
-    names = (*SAMPLE_COLUMNS, *aircraft.control_symbols)
-    return FlightRecord(time, {n: samples[:, i] for i, n in enumerate(names) if i != AIR_INTERVAL})
 
 
 def _motion(

@@ -13,6 +13,7 @@ from sysid_node.online.types import SAMPLE_COLUMNS, DerivativeEstimate, Estimate
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.files.run_folder import rebuild_report, write_run
 from sysid_node.report.results.from_replay import replay_result
+from sysid_node.report.results.recorded_samples import RecordedSamples
 
 SETTINGS = OnlineSettings()
 LONGITUDINAL = ("CL", "CD", "Cm")
@@ -61,7 +62,9 @@ def aircraft() -> Aircraft:
 def result(aircraft):
     time, samples = flight(aircraft)
     history = [believed(aircraft, 30.0), believed(aircraft, 60.0)]
-    return replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={})
+    return replay_result(
+        aircraft, SETTINGS, recorded=RecordedSamples.of(aircraft, time, samples), history=history, rejected={}
+    )
 
 
 @pytest.mark.parametrize("coefficient", LONGITUDINAL)
@@ -83,7 +86,7 @@ def test_what_the_model_lacks_is_left_at_its_frequency(aircraft):
     samples[:, SAMPLE_COLUMNS.index("az")] += 0.5 * np.sin(2 * np.pi * 1.3 * time)
     history = [believed(aircraft, 60.0)]
     spectra = replay_result(
-        aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={}
+        aircraft, SETTINGS, recorded=RecordedSamples.of(aircraft, time, samples), history=history, rejected={}
     ).signals.spectra
     assert spectra.frequency[np.argmax(spectra.residuals["CL"])] == pytest.approx(1.3)
     pressure = 0.5 * aircraft.reference.air_density * aircraft.reference.airspeed**2
@@ -108,7 +111,8 @@ def test_it_goes_through_the_folder(result, tmp_path):
 def test_short_records_give_what_they_can(aircraft, count, tmp_path):
     time, samples = flight(aircraft)
     history = [believed(aircraft, 1.0)] if count else []
-    short = {"time": time[:count], "samples": samples[:count], "history": history, "rejected": {"imu/data: stale": 1}}
+    recorded = RecordedSamples.of(aircraft, time[:count], samples[:count])
+    short = {"recorded": recorded, "history": history, "rejected": {"imu/data: stale": 1}}
     write_run(tmp_path, replay_result(aircraft, SETTINGS, **short))
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["samples"] == count
     assert "</html>" in (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -118,7 +122,9 @@ def test_incomplete_samples_are_left_out(aircraft):
     time, samples = flight(aircraft)
     samples[1000:1100, SAMPLE_COLUMNS.index("alpha")] = np.nan
     history = [believed(aircraft, 60.0)]
-    result = replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={})
+    result = replay_result(
+        aircraft, SETTINGS, recorded=RecordedSamples.of(aircraft, time, samples), history=history, rejected={}
+    )
     assert np.isfinite(result.signals.responses["CL"].measured).all()
     assert result.signals.spectra.residuals["CL"].max() < 0.01 * result.signals.spectra.measured["CL"].max()
 
@@ -141,6 +147,8 @@ def test_after_an_abrupt_change_only_what_follows_counts(aircraft):
     changed = believed(aircraft, 31.0)
     derivatives = {n: d._replace(valid=False, status="changed") for n, d in changed.derivatives.items()}
     history = [believed(aircraft, 20.0), replace(changed, derivatives=derivatives), believed(aircraft, 60.0)]
-    result = replay_result(aircraft, SETTINGS, time=time, samples=samples, history=history, rejected={})
+    result = replay_result(
+        aircraft, SETTINGS, recorded=RecordedSamples.of(aircraft, time, samples), history=history, rejected={}
+    )
     assert result.signals.spectra.residuals["CL"].max() < 0.01 * result.signals.spectra.measured["CL"].max()
     assert "noticed at 31.0 s" in result.remarks[0]

@@ -1,6 +1,7 @@
-"""Bulk alignment gives the bits of the message-by-message intake, whatever the recording."""
+"""Alignment in pieces gives the bits of the message-by-message alignment, whatever the recording and the pieces."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,28 +9,59 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_flights import made_aircraft, made_streams
 
-from sysid_node.flight.align import align
 from sysid_node.flight.streams import Arrival, Streams
-from sysid_node.online.alignment import whole_record
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import PieceAlignment
 
 AIRCRAFT = made_aircraft()
 
 
-def assert_same_bits(streams, max_gap=0.2, carried="positions"):
-    bulk = align_streams(AIRCRAFT, streams, max_gap, carried)
-    single = whole_record.align_by_message(AIRCRAFT, streams, max_gap, carried)
-    assert bulk.commands_from == single.commands_from
-    assert bulk.time.tobytes() == single.time.tobytes()
-    assert bulk.samples.tobytes() == single.samples.reshape(bulk.samples.shape).tobytes()
-    assert bulk.stamps.tobytes() == single.stamps.tobytes()
-    assert bulk.wait.tobytes() == single.wait.tobytes()
-    assert bulk.rejected == single.rejected
-    return bulk
+def cut(streams: Streams, shares) -> list[Streams]:
+    """The messages as recorded, cut where these shares of them have come."""
+    every = np.sort(np.concatenate([stream.arrival.order for stream in streams.by_topic.values()]))
+    borders = [every[0], *(every[int(share * (every.size - 1))] for share in sorted(shares)), every[-1] + 1]
+    return [_between(streams, begin, end) for begin, end in pairwise(borders)]
+
+
+def _between(streams: Streams, begin: int, end: int) -> Streams:
+    parts = {}
+    for name, field in (("imu", "values"), ("air_data", "values"), ("actuators", "positions")):
+        stream = getattr(streams, name)
+        arrival = stream.arrival
+        keep = (arrival.order >= begin) & (arrival.order < end)
+        come = Arrival(arrival.stamp_ns[keep], arrival.log_ns[keep], arrival.order[keep])
+        parts[name] = dataclasses.replace(stream, arrival=come, **{field: getattr(stream, field)[keep]})
+    return Streams(**parts, piece=True)
+
+
+def together(pieces, alignment):
+    """What the pieces give, one behind the other."""
+    found = [alignment.take(piece, last=piece is pieces[-1]) for piece in pieces]
+    width = max(part.samples.shape[1] for part in found)
+    begins, before = [], 0
+    for part in found:
+        begins += [before + part.commands_from] if part.commands_from < part.time.size else []
+        before += part.time.size
+    return (
+        np.concatenate([part.time for part in found]).tobytes(),
+        b"".join(np.pad(p.samples, ((0, 0), (0, width - p.samples.shape[1]))).tobytes() for p in found),
+        np.concatenate([part.stamps for part in found]).tobytes(),
+        np.concatenate([part.wait for part in found]).tobytes(),
+        {topic: dict(reasons) for topic, reasons in alignment.rejected.items()},
+        begins[:1],
+    )
+
+
+def assert_same_bits(streams, max_gap=0.2, carried="positions", shares=(0.1, 0.35, 0.36, 0.8)):
+    wanted = together([streams], PieceAlignment(AIRCRAFT, max_gap, carried, by_message=True))
+    assert together([streams], PieceAlignment(AIRCRAFT, max_gap, carried)) == wanted
+    assert together(cut(streams, shares), PieceAlignment(AIRCRAFT, max_gap, carried)) == wanted
+    return PieceAlignment(AIRCRAFT, max_gap, carried).take(streams, last=True)
 
 
 def is_regular(streams, max_gap=0.2):
-    return whole_record.is_regular(align(AIRCRAFT, streams, max_gap), streams, max_gap)
+    whole = PieceAlignment(AIRCRAFT, max_gap)
+    whole.take(streams, last=True)
+    return whole.regular
 
 
 def changed(streams: Streams, topic: str, change) -> Streams:
@@ -134,8 +166,8 @@ def test_a_topic_that_fell_silent(topic, silence):
     keep = ~((t >= silence[0]) & (t < silence[1]))
     arrival = Arrival(stream.arrival.stamp_ns[keep], stream.arrival.log_ns[keep], stream.arrival.order[keep])
     field = "positions" if topic == "actuators" else "values"
-    cut = dataclasses.replace(stream, arrival=arrival, **{field: getattr(stream, field)[keep]})
-    assert_same_bits(dataclasses.replace(streams, **{topic: cut}))
+    short = dataclasses.replace(stream, arrival=arrival, **{field: getattr(stream, field)[keep]})
+    assert_same_bits(dataclasses.replace(streams, **{topic: short}))
 
 
 SHIFTS = (0, -1, -2_000_000_000, 10**7, -(10**7), 3 * 10**11, 6_000_000_000, None)
@@ -149,8 +181,9 @@ faults = st.lists(st.tuples(st.integers(0, 1000), st.sampled_from(SHIFTS), st.bo
     st.booleans(),
     st.integers(0, 9),
     st.sampled_from(["positions", "commands", "auto"]),
+    st.lists(st.floats(0.0, 1.0), max_size=4),
 )
-def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried):
+def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried, shares):
     """Repeated, absent, leaping and disordered stamps; topics that arrive in any order."""
     streams = made_streams(0.5, seed=seed)
     lengths = [len(stream.arrival) for stream in streams.by_topic.values()]
@@ -169,4 +202,4 @@ def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried):
                 rng.shuffle(arrival.stamp_ns[3:9])
 
         streams = changed(streams, topic, spoil)
-    assert_same_bits(with_steps(streams, 4) if carried == "auto" else streams, carried=carried)
+    assert_same_bits(with_steps(streams, 4) if carried == "auto" else streams, carried=carried, shares=shares)
