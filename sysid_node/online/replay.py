@@ -1,10 +1,7 @@
-"""Estimates along a record of aligned samples, by the same calls in the same order as in the live node.
+"""Estimates along aligned samples that are at hand, by the same calls in the same order as in the live node.
 
-A replay therefore equals the live run to the last bit, without a second implementation. It calls ``update`` with every
-sample and ``estimate`` where an estimate falls due. This takes 2.0 times (a record of 60 s) to 2.8 times (600 s) the
-processor time of the bulk estimator that it replaced, which had about 900 lines that had to agree with ``update`` and
-``estimate`` bit for bit. Only the alignment has a twin that works on the whole record at once;
-``alignment.whole_record`` says why.
+It calls ``update`` with every sample and ``estimate`` where an estimate falls due. ``api.replaying`` does the same with
+the samples of a recording that is read in pieces.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.state import EstimatorState
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
@@ -40,19 +36,6 @@ def run(
     time (s) of the last sample, every ``REPORT_EVERY`` samples and at the end. ``commands_from``: the place of the
     first sample whose deflections follow from commands; the estimator begins anew there.
     """
-    return run_to_end(aircraft, settings, time, samples, publish_times, progress, commands_from)[0]
-
-
-def run_to_end(
-    aircraft: Aircraft,
-    settings: OnlineSettings,
-    time: Array,
-    samples: Array,
-    publish_times: Array,
-    progress: Callable[[float], None] | None = None,
-    commands_from: int | None = None,
-) -> tuple[list[Estimates], EstimatorState]:
-    """The estimates of ``run``, and the estimator as it stands after the last sample."""
     state = estimator.init(aircraft, settings)
     due = set(np.searchsorted(time, publish_times, side="left").tolist())
     estimates = []
@@ -64,4 +47,4 @@ def run_to_end(
             estimates.append(estimate(state, moment))
         if progress is not None and ((i + 1) % REPORT_EVERY == 0 or i + 1 == time.size):
             progress(moment)
-    return estimates, state
+    return estimates
