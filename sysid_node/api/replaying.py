@@ -22,7 +22,7 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.logs.opening import carried_by
-from sysid_node.flight.pieces import FlightPiece, FlightPieces, flight_pieces
+from sysid_node.flight.pieces import PIECE, FlightPiece, FlightPieces, flight_pieces
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import ImuStream, Stamps, Streams
 from sysid_node.flight.truth import Truth, truth_at_end
@@ -131,12 +131,14 @@ def replay(
     *,
     judge_faults: bool = True,
     progress: Progress | None = None,
+    at_once: int = PIECE,
 ) -> Replay:
     """Identifies a flight's derivatives from its bag as the live node would have, and looks for faults.
 
     ``settings``: any parameter of the node, e.g. ``{"method": "iv_rft", "window": 20.0, "publish_rate": 5.0}``; the
-    rest is as by default. ``progress`` is called with the share done (0..1) and what is being done. The bag is read in
-    pieces, so that the memory that is needed does not grow with the flight.
+    rest is as by default. ``progress`` is called with the share done (0..1) and what is being done. A bag is read in
+    pieces of ``at_once`` messages, so that the memory that is needed does not grow with the flight; the results do not
+    depend on it.
 
     Raises InputError where a setting is wrong, the bag cannot be read, lacks a joint of the aircraft, or gives no
     sample.
@@ -144,7 +146,7 @@ def replay(
     chosen, publish_rate = replay_settings(settings or {})
     truth = truth_at_end(flight.path)
     tell: Progress = progress or (lambda share, doing: None)
-    with flight_pieces(flight.path, flight.aircraft, flight.topics, flight.body_frame) as found:
+    with flight_pieces(flight.path, flight.aircraft, flight.topics, flight.body_frame, at_once) as found:
         running = _Run(flight.aircraft, chosen, publish_rate, found, judge_faults, tell)
         for piece in found.pieces:
             running.take(piece)

@@ -97,6 +97,17 @@ def test_a_replay_is_the_live_run_to_the_last_bit(bag, rate):
         assert bits(ours) == bits(theirs)
 
 
+@pytest.mark.parametrize("at_once", [97, 1500])
+def test_a_replay_in_pieces_is_the_whole_one(bag, tmp_path, at_once):
+    """Files as bytes: estimates over time as a bag, tables, faults and what is drawn."""
+    for folder, size in (("whole", 10**9), ("pieces", at_once)):
+        replay(load(bag, AIRCRAFT), LINES, at_once=size).save(tmp_path / folder)
+    files = sorted(f.relative_to(tmp_path / "whole") for f in (tmp_path / "whole").rglob("*") if f.is_file())
+    assert len(files) >= 8
+    for file in files:
+        assert (tmp_path / "pieces" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes(), file
+
+
 @pytest.mark.parametrize("carried", ["auto", "commands"])
 def test_commands_are_followed_in_flight_as_in_a_replay(tmp_path, flight, carried):
     """Joints that jump are commands; from then on, servos of the file follow, and the estimator begins anew."""
@@ -106,7 +117,7 @@ def test_commands_are_followed_in_flight_as_in_a_replay(tmp_path, flight, carrie
     steps[:, 1:] = 0.05 * ((np.arange(len(steps)) // 40) % 2)[:, None]
     streams = replace(flight, actuators=replace(flight.actuators, positions=steps))
     write_streams(tmp_path / "steps", streams)
-    done = replay(load(tmp_path / "steps", aircraft), LINES | {"actuators": carried, "publish_rate": 10.0})
+    done = replay(load(tmp_path / "steps", aircraft), LINES | {"actuators": carried, "publish_rate": 10.0}, at_once=701)
     session = Session(aircraft, replace(SETTINGS, actuators=carried), 10.0)
     calls = [
         *((session.imu, streams.imu, i, (tuple(v),)) for i, v in enumerate(streams.imu.values.tolist())),
