@@ -146,6 +146,7 @@ def main() -> None:
     parser.add_argument("--only", default=";".join(CASES), help="commands, with semicolons between")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts what is in the background without it
     rng, rows = random.Random(args.seed), []
     with tempfile.TemporaryDirectory() as name:
         make(Path(name))
