@@ -15,6 +15,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.state import EstimatorState
 from sysid_node.online.types import Estimates
 
 Array = NDArray[np.float64]
@@ -36,6 +37,19 @@ def run(
     time (s) of the last sample, every ``REPORT_EVERY`` samples and at the end. ``commands_from``: the place of the
     first sample whose deflections follow from commands; the estimator begins anew there.
     """
+    return run_to_end(aircraft, settings, time, samples, publish_times, progress, commands_from)[0]
+
+
+def run_to_end(
+    aircraft: Aircraft,
+    settings: OnlineSettings,
+    time: Array,
+    samples: Array,
+    publish_times: Array,
+    progress: Callable[[float], None] | None = None,
+    commands_from: int | None = None,
+) -> tuple[list[Estimates], EstimatorState]:
+    """The estimates of ``run``, and the estimator as it stands after the last sample."""
     state = estimator.init(aircraft, settings)
     due = set(np.searchsorted(time, publish_times, side="left").tolist())
     estimates = []
@@ -47,4 +61,4 @@ def run(
             estimates.append(estimate(state, moment))
         if progress is not None and ((i + 1) % REPORT_EVERY == 0 or i + 1 == time.size):
             progress(moment)
-    return estimates
+    return estimates, state

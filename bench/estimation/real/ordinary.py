@@ -17,7 +17,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.record import FlightRecord
-from sysid_node.online.alignment.whole_record import align_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
 from sysid_node.online.replay import run_to_end
 from sysid_node.online.settings import OnlineSettings
