@@ -26,7 +26,6 @@ class ModelProperties:
 
     deflections: Mapping[str, tuple[str, float]]  # by control: property, and rad (the aircraft file's sign) per unit
     thrust: str | None  # of the thrust along the body's x axis, lbf
-    thrust_ratio: float = 1.0  # of the aircraft file's thrust to that of the property, in the steady flight
 
 
 def increments_between(before: Aircraft, after: Aircraft, model: ModelProperties) -> Increments:
@@ -122,7 +121,7 @@ def _propwash(found: Increments, change: Change, aircraft: Aircraft, model: Mode
             pressure = one_over("aero/qbar-psf", "metrics/Sw-sqft")
             found.add(
                 coefficient,
-                slope * change.get("gain", 0.0) * model.thrust_ratio * unit,
+                slope * change.get("gain", 0.0) * unit,
                 *factors,
                 model.thrust,
                 pressure,
@@ -139,7 +138,7 @@ def _slopes(aircraft: Aircraft, control: str) -> list[tuple[str, float]]:
 
 
 def _thrust_scale(found: Increments, change: Change, aircraft: Aircraft, model: ModelProperties) -> None:
-    error = change.get("error", 0.0) * model.thrust_ratio
+    error = change.get("error", 0.0)
     if model.thrust == "forces/fbx-prop-lbs":
         for axis, force in zip("XYZ", "xyz", strict=True):
             found.add(axis, error, f"forces/fb{force}-prop-lbs")
@@ -152,15 +151,15 @@ def _thrust_scale(found: Increments, change: Change, aircraft: Aircraft, model: 
 
 def _thrust_line(found: Increments, change: Change, aircraft: Aircraft, model: ModelProperties) -> None:
     if model.thrust is not None:
-        found.add("M", model.thrust_ratio * metres(change.get("arm", 0.0)), model.thrust)
+        found.add("M", metres(change.get("arm", 0.0)), model.thrust)
 
 
 def _thrust_yaw(found: Increments, change: Change, aircraft: Aircraft, model: ModelProperties) -> None:
     if model.thrust is None:
         return
-    found.add("N", model.thrust_ratio * metres(change.get("arm", 0.0)), model.thrust)
-    found.add("N", model.thrust_ratio * metres(change.get("p_factor", 0.0)), model.thrust, "aero/alpha-rad")
-    found.add("L", model.thrust_ratio * metres(change.get("torque_arm", 0.0)), model.thrust)
+    found.add("N", metres(change.get("arm", 0.0)), model.thrust)
+    found.add("N", metres(change.get("p_factor", 0.0)), model.thrust, "aero/alpha-rad")
+    found.add("L", metres(change.get("torque_arm", 0.0)), model.thrust)
 
 
 _WRITERS: Mapping[str, Callable[[Increments, Change, Aircraft, ModelProperties], None]] = {

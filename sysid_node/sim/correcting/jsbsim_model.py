@@ -184,15 +184,7 @@ def _properties(survey: ModelSurvey, aircraft: Aircraft, root: Element) -> Model
     thrust = "forces/fbx-prop-lbs" if survey.engines else None
     if thrust is None and external is not None:
         thrust = "external_reactions/thrust/magnitude"
-    return ModelProperties(surfaces, thrust, _thrust_ratio(survey, aircraft))
-
-
-def _thrust_ratio(survey: ModelSurvey, aircraft: Aircraft) -> float:
-    """The aircraft file's thrust in the steady flight over the model's: a file holds the slope over the throttle."""
-    throttle = aircraft.throttle
-    if not survey.engines or throttle is None or not throttle.max_thrust or survey.thrust <= 0.0:
-        return 1.0
-    return throttle.max_thrust * survey.steady.state.throttle / survey.thrust
+    return ModelProperties(surfaces, thrust)
 
 
 def _stall(parts: _Parts, increments: Increments, before: Aircraft, after: Aircraft, left_out: dict[str, str]) -> None:

@@ -14,7 +14,7 @@ from sysid_node.aircraft.names import CONTROL_SYMBOLS
 from sysid_node.sim.importing.expansion import TableAxis
 from sysid_node.sim.importing.jsbsim.program import Loads, Program
 from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
-from sysid_node.sim.importing.jsbsim.throttle import thrust_by_throttle
+from sysid_node.sim.importing.jsbsim.throttle import engine_of
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
 Array = NDArray[np.float64]
@@ -44,9 +44,9 @@ class CoefficientModel:
         self._put({}, steady.state.phi)
         self.steady_loads: Loads = program.loads()
         self.mach_per_speed = program.mach / steady.state.airspeed
-        engine = thrust_by_throttle(program, steady.state, self.steady_loads.engine)
-        self.thrust = engine.slope * steady.state.throttle
-        self.inclination, self.arm, self.motor_lag = engine.inclination, engine.arm, engine.lag
+        engine = engine_of(program, steady.state, self.steady_loads.engine)
+        self.thrust, self.inclination = engine.thrust, engine.inclination
+        self.arm, self.motor_lag = engine.arm, engine.lag
         self.unsteady = self._unsteady()
 
     @property
@@ -57,7 +57,7 @@ class CoefficientModel:
         return {**angles, **{symbol: self._steady.deflections[s.name] for symbol, s in self._surfaces.items()}}
 
     def __call__(self, points: Mapping[str, Array]) -> Array:
-        """Coefficients (N, 6): all loads but what the throttle adds, and without terms in the rate of alpha."""
+        """Coefficients (N, 6): all loads but the steady flight's thrust, and without terms in the rate of alpha."""
         size = len(next(iter(points.values())))
         names = list(points)
         rows = np.column_stack([points[name] for name in names])

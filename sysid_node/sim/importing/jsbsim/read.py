@@ -168,10 +168,10 @@ def _notes(
         notes.append(f"Terms of {', '.join(left)} in the rate of alpha are left out; a file has those of CL and Cm.")
     if program.powered:
         notes.append(
-            f"Thrust changes by {model.thrust / steady.state.throttle:.0f} N per unit of throttle at throttle "
-            f"{steady.state.throttle:.2f} and {steady.state.airspeed:.1f} m/s"
+            f"Thrust is {model.thrust:.0f} N at throttle {steady.state.throttle:.2f} and {steady.state.airspeed:.1f} "
+            "m/s, and proportional to the throttle"
             + (f", with a lag of {model.motor_lag:.2f} s" if model.motor_lag else "")
-            + "; what it is beyond that, and how it changes with airspeed, is in the drag and its table over V."
+            + "; how it changes with airspeed is in the tables over V, at this throttle."
         )
     notes.append(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."

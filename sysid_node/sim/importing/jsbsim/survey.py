@@ -48,7 +48,6 @@ class ModelSurvey:
     geometry: tuple[float, float, float]  # m^2, m, m
     cg_in: tuple[float, float, float]  # in JSBSim's structural axes, inches
     engines: int
-    thrust: float  # of the engines in the steady flight, along the x axis, N
 
 
 def survey_model(model: str, airspeed: float | None = None, altitude: float | None = None) -> ModelSurvey:
@@ -106,7 +105,6 @@ def _survey(
         program.geometry,
         cg,
         program.engines,
-        _thrust(program, surfaces, steady),
     )
     return survey, program, aerodynamics
 
@@ -119,14 +117,6 @@ def _steady(
         if found is not None:
             return found
     raise no_trim(files.name, states[0].airspeed)
-
-
-def _thrust(program: Program, surfaces: Sequence[JsbsimSurface], steady: SteadyFlight) -> float:
-    driven: dict[str, float] = {}
-    for surface in surfaces:
-        driven |= surface.at(steady.deflections[surface.name])
-    program.put(steady.state, driven)
-    return float(program.loads().engine[0])
 
 
 def _usual_signs(program: Program, surfaces: Sequence[JsbsimSurface], steady: SteadyFlight) -> list[JsbsimSurface]:

@@ -1,4 +1,4 @@
-"""How a JSBSim model's thrust follows its throttle near a steady flight: its slope, its direction, and its lag."""
+"""How a JSBSim model's thrust follows its throttle near a steady flight: its direction and its lag."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from sysid_node.sim.importing.jsbsim.program import Flight, Program
 
 Array = NDArray[np.float64]
 
-#: Change of the throttle from the steady flight's, both ways, for the slope and for the lag: a turbine changes its
-#: speed at a steady rate, and an ordinary flight moves the throttle little. The least change of thrust, N.
-_STEP, _SMALL, _LEAST = 0.1, 0.02, 1e-6
+#: Change of the throttle from the steady flight's, both ways: a turbine changes its speed at a steady rate, and an
+#: ordinary flight moves the throttle little.
+_STEP = 0.02
 
 #: How long the engine runs before a step of the throttle and is watched after it, s, and how often, Hz.
 _RUNNING, _WATCHED, _RATE = 0.2, 6.0, 50.0
@@ -25,48 +25,26 @@ _SHORTEST = 0.02
 
 @dataclass(frozen=True)
 class Engine:
-    """Thrust in proportion to the throttle: N at 1.0, its angle above the x axis (rad), its arm (m) and its lag (s)."""
+    """Thrust in the steady flight (N), its angle above the x axis (rad), its arm (m) and its lag (s)."""
 
-    slope: float
+    thrust: float
     inclination: float = 0.0
     arm: float = 0.0
     lag: float = 0.0
 
 
-def thrust_by_throttle(program: Program, state: Flight, steady: Array) -> Engine:
-    """The engine near a steady flight, whose load by the engine (6,) is ``steady``; a slope of zero: unpowered.
-
-    The slope is that of the thrust over the throttle. Where the thrust does not grow with the throttle, or is no
-    engine's, it is the steady thrust over the steady throttle.
-    """
-    if not program.powered or state.throttle <= 0.0:
-        return Engine(0.0)
-    proportional = _along(steady, state.throttle)
-    if not program.engines:
-        return proportional
-    low, high = max(state.throttle - _STEP, 0.0), min(state.throttle + _STEP, 1.0)
-    change = _steady_load(program, state, high) - _steady_load(program, state, low)
-    _steady_load(program, state, state.throttle)
-    if change[0] < _LEAST:
-        return proportional
-    return replace(_along(change, high - low), lag=_lag(program, state))
-
-
-def _along(load: Array, throttle: float) -> Engine:
-    thrust = math.hypot(load[0], load[2])
+def engine_of(program: Program, state: Flight, steady: Array) -> Engine:
+    """The engine near a steady flight, whose load by the engine (6,) is ``steady``; no thrust: unpowered."""
+    thrust = math.hypot(steady[0], steady[2]) if program.powered else 0.0
     if thrust <= 0.0:
         return Engine(0.0)
-    return Engine(thrust / throttle, math.atan2(-load[2], load[0]), float(load[4]) / thrust)
-
-
-def _steady_load(program: Program, state: Flight, throttle: float) -> Array:
-    program.put(replace(state, throttle=throttle), {})
-    return program.loads().engine
+    engine = Engine(thrust, math.atan2(-steady[2], steady[0]), float(steady[4]) / thrust)
+    return replace(engine, lag=_lag(program, state)) if program.engines else engine
 
 
 def _lag(program: Program, state: Flight) -> float:
     """Time (s) after which a step of the throttle has changed the thrust by 1 - 1/e of what it does in the end."""
-    low, high = max(state.throttle - _SMALL, 0.0), min(state.throttle + _SMALL, 1.0)
+    low, high = max(state.throttle - _STEP, 0.0), min(state.throttle + _STEP, 1.0)
     flown = [_course(program, state, low, throttle) for throttle in (low, high)]
     change = flown[1] - flown[0]  # the airspeed falls in both flights alike
     late = np.flatnonzero(change >= (1.0 - math.exp(-1.0)) * change[-1])
