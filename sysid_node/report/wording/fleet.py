@@ -28,7 +28,7 @@ def change_words(drift: Drift) -> str:
     """The change in percent of the level before it, or as a number where that level is hardly known."""
     if abs(drift.before) > _SURE * drift.error and not drift.name.endswith("_0"):
         return f"{_signed(100.0 * drift.change / drift.before, 2)}\u202f%"
-    return f"by {_signed(drift.change, 2)}"
+    return f"changed by {_signed(drift.change, 2)}"
 
 
 def drift_words(drift: Drift) -> str:
