@@ -58,8 +58,9 @@ def _live(args: argparse.Namespace) -> None:
 def _scene(args: argparse.Namespace) -> Scene:
     from sysid_node.view.runs import opening  # noqa: PLC0415
 
-    if opening.is_run(args.path):
-        return opening.scene_of(args.path, args.aircraft)
+    folder = opening.run_folder(args.path)
+    if folder is not None:
+        return opening.scene_of(folder, args.aircraft)
     from sysid_node.api.flight_file import load  # noqa: PLC0415
     from sysid_node.view.runs.bag import scene_of_flight  # noqa: PLC0415
 

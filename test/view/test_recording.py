@@ -163,11 +163,13 @@ def test_a_gap_is_shown_as_measured_and_as_simulated(tmp_path: Path) -> None:
         columns |= {
             f"{stage}_{c}": size * np.sin(3 * time) if c == "CL" else zero for c in ("CL", "CD", "CY", "Cl", "Cm", "Cn")
         }
-    write_table(tmp_path / "flights.csv", list(columns), zip(*columns.values(), strict=True))
+    folder = tmp_path / "a_flight_of_a_fleet" / "gap"
+    folder.mkdir(parents=True)
+    write_table(folder / "flights.csv", list(columns), zip(*columns.values(), strict=True))
     gap = {"before": 0.5, "after": 0.1, "noise_floor": 0.1}
     content = {"verdict": "explained", "aircraft": "cdrw", "gap": gap, "causes": [{"label": "stall_separation"}]}
-    (tmp_path / "gap.json").write_text(json.dumps(content))
-    assert main(["view", str(tmp_path), "--save", str(tmp_path / "gap.rrd"), "--quiet"]) == DONE
+    (folder / "gap.json").write_text(json.dumps(content))
+    assert main(["view", str(folder.parent), "--save", str(tmp_path / "gap.rrd"), "--quiet"]) == DONE
     recorded = Recorded(tmp_path / "gap.rrd")
     for body in ("measured", "simulated_aircraft_file", "simulated_corrected"):
         assert f"/world/{body}/body/airframe" in recorded.entities
@@ -184,6 +186,12 @@ def test_a_gap_is_shown_as_measured_and_as_simulated(tmp_path: Path) -> None:
         recorded.vectors(f"/world/measured/body/missing_force{end}", "vectors")[1] for end in ("", "_corrected")
     )
     np.testing.assert_allclose(after, 0.1 * before, atol=1e-6)
+
+
+def test_of_a_whole_fleet_one_flight_must_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "fleet.json").write_text("{}")
+    assert main(["view", str(tmp_path), "--save", str(tmp_path / "fleet.rrd")]) == BAD_INPUT
+    assert "give the folder of one flight" in capsys.readouterr().err
 
 
 def test_a_closed_loop_is_shown(tmp_path: Path) -> None:

@@ -31,9 +31,18 @@ def scene_of(path: Path, aircraft: str | None) -> Scene:
     return scene_of_run(path, chosen)
 
 
-def is_run(path: Path) -> bool:
-    """Whether a path is a folder with the result of a command."""
-    return (path / "gap.json").is_file() or (path / "summary.json").is_file()
+def run_folder(path: Path) -> Path | None:
+    """The folder with the result of a command that a path stands for, or None where it is none.
+
+    A flight of a fleet that was diagnosed and has no report of its own is its diagnosis. Raises InputError for the
+    folder of a whole fleet.
+    """
+    if (path / "fleet.json").is_file():
+        raise InputError(f"{path}: is a whole fleet; give the folder of one flight, in {path / 'flights'}")
+    for folder in (path, path / "gap"):
+        if (folder / "gap.json").is_file() or (folder / "summary.json").is_file():
+            return folder
+    return None
 
 
 def kind_of(folder: Path) -> tuple[str, dict[str, Any]]:
