@@ -41,6 +41,19 @@ def test_a_simulators_file_is_right_within_a_small_share_unless_it_states_tolera
     assert derivative_tolerances(replace(aircraft, ideal=True)) == stated
 
 
+def test_where_derivatives_are_the_cause_reality_may_be_further_off_a_simulators_file(aircraft, plain_model) -> None:
+    """A file that holds its simulator to 2 % says nothing of how well the simulator agrees with reality."""
+    plain = {name: replace(d, tolerance=None) for name, d in aircraft.derivatives.items()}
+    simulators, names = replace(aircraft, derivatives=plain, ideal=True), plain_model.simulator.names
+    found = nuisances_of(simulators, plain_model)
+    place, priors = found.indices.index(names.index("derivative_error.Cm_alpha")), THRESHOLDS.priors
+    size = abs(plain["Cm_alpha"].value)
+    assert found.sigma[place] == pytest.approx(priors.ideal * size)
+    assert found.factors[place] * found.sigma[place] == pytest.approx(priors.widening * priors.reality * size)
+    stated = nuisances_of(aircraft, plain_model)
+    assert set(stated.factors) == {priors.widening}
+
+
 def stating(aircraft, **kind):
     """The aircraft with an effect of each kind among its file's."""
     effects = {
