@@ -40,8 +40,8 @@ ROOMS = {
         "identify",
     ),
     "gap": (
-        "thresholds", "flightdata", "residuals", "estimation", "instruments", "selection", "validation", "verdict",
-        "surrogate", "diagnose", "document", "correction", "reflying",
+        "thresholds", "flightdata", "residuals", "estimation", "instruments", "short_flights", "selection",
+        "validation", "verdict", "surrogate", "diagnose", "document", "correction", "reflying",
     ),
 }  # fmt: skip
 

@@ -15,7 +15,7 @@ from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import Cause
-from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.gap.short_flights.readings import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.validation.standard_errors import standard_errors, with_standard_error
 from sysid_node.gap.verdict.decision import unexplained_share
@@ -147,6 +147,7 @@ def _grounds(cause: Cause) -> dict[str, Any]:
     return {
         "share": cause.share,
         "foretold": evidence.log_bayes_factor,
+        "tolerances": evidence.by_tolerances,
         "misfit": evidence.misfit,
         "pliable": evidence.flexible,
     }

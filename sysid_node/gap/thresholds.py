@@ -146,7 +146,7 @@ class Acceptance:
     joint: float = _threshold(
         4.5,
         "1 sigma",
-        "deviation of all derivatives together from the file from which their tolerances cannot excuse it",
+        "deviation of all derivatives together from the file up to which their tolerances excuse it",
     )
 
     def log_bayes_factor(self, searched: int) -> float:

@@ -31,6 +31,10 @@ _OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.statio
 #: Effects of the structure, which a flight that is compared below all structural modes cannot show.
 _OF_STRUCTURE = frozenset({"structural_mode"})
 
+#: Effects that need the ground. No reading of a flight says how far it is: at one height its effect is that of other
+#: derivatives. They are candidates where the aircraft file states one, and with it the height.
+_OF_GROUND = frozenset({"ground_effect"})
+
 #: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
 _FIXED = frozenset(
     {"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping", "actuator_lag.damping"}
@@ -87,6 +91,7 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
     length = max(model.windows.starts[-1] + model.windows.length for model in models)
     unseen = UNOBSERVABLE | (_OF_VANES if any(model.flight.inferred for model in models) else frozenset())
     unseen |= frozenset() if all(model.flight.metered for model in models) else _OF_THRUST
+    unseen |= _OF_GROUND - frozenset(simulator.aircraft.effects)
     band = min(model.windows.highest for model in models)
     unseen |= _OF_STRUCTURE if band < THRESHOLDS.priors.lowest_mode else frozenset()
     for effect in EFFECTS:

@@ -35,6 +35,9 @@ from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 from sysid_node.gap.thresholds import THRESHOLDS
 
+#: Rounds in which the noise levels of a flight and the step of the unknowns are computed by turns.
+_LEVEL_ROUNDS = 3
+
 
 @dataclass(frozen=True)
 class FlightEvidence:
@@ -174,7 +177,9 @@ def _information_without_shapes(fit: CandidateFit) -> Array:
 def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> Evidence:
     """Evidence of flights that were not fitted.
 
-    The fit's parameters and shared nuisances are kept; biases and clock offsets are each flight's own and unknown.
+    The fit's parameters and shared nuisances are kept; biases and clock offsets are each flight's own and unknown. So
+    is the level of the noise: a flight in other air, or one that shows what no effect describes, is no more certain
+    than what is left of it.
     """
     chosen, shared, _ = fit.sizes
     common = chosen + shared
@@ -184,8 +189,7 @@ def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> E
     for flight in held_out:
         model, kept = flight.model, _kept_nuisances(fit, flight)
         point = transferred_parameters(fit, model)
-        power = np.maximum(_mean_power(fit, model), model.noise)
-        power = np.where(model.axes, power, 1.0)
+        power = np.where(model.axes, np.maximum(_mean_power(fit, model), model.noise), 1.0)
         weight = weights(model.windows, power)
         order = [*fit.indices, *_shared_first(kept)]
         rows = real_rows(model.residual(point), weight)
@@ -194,13 +198,33 @@ def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> E
         information = np.zeros((len(order), len(order)))
         information[:common, :common] = np.linalg.inv(covariance)
         information[common:, common:] = np.diag(kept.sigma[~kept.shared] ** -2.0)
-        groups = window_groups(model)
+        level, groups = noise_levels(rows, slopes, information), window_groups(model)
         for group in groups:
             part = _Group(model, power, rows[group], slopes[group])
-            scores.append(_predictive(part, power, np.zeros(len(order)), information)[0])
+            scores.append(_predictive(part, power * level, np.zeros(len(order)), information)[0])
         exported = exported_parameters(fit, point)
         flights.append(FlightEvidence(model, model.residual(point), (exported,) * len(groups)))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(flights))
+
+
+def noise_levels(rows: Array, slopes: Array, information: Array) -> Array:
+    """Power (12,) by channel of the noise of a flight that was not fitted, in multiples of that which its rows assume.
+
+    ``rows`` (W, R) are its weighted residual, ``slopes`` (W, R, unknowns) those of all unknowns, of which
+    ``information`` is known before. The levels are those at which the flight is most probable, the unknowns moving
+    along (the scale of a normal linear model, profiled out: Seber & Lee (2003), Linear Regression Analysis, sect. 3.5).
+    None is below one: how small noise can be is said by the fit.
+    """
+    J, r = slopes.reshape(-1, slopes.shape[2]), rows.ravel()
+    channel = np.arange(r.size) % len(CHANNELS)
+    count = np.bincount(channel, J.any(axis=1) | (r != 0.0), len(CHANNELS))
+    level = np.ones(len(CHANNELS))
+    for _ in range(_LEVEL_ROUNDS):
+        weight = 1.0 / level[channel]
+        step = solve(information + J.T @ (J * weight[:, None]), J.T @ (r * weight))
+        squares = np.bincount(channel, (r - J @ step) ** 2, len(CHANNELS))
+        level = np.maximum(2.0 * squares / np.maximum(count, 1.0), 1.0)
+    return level
 
 
 def _shared_first(nuisances: Nuisances) -> list[int]:

@@ -60,6 +60,7 @@ class VariableProjection:
         self.indices = list(fit.indices)
         self.centre, self.sigma = prior(fit.simulator, fit.indices)
         self._kept = (b"", np.empty((0, 0)))
+        self.replaces_nuisances = False  # whether a candidate that was added is or replaces some of them
         self._set_free(np.ones(self.now.size, bool), np.zeros(self.now.size))
         self._bind(fit.values)
 
@@ -94,9 +95,10 @@ class VariableProjection:
 
         A nuisance parameter at its limit stays there while the values move alone, and may hold what belongs to them:
         an actuator's bias then moves by a thousandth a round, where the joint step finds it at once. The joint step
-        decides anew which nuisance parameters stand at their limits. Values at which predictions diverge are returned.
+        decides anew which nuisance parameters stand at their limits. Values at which predictions diverge are returned,
+        and those of a problem with a candidate that replaces nuisance parameters, which would move again.
         """
-        if self.free.all():
+        if self.free.all() or self.replaces_nuisances:
             return values
         columns, rows = self._columns(values), self._rows(values) + self.shifted_rows
         cross, corner = self.matrix.T @ columns, columns.T @ columns + np.diag(self.sigma**-2.0)
@@ -145,6 +147,7 @@ class VariableProjection:
             places = nuisances.places(number)
             gone[places] |= fitted | ~np.isin(nuisances.indices, kept)
             neutral[places] |= ~fitted
+        other.replaces_nuisances = bool(gone.any())
         if gone.any():
             other._set_free(self.free & ~gone, np.where(gone, -self.now * neutral, self.shift))
         return other

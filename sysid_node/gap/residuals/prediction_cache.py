@@ -11,6 +11,7 @@ from threading import Lock
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
+from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.flight_path_reconstruction import Flow
 from sysid_node.gap.residuals.lru_cache import LruCache
 from sysid_node.gap.residuals.windowed_spectra import Complex
@@ -32,6 +33,7 @@ class PredictionCache:
         self.readings: LruCache[Complex] = LruCache(_PREDICTIONS)  # (W, L, 6)
         self.flows: LruCache[Flow | None] = LruCache(_PREDICTIONS)
         self.slopes: LruCache[Complex] = LruCache(_SLOPES)  # (W, L, 12, K)
+        self.short_flights: LruCache[Array] = LruCache(_PREDICTIONS)  # (S, R) mean squares by short flight and reading
         self._results: LruCache[Any] = LruCache(_RESULTS)
         self._constants: dict[str, Any] = {}
 

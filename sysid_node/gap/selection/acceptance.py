@@ -6,8 +6,10 @@ accepted where all of these hold:
 1. it is not a time within one sample of the slowest topic, which is a matter of sampling, and not larger than real
    parts show;
 2. with it the explanation predicts flight that was not fitted better, beyond doubt;
-3. on some channel it removes a share of the remainder that matters, and a share of the whole gap comes back without it;
-   or without it the derivatives would have to be off as no tolerances together excuse, and with it they need not;
+3. it matters by one of these: on some channel of forces, moments and kinematics it removes a share of the remainder,
+   and a share of the whole gap comes back without it; it removes such a share of the error of some reading of short
+   simulated flights, in which what an instrument does adds up; or the derivatives are much more probable together with
+   it, by the file's tolerances;
 4. its log Bayes factor, from what the commands predict, makes up for its having been picked from many effects. Gusts
    can imitate the first three, and a model that is not exact repeats its error with every manoeuvre.
 
@@ -51,6 +53,19 @@ class RemainingStructure:
 
     coherent: RemainingPower
     total: Array  # all power that is left without it
+
+
+@dataclass(frozen=True)
+class DerivativeShift:
+    """How far all derivatives together are from the aircraft file."""
+
+    distance: float  # sum of the squared deviations, each in the file's tolerance
+    expected: float  # of that sum, if the tolerances are right
+
+    @property
+    def deviations(self) -> float:
+        """Standard deviations by which the distance exceeds its expectation (chi-squared)."""
+        return (self.distance - self.expected) / float(np.sqrt(2.0 * max(self.expected, 1.0)))
 
 
 class ComparisonScores(Protocol):
@@ -109,8 +124,20 @@ class ComparisonScores(Protocol):
         """Largest of its sizes beyond its standard error, in multiples of what real parts show."""
 
     @property
-    def excuse(self) -> tuple[float, float]:
-        """Deviation of all derivatives together from the file, standard deviations from chance: without and with it."""
+    def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:
+        """Of all derivatives together from the file: without and with the candidate."""
+
+    @property
+    def readings(self) -> RemainingPower:
+        """Mean squares (11,) of the errors of short simulated flights, by reading, on flight not fitted if there is."""
+
+    @property
+    def reading_motion(self) -> Array:
+        """Mean squares (11,) of the measured motion by reading; infinite where a reading is not compared."""
+
+    @property
+    def reading_errors(self) -> Array:
+        """Errors (11,) of the simulator's model on short flights, as shares of the motion."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +157,10 @@ class ComparisonTable:
     searched: int
     simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
     size: float = 0.0
-    excuse: tuple[float, float] = (0.0, 0.0)
+    shifts: tuple[DerivativeShift, DerivativeShift] = (DerivativeShift(0.0, 0.0), DerivativeShift(0.0, 0.0))
+    readings: RemainingPower = RemainingPower(np.zeros(1), np.zeros(1))
+    reading_motion: Array = field(default_factory=lambda: np.full(1, np.inf))
+    reading_errors: Array = field(default_factory=lambda: np.zeros(1))
 
 
 def is_accepted(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -144,18 +174,32 @@ def rejection(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> 
     Scores are read in the order of the rules, so that those of later rules need not be measured.
     """
     limits = thresholds.acceptance
-    if scores.time is not None and abs(scores.time) < scores.sample_period:
-        return "its time is within one sample"
-    if scores.size > limits.plausible:
-        return "no real part is off so far"
+    implausible = _implausibility(scores, thresholds)
+    if implausible is not None:
+        return implausible
     if not predicts_better(scores.probability, thresholds):
         return "it does not predict better beyond doubt"
-    matters = np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap))
-    if not (matters or relieves(scores.excuse, limits)):
+    if not _is_large(scores, limits):
         return "it removes too little"
     if not scores.log_bayes_factor > limits.log_bayes_factor(scores.searched):
         return "what the commands predict does not support it"
     return None
+
+
+def is_relevant(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether a candidate explains what matters (rules 1 and 3), however probable it is.
+
+    What is within one sample, larger than in real parts, or too small to be of interest explains something else than a
+    cause does, and is no alternative to it.
+    """
+    return _implausibility(scores, thresholds) is None and _is_large(scores, thresholds.acceptance)
+
+
+def _implausibility(scores: ComparisonScores, thresholds: Thresholds) -> str | None:
+    """What of rule 1 the candidate fails, in words; none where it passes."""
+    if scores.time is not None and abs(scores.time) < scores.sample_period:
+        return "its time is within one sample"
+    return "no real part is off so far" if scores.size > thresholds.acceptance.plausible else None
 
 
 def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -163,13 +207,41 @@ def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> 
     return probability > thresholds.acceptance.probability
 
 
-def relieves(excuse: tuple[float, float], limits: Acceptance = THRESHOLDS.acceptance) -> bool:
-    """Whether the derivatives would be off together as their tolerances cannot excuse, and are not with the candidate.
+def _is_large(scores: ComparisonScores, limits: Acceptance) -> bool:
+    """Whether the candidate matters by any of the measures of rule 3, the cheapest first."""
+    if np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap)):
+        return True
+    return relieves(scores.shifts, scores.searched, limits) or bool(readings_improved(scores, limits).any())
 
-    A mass that is a fifth off shifts every coefficient by two tolerances. Each alone is excused; that all are is not.
+
+def relieves(
+    shifts: tuple[DerivativeShift, DerivativeShift], searched: int, limits: Acceptance = THRESHOLDS.acceptance
+) -> bool:
+    """Whether the derivatives' joint prior favours the candidate beyond doubt, and they are plausible with it.
+
+    A mass that is a fifth off shifts every coefficient by two tolerances. Each alone is excused; that all are is not:
+    so many independent draws are less probable than one common cause. The logarithm of the ratio of the two joint prior
+    densities is half the difference of the squared distances, each beyond its expectation.
     """
-    without, with_it = excuse
-    return without > limits.joint and with_it < min(0.5 * without, limits.joint)
+    return nats_by_tolerances(shifts, limits) > limits.log_bayes_factor(searched)
+
+
+def nats_by_tolerances(
+    shifts: tuple[DerivativeShift, DerivativeShift], limits: Acceptance = THRESHOLDS.acceptance
+) -> float:
+    """Nats by which the derivatives' joint prior favours the candidate; zero where they are not plausible with it."""
+    without, with_it = (shift.distance - shift.expected for shift in shifts)
+    return 0.5 * (without - with_it) if shifts[1].deviations < limits.joint else 0.0
+
+
+def readings_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
+    """Readings (11,) of short flights on which the candidate removes enough of the error to matter.
+
+    What an instrument does is small in forces and moments, and in what an observer predicts that follows the readings.
+    In a flight of some seconds from a state that was read wrongly it adds up.
+    """
+    least = np.sqrt(limits.noticeable_error**2 + scores.reading_errors**2)
+    return _matters(scores.readings, 1.0, scores.reading_motion, least, limits)
 
 
 def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:

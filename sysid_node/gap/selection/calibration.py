@@ -5,6 +5,10 @@ evidence of the nearest candidate grows with the amount of data, and no such num
 (1994), Bayesian Theory, sect. 6.1: the M-open case). A cause whose equation is refuted by what it leaves therefore has
 no probability, and for the others the log Bayes factor is calibrated by a logistic regression over causes whose truth
 was known (Platt (1999), Advances in Large Margin Classifiers). ``bench/gap/calibration_weights.py`` learns its weights.
+
+What the tolerances of the aircraft file say is another kind of evidence. That all derivatives are off together as one
+cause has them is improbable by the joint prior alone, and this does not grow with the amount of data. So much of the
+log Bayes factor counts as it is, against as many effects as were searched (Bonferroni).
 """
 
 from __future__ import annotations
@@ -25,6 +29,8 @@ class CauseEvidence:
     misfit: float  # amplitude of what is left and depends on the cause, as a share of what the cause does
     flexible: bool  # the effect acts as other values of the file's derivatives
     windows: float = THRESHOLDS.calibration.windows  # in which the commands excite the flights (effective number)
+    by_tolerances: float = 0.0  # nats of it that the joint prior of the derivatives gives
+    searched: int = 1  # number of effects that the cause was picked from
 
 
 def evidence_of(
@@ -32,11 +38,18 @@ def evidence_of(
     log_bayes_factor: float,
     tested: Misspecification,
     windows: float,
+    by_tolerances: float = 0.0,
+    searched: int = 1,
     thresholds: Thresholds = THRESHOLDS,
 ) -> CauseEvidence:
-    """The evidence of an effect from its log Bayes factor (nats) and the test of its equation."""
+    """The evidence of an effect from its log Bayes factor (nats) and the test of its equation.
+
+    ``by_tolerances`` (nats) is what the derivatives' joint prior says for it, of which no more counts than the log
+    Bayes factor, in which the effect's own prior is.
+    """
     flexible = effect in thresholds.calibration.flexible_effects
-    return CauseEvidence(log_bayes_factor, misfit_of(tested, thresholds), flexible, windows)
+    prior = max(min(by_tolerances, log_bayes_factor), 0.0)
+    return CauseEvidence(log_bayes_factor, misfit_of(tested, thresholds), flexible, windows, prior, searched)
 
 
 def misfit_of(tested: Misspecification, thresholds: Thresholds = THRESHOLDS) -> float:
@@ -81,5 +94,9 @@ def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:
 
 
 def _probability_by_support(evidence: CauseEvidence, thresholds: Thresholds) -> float:
-    """The logistic regression's probability, whatever the misfit."""
-    return 1.0 / (1.0 + float(np.exp(-np.dot(thresholds.calibration.weights, regressors(evidence)))))
+    """The larger of the logistic regression's probability and that by the tolerances, whatever the misfit."""
+    log_odds = float(np.dot(thresholds.calibration.weights, regressors(evidence)))
+    by_tolerances = evidence.by_tolerances - float(np.log(evidence.searched))
+    if evidence.by_tolerances > 0.0:
+        log_odds = max(log_odds, by_tolerances + thresholds.calibration.flexible * evidence.flexible)
+    return 1.0 / (1.0 + float(np.exp(-log_odds)))

@@ -19,10 +19,11 @@ from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.residuals.excited_axes import excited_windows
+from sysid_node.gap.selection.acceptance import is_relevant, nats_by_tolerances
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
 from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, evidence_of, prior_odds
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
-from sysid_node.gap.selection.comparison import Comparison, power_left
+from sysid_node.gap.selection.comparison import Comparison, derivative_shift, power_left
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.misspecification import misspecification_of
 from sysid_node.gap.selection.retention import (
@@ -33,6 +34,7 @@ from sysid_node.gap.selection.retention import (
     successor,
 )
 from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.sim import EFFECTS
 
 #: Effects by which the commands are late against the IMU's clock.
 _COMMANDS_CLOCK = frozenset({"command_delay", "actuator_stamp_delay"})
@@ -81,7 +83,7 @@ def select_causes(
     while True:
         excluded = frozenset(cause.candidate.label for cause in doubted)
         chosen, positions = replace_stepwise(fitter, base, chosen, stages, always, excluded | challenged)
-        causes = [_weighed(fitter, chosen, position, excluded) for position in positions]
+        causes = [_weighed(fitter, base, chosen, position, excluded) for position in positions]
         challenge = next_challenge([cause.table for cause in causes], challenged)
         if challenge is None:
             causes = [_with_late_imu(cause, chosen) for cause in causes]
@@ -150,28 +152,31 @@ def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> Ca
     """The evidence of a candidate that one fitted set has and another has not."""
     factor = log_bayes_factor(fitted.fit, without.fit)
     windows = excited_windows(fitted.fit.models)
-    return evidence_of(candidate.effect, factor, misspecification_of(fitted.fit, candidate), windows)
+    by_tolerances = nats_by_tolerances((derivative_shift(without.fit), derivative_shift(fitted.fit)))
+    tested = misspecification_of(fitted.fit, candidate)
+    return evidence_of(candidate.effect, factor, tested, windows, by_tolerances, len(EFFECTS))
 
 
 def _weighed(
-    fitter: CandidateFitter, chosen: FittedSet, position: CauseAlternatives, excluded: frozenset[str]
+    fitter: CandidateFitter, base: FittedSet, chosen: FittedSet, position: CauseAlternatives, excluded: frozenset[str]
 ) -> Cause:
     """A cause with its share of the probability, summed over all sets of effects that were fitted with it.
 
     An alternative counts only as far as it does not predict still better beside the cause: effects that add up are no
     alternatives (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
-    Alternatives whose labels are ``excluded`` are left out.
+    Alternatives whose labels are ``excluded`` are left out, and so are those that explain nothing that matters.
     """
     candidate, without = position.candidate, position.without
     left_out = excluded | {candidate.label}
-    rivals = [(each, each.added) for each in position.alternatives if each.added and each.added.label not in left_out]
-    fitted = [each for each, _ in rivals]
-    in_its_place = _shares([chosen], fitted)[1:]
-    strong = [added for (_, added), share in zip(rivals, in_its_place, strict=True)
-              if share > THRESHOLDS.search.tried_beside]  # fmt: skip
-    beside = [fitter.add_candidate(chosen, added) for added in strong if added.effect != candidate.effect]
+    known = [each for each in position.alternatives if each.added and each.added.label not in left_out]
+    in_its_place = zip(known, _shares([chosen], known)[1:], strict=True)
+    strong = [each for each, share in in_its_place if share > THRESHOLDS.search.tried_beside]
+    idle = [each for each in strong if not is_relevant(Comparison(base, without, each))]
+    fitted = [each for each in known if not any(each is other for other in idle)]
+    added = [each.added for each in strong if not any(each is other for other in idle) and each.added]
+    beside = [fitter.add_candidate(chosen, new) for new in added if new.effect != candidate.effect]
     sets = [chosen, *(each for each in beside if each is not None)]
-    effects = [added.effect for _, added in rivals]
+    effects = [each.added.effect for each in fitted if each.added]
     odds = [*[prior_odds(candidate.effect)] * len(sets), *(prior_odds(effect) for effect in effects), 1.0]
     share, alternatives = shares_by_effect(candidate.effect, effects, _shares(sets, [*fitted, without]), np.array(odds))
     return Cause(

@@ -14,7 +14,8 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
 from sysid_node.gap.estimation.candidates import TIME_EFFECTS
-from sysid_node.gap.estimation.predictive_density import Evidence, probabilities
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
+from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, exported_parameters, probabilities
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.instruments.overidentification import overidentification_of
@@ -22,8 +23,9 @@ from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.excited_axes import excited_channels
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
+from sysid_node.gap.selection.acceptance import ComparisonTable, DerivativeShift, RemainingPower, RemainingStructure
 from sysid_node.gap.selection.fitted_set import FittedSet
+from sysid_node.gap.short_flights.readings import READINGS, reading_errors, reading_motion
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
 
@@ -148,32 +150,58 @@ class Comparison:
         return float(np.max((changes - 2.0 * errors) / fit.simulator.scales[sizes], initial=0.0))
 
     @cached_property
-    def excuse(self) -> tuple[float, float]:
-        """Deviations of all derivatives together from the file without and with what was added."""
-        return joint_deviation(self.without.fit), joint_deviation(self.fitted.fit)
+    def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:
+        """How far all derivatives together are from the file without and with what was added."""
+        return derivative_shift(self.without.fit), derivative_shift(self.fitted.fit)
+
+    @cached_property
+    def readings(self) -> RemainingPower:
+        """Mean squares (11,) of the errors of short flights: on flights held out, without these on those fitted."""
+        return RemainingPower(*(reading_errors(_flown(each)) for each in (self.without, self.fitted)))
+
+    @cached_property
+    def reading_motion(self) -> Array:
+        """Mean squares (11,) of the motion by reading on the same flights."""
+        return reading_motion([flight.model for flight in _flown(self.fitted)])
+
+    @property
+    def reading_errors(self) -> Array:
+        """Errors (11,) of the simulator's model on short flights, as shares of the motion."""
+        known = [model.reading_errors for model in self.fitted.fit.models]
+        return np.array([max(errors.get(name, 0.0) for errors in known) for name in READINGS])
 
     def table(self) -> ComparisonTable:
         """All scores as plain values."""
         return ComparisonTable(**{entry.name: getattr(self, entry.name) for entry in fields(ComparisonTable)})
 
 
-def joint_deviation(fit: CandidateFit) -> float:
-    """Standard deviations by which the derivatives' squared distance from the file exceeds what tolerances give.
+def derivative_shift(fit: CandidateFit) -> DerivativeShift:
+    """How far the derivatives are from the file, in the file's tolerances, however wide a candidate makes their priors.
 
-    The distance is in tolerances. Of a derivative that the flights determine its expectation is one, of another the
-    share of its prior's variance that they take away (the prior predictive check of Box (1980), J. R. Stat. Soc. A
-    143(4), for the parameters).
+    Of a derivative that the flights determine the expectation of its square is one, of another the share of its prior's
+    variance that they take away (the prior predictive check of Box (1980), J. R. Stat. Soc. A 143(4), for parameters).
     """
     assert fit.information is not None
     now, spread, _ = fit.stacked
-    shared = int(fit.nuisances.shared.sum())
-    names = [fit.simulator.names[i] for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-    places = [k for k, name in enumerate(names[:shared]) if name.startswith("derivative_error")]
-    variance = np.diag(fit.covariance)[len(fit.indices) :]
-    known = np.clip(1.0 - variance[places] / spread[places] ** 2, 0.0, 1.0)
-    expected = float(known.sum())
-    distance = float(np.sum((now[places] / spread[places]) ** 2))
-    return (distance - expected) / float(np.sqrt(2.0 * max(expected, 1.0)))
+    shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    places = [k for k, i in enumerate(shared) if fit.simulator.names[i].startswith(DERIVATIVE_ERROR)]
+    widened = np.isin([shared[k] for k in places], fit.widened)
+    factors = np.where(widened, fit.nuisances.factors_of_shared[places], 1.0) if widened.any() else 1.0
+    variance = np.diag(fit.covariance)[len(fit.indices) :][places]
+    known = np.clip(1.0 - variance / spread[places] ** 2, 0.0, 1.0)
+    return DerivativeShift(float(np.sum((now[places] / (spread[places] / factors)) ** 2)), float(known.sum()))
+
+
+def _flown(fitted: FittedSet) -> list[FlightEvidence]:
+    """Flights on which short flights are simulated: those held out, else those fitted, each with one set of parameters.
+
+    The size of an effect is asked for here, not whether it is there. Therefore parts of the fitted flights need not be
+    predicted from the others, which would take as many simulations.
+    """
+    fit = fitted.fit
+    held_out = fitted.evidence.flights[len(fit.flights) :]
+    own = (FlightEvidence.throughout(f.model, exported_parameters(fit, f.point)) for f in fit.flights)
+    return list(held_out or own)
 
 
 def probability_against(fitted: FittedSet, other: FittedSet) -> float:

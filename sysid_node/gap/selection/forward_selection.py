@@ -24,10 +24,11 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import is_accepted, predicts_better, relieves
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
-from sysid_node.gap.selection.comparison import Comparison, joint_deviation, probability_against
+from sysid_node.gap.selection.comparison import Comparison, derivative_shift, probability_against
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.screening import best_screened, with_found_onsets
 from sysid_node.gap.thresholds import THRESHOLDS
+from sysid_node.sim import EFFECTS
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,8 @@ class Attribution:
 
     @property
     def relieves_derivatives(self) -> bool:
-        """Whether the derivatives are plausible together beside the causes, and are not without them."""
-        return relieves((joint_deviation(self.base.fit), joint_deviation(self.chosen.fit)))
+        """Whether the derivatives are plausible together beside the causes, and much less so without them."""
+        return relieves((derivative_shift(self.base.fit), derivative_shift(self.chosen.fit)), len(EFFECTS))
 
     def as_in_file(self) -> Attribution:
         """The same with the aircraft file as the corrected fit: where fitted derivatives predict worse."""

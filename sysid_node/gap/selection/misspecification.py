@@ -5,19 +5,28 @@ contribution to each channel, rectified, weighted by its own size and weighted b
 remainder. These are the added regressors of Ramsey (1969), J. R. Stat. Soc. B 31(2), and a score test for parameters
 that are not constant (Nyblom (1989), J. Am. Stat. Assoc. 84). A gyro that saturates is not a gyro with a scale error,
 although a scale error explains most of it.
+
+In moving air the remainder is weather, which comes in bursts, and an autopilot moves the surfaces most where the air
+moves most. A remainder and a contribution that are large together are correlated by chance, more than a remainder of
+constant power is. What chance explains is therefore measured there from the scatter between groups of windows
+(White (1980), Econometrica 48(4); by clusters: Liang & Zeger (1986), Biometrika 73(1)).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit
 from sysid_node.gap.estimation.candidates import Candidate
+from sysid_node.gap.estimation.predictive_density import window_groups
 from sysid_node.gap.estimation.spectral_weights import real_rows
 from sysid_node.gap.instruments.moment_equations import weights_without_mean
+from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 
@@ -34,23 +43,32 @@ class Misspecification:
     deviations: Array  # standard deviations by which that exceeds chance
 
 
+class Explained(NamedTuple):
+    """What added regressors explain of a remainder: the sum of squares, and its mean and variance by chance."""
+
+    squares: float
+    mean: float
+    variance: float
+
+
 def misspecification_of(fit: CandidateFit, candidate: Candidate) -> Misspecification:
     """The tests of one of a fit's candidates over its flights; all unknowns of the fit are free to move."""
-    contributed, explained, added = (np.zeros(len(CHANNELS)) for _ in range(3))
+    contributed, explained, mean, variance = (np.zeros(len(CHANNELS)) for _ in range(4))
     for flight in fit.flights:
         contribution = _contribution(flight.model, flight.point, candidate)
         for axis in np.flatnonzero(flight.model.axes & (contribution.std(axis=0) > 0.0)):
-            power, sum_of_squares, count = _tested(fit, flight, contribution[:, axis], int(axis))
+            power, found = _tested(fit, flight, contribution[:, axis], int(axis))
             contributed[axis] += power
-            explained[axis] += sum_of_squares
-            added[axis] += count
-    beyond = explained - added
-    deviations = beyond / np.sqrt(2.0 * np.maximum(added, 1.0))
+            explained[axis] += found.squares
+            mean[axis] += found.mean
+            variance[axis] += found.variance
+    beyond = explained - mean
+    deviations = beyond / np.sqrt(np.maximum(variance, 2.0))
     return Misspecification(contributed, np.maximum(beyond, 0.0), deviations)
 
 
-def _tested(fit: CandidateFit, flight: FlightFit, contribution: Array, axis: int) -> tuple[float, float, int]:
-    """Of one flight and channel: the contribution's power, what added regressors explain, and how many these are.
+def _tested(fit: CandidateFit, flight: FlightFit, contribution: Array, axis: int) -> tuple[float, Explained]:
+    """Of one flight and channel: the contribution's power, and what added regressors explain.
 
     All zero where the contribution (N,) is too small to be tested.
     """
@@ -62,11 +80,15 @@ def _tested(fit: CandidateFit, flight: FlightFit, contribution: Array, axis: int
     series = (contribution, *_added_regressors(contribution, model.record.time))
     whole, *added = (_rows(model, each, weight[:, axis]) for each in series)
     if whole @ whole < THRESHOLDS.calibration.least_power:
-        return 0.0, 0.0, 0
+        return 0.0, Explained(0.0, 0.0, 0.0)
     unknowns = slopes.reshape(*residual.shape, slopes.shape[2])[:, :, axis] * kept[:, None]
     J = unknowns.reshape(-1, slopes.shape[2])
-    squares = _explained(np.column_stack(added), (residual[:, :, axis] * kept).ravel(), J, fit.information)
-    return float(whole @ whole), squares, len(added)
+    remainder = (residual[:, :, axis] * kept).ravel()
+    groups = np.zeros(model.windows.count, int)
+    for number, group in enumerate(window_groups(model)):
+        groups[group] = number
+    clusters = np.repeat(groups, remainder.size // groups.size) if is_gusty(model) else None
+    return float(whole @ whole), explained_by(np.column_stack(added), remainder, J, fit.information, clusters)
 
 
 def _contribution(model: ResidualModel, point: Array, candidate: Candidate) -> Array:
@@ -88,13 +110,26 @@ def _rows(model: ResidualModel, series: Array, weight: Array) -> Array:
     return real_rows(model.windows.transform(series[:, None]), weight[:, None]).ravel()
 
 
-def _explained(added: Array, remainder: Array, slopes: Array, information: Array) -> float:
-    """Sum of squares by which a remainder (R,) falls with added regressors (R, m), the unknowns moving along.
+def explained_by(
+    added: Array, remainder: Array, slopes: Array, information: Array, clusters: NDArray[np.intp] | None = None
+) -> Explained:
+    """What added regressors (R, m) explain of a remainder (R,), the unknowns moving along.
 
-    The remainder is that of a fit, so that its gradient in the unknowns is zero.
+    The remainder is that of a fit, so that its gradient in the unknowns is zero. Chance is that of a remainder whose
+    power is one throughout; with ``clusters`` (R,), numbers of groups that are independent of each other, at least that
+    by which the gradient scatters from group to group.
     """
     crossed = added.T @ slopes
-    free = added.T @ added - crossed @ np.linalg.solve(information, crossed.T)
-    gradient = added.T @ remainder
+    shares = np.linalg.solve(information, crossed.T)
+    free = added.T @ added - crossed @ shares
     ridge = _RIDGE * np.trace(added.T @ added) / added.shape[1] * np.eye(added.shape[1])
-    return float(gradient @ np.linalg.solve(free + ridge, gradient))
+    inverse = np.linalg.inv(free + ridge)
+    gradient, count = added.T @ remainder, float(added.shape[1])
+    squares, mean, variance = float(gradient @ inverse @ gradient), count, 2.0 * count
+    if clusters is not None and (groups := int(clusters.max()) + 1) > 1:
+        parts = np.zeros((groups, added.shape[1]))
+        np.add.at(parts, clusters, (added - slopes @ shares) * remainder[:, None])
+        parts = parts - parts.mean(axis=0)
+        scatter = inverse @ (parts.T @ parts) * groups / (groups - 1)
+        mean, variance = max(mean, float(np.trace(scatter))), max(variance, 2.0 * float(np.trace(scatter @ scatter)))
+    return Explained(squares, mean, variance)

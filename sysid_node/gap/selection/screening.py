@@ -65,7 +65,24 @@ def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidat
             deviance = extended.deviance(left)
             if deviance < best.deviance:
                 best = Screened(deviance, candidate, tuple(tried[fit.values.size :].tolist()))
-    return best
+    return _with_derivatives_released(fit, problem, best)
+
+
+def _with_derivatives_released(fit: CandidateFit, problem: VariableProjection, found: Screened) -> Screened:
+    """The candidate screened as before, or after a joint step with nuisance parameters that stand at their limits.
+
+    One cause that shifts all derivatives, as another mass does, takes nothing away as long as these stay at the limits
+    to which they went in its absence.
+    """
+    if problem.free.all() or not np.isfinite(found.deviance):
+        return found
+    extended = problem.with_candidate(found.candidate)
+    limits = bounds(fit.simulator, (*fit.indices, *found.candidate.indices))
+    values = extended.joint_start(np.concatenate([fit.values, found.start]), *limits)
+    deviance = extended.deviance(extended.residual(values))
+    if not deviance < found.deviance:
+        return found
+    return Screened(deviance, found.candidate, tuple(values[fit.values.size :].tolist()))
 
 
 def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Thresholds = THRESHOLDS) -> list[ScreenedPair]:

@@ -20,8 +20,8 @@ from sysid_node.gap.residuals.flight_path_reconstruction import InstrumentReadin
 from sysid_node.gap.residuals.predictions import kinematic_parameters
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.residuals.sensor_noise import with_added_noise
+from sysid_node.gap.short_flights.multiple_shooting import Course, simulate_beside, simulation_error
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.gap.validation.multiple_shooting import Course, simulate_beside, simulation_error
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.signals.dryden import Dryden
 

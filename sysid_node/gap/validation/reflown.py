@@ -22,14 +22,9 @@ from sysid_node.dynamics.lever_arm import specific_force_at, velocity_at
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.validation.multiple_shooting import Beginnings, beginnings, without_jumps
-from sysid_node.gap.validation.simulation_error import (
-    SideBySide,
-    can_be_simulated,
-    course_of_flight,
-    gap_of_errors,
-    mean_squares,
-)
+from sysid_node.gap.short_flights.multiple_shooting import Beginnings, beginnings, without_jumps
+from sysid_node.gap.short_flights.readings import can_be_simulated, course_of_flight
+from sysid_node.gap.validation.simulation_error import SideBySide, gap_of_errors, mean_squares
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.sim.effects import EFFECTS
 from sysid_node.sim.model.chain import Chain

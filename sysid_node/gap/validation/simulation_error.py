@@ -14,37 +14,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.names import LONGITUDINAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import Evidence, window_groups
-from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.residuals.excited_axes import excited_motions, of_motions
-from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.short_flights.multiple_shooting import Course, simulate_beside, simulation_error
+from sysid_node.gap.short_flights.readings import (
+    READINGS,
+    can_be_simulated,
+    compared,
+    course_of_flight,
+    errors_by_group,
+    motion,
+    noise_power,
+    squares,
+)
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.gap.validation.multiple_shooting import Course, course_of, simulate_beside, simulation_error
 from sysid_node.gap.validation.noise_floor import noise_floor_errors
 from sysid_node.gap.validation.spectral_error import STAGES, Gap, gap_from
 from sysid_node.gap.validation.standing import weather_accounts_for
-from sysid_node.sim.model.layout import OUTPUTS
-
-#: Length of a short flight, s: one or two short periods of a small aircraft, too short for drift to matter.
-WINDOW = 2.0
-
-#: Readings that are compared. Heading is left out, because it is the integral of the yaw rate.
-READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
-
-_COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
-
-#: The sensor of each reading, by its name in the aircraft file.
-_SENSOR_OF = {
-    **dict.fromkeys(("ax", "ay", "az"), "accel"),
-    **dict.fromkeys("pqr", "gyro"),
-    **dict.fromkeys(("phi", "theta"), "attitude"),
-    "V": "airspeed",
-    "alpha": "alpha",
-    "beta": "beta",
-}
 
 #: Bootstrap draws, and length of a block in short flights.
 _DRAWS, _BLOCK = 2000, 2
@@ -84,17 +72,12 @@ def gap_of_errors(models: Sequence[ResidualModel], tables: Sequence[Array]) -> G
     """
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return None
-    motion, noise, *errors = np.concatenate(tables, axis=1)
-    flights = [model.flight for model in models]
-    lateral = all(flight.lateral for flight in flights)
-    unread = {angle for flight in flights for angle in flight.inferred}
-    unread |= thrust.THRUST_READINGS if any(not flight.metered for flight in flights) else set()
-    counted = np.array([(lateral or name in LONGITUDINAL_SIGNALS) and name not in unread for name in READINGS])
-    counted &= of_motions(READINGS, excited_motions(models))
-    counted &= motion.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
+    moving, noise, *errors = np.concatenate(tables, axis=1)
+    counted = compared(models)
+    counted &= moving.mean(axis=0) > THRESHOLDS.validation.motion * noise.mean(axis=0)
     if not counted.any():
         return None
-    return _summary(motion[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
+    return _summary(moving[:, counted], np.array(errors)[:, :, counted], np.array(READINGS)[counted].tolist())
 
 
 def weather_suffices(models: Sequence[ResidualModel]) -> bool:
@@ -118,29 +101,25 @@ def error_shares(models: Sequence[ResidualModel], noise: Mapping[str, float]) ->
     """
     motions, errors = [np.empty((0, len(READINGS)))], [np.empty((0, len(READINGS)))]
     for model in filter(can_be_simulated, models):
-        course, neutral = course_of(model, _size(model)), model.simulator.neutral()
-        measured = _cut(model, simulate_beside(model, neutral, course)[1])
-        motions.append(((measured - measured.mean(axis=1, keepdims=True)) ** 2).mean(axis=1))
-        errors.append(_squares(model, simulation_error(model, neutral, course)))
-    motion, error = (np.concatenate(parts) for parts in (motions, errors))
-    if not len(motion) or not np.isfinite(error).all():
+        course, neutral = course_of_flight(model), model.simulator.neutral()
+        motions.append(motion(model, simulate_beside(model, neutral, course)[1]))
+        errors.append(squares(model, simulation_error(model, neutral, course)))
+    moving, error = (np.concatenate(parts) for parts in (motions, errors))
+    if not len(moving) or not np.isfinite(error).all():
         return {}
-    least = THRESHOLDS.validation.motion * np.array([noise[_SENSOR_OF[name]] for name in READINGS]) ** 2
-    shares = np.sqrt(error.mean(axis=0) / np.maximum(motion.mean(axis=0), 1e-300))
-    moved = motion.mean(axis=0) > least
+    least = THRESHOLDS.validation.motion * noise_power(noise)
+    shares = np.sqrt(error.mean(axis=0) / np.maximum(moving.mean(axis=0), 1e-300))
+    moved = moving.mean(axis=0) > least
     return {name: float(share) for name, share, counts in zip(READINGS, shares, moved, strict=True) if counts}
-
-
-def can_be_simulated(model: ResidualModel) -> bool:
-    """Whether short flights can be simulated: attitude was measured, and the flight is long enough."""
-    return motion_of(model.record) is not None and len(model.record) >= _size(model)
 
 
 def side_by_side(model: ResidualModel, points: Sequence[Array]) -> SideBySide:
     """A flight with its simulation by the file and as corrected; ``points`` are parameters (P,) by group of windows."""
     course, neutral = course_of_flight(model), model.simulator.neutral()
     _, measured, _ = simulate_beside(model, neutral, course)
-    before, after = (measured - e for e in (simulation_error(model, neutral, course), _errors(model, points, course)))
+    before, after = (
+        measured - e for e in (simulation_error(model, neutral, course), errors_by_group(model, points, course))
+    )
     return SideBySide(model.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
 
 
@@ -186,7 +165,7 @@ def _table(model: ResidualModel, base: Sequence[Array], final: Sequence[Array]) 
     """Mean squares as for ``gap_of_errors``, by parameters (P,) of each group of windows without and with causes."""
     course, neutral = course_of_flight(model), model.simulator.neutral()
     measured = simulate_beside(model, neutral, course)[1]
-    errors = [_errors(model, points, course) for points in ([neutral] * len(base), base, final)]
+    errors = [errors_by_group(model, points, course) for points in ([neutral] * len(base), base, final)]
     return mean_squares(model, final[len(final) // 2], course, measured, errors)
 
 
@@ -195,53 +174,9 @@ def mean_squares(model: ResidualModel, theta: Array, course: Course, measured: A
 
     The noise floor is that of parameters (P,).
     """
-    by_flight = _cut(model, measured)
     floors, noise = zip(*noise_floor_errors(model, theta, course), strict=True)
-    motion = ((by_flight - by_flight.mean(axis=1, keepdims=True)) ** 2).mean(axis=1)
-    sensors = np.mean([_squares(model, each) for each in noise], axis=0)
-    squares = [_squares(model, error) for error in errors]
-    unknown = np.array([model.reading_errors.get(name, 0.0) for name in READINGS]) ** 2 * motion
-    return np.stack([motion, sensors, *squares, *(_squares(model, floor) + unknown for floor in floors)])
-
-
-def course_of_flight(model: ResidualModel) -> Course:
-    """The course of a flight that is simulated in short flights."""
-    return course_of(model, _size(model))
-
-
-def _errors(model: ResidualModel, points: Sequence[Array], course: Course) -> Array:
-    """Measured minus simulated (N, 12), each short flight with the parameters of its group of windows."""
-    size, windows = _size(model), model.windows
-    edges = [windows.slices[group[0]].start + windows.size / 4 for group in window_groups(model)][1:]
-    middles = np.arange(len(model.record)) // size * size + size // 2
-    group_of = np.searchsorted(np.array(edges), middles, side="right")
-    error = np.empty((len(model.record), len(OUTPUTS)))
-    for groups, theta in _distinct(points):
-        chosen = np.isin(group_of, groups)
-        error[chosen] = simulation_error(model, theta, course)[chosen]
-    return error
-
-
-def _distinct(points: Sequence[Array]) -> list[tuple[list[int], Array]]:
-    """Distinct parameters (P,), each with the indices of the groups that have them."""
-    places: dict[bytes, list[int]] = {}
-    for place, point in enumerate(points):
-        places.setdefault(np.ascontiguousarray(point).tobytes(), []).append(place)
-    return [(groups, points[groups[0]]) for groups in places.values()]
-
-
-def _size(model: ResidualModel) -> int:
-    """Samples of a short flight."""
-    return round(WINDOW * model.simulator.rate)
-
-
-def _cut(model: ResidualModel, series: Array) -> Array:
-    """A series (N, 12) by short flight (S, samples, R)."""
-    size = _size(model)
-    count = len(series) // size
-    return np.asarray(series[: count * size, _COLUMNS].reshape(count, size, len(_COLUMNS)))
-
-
-def _squares(model: ResidualModel, series: Array) -> Array:
-    """Mean squares (S, R) of a series (N, 12) by short flight."""
-    return np.asarray((_cut(model, series) ** 2).mean(axis=1))
+    moving = motion(model, measured)
+    sensors = np.mean([squares(model, each) for each in noise], axis=0)
+    powers = [squares(model, error) for error in errors]
+    unknown = np.array([model.reading_errors.get(name, 0.0) for name in READINGS]) ** 2 * moving
+    return np.stack([moving, sensors, *powers, *(squares(model, floor) + unknown for floor in floors)])

@@ -21,7 +21,8 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
-from sysid_node.gap.validation.simulation_error import can_be_simulated, side_by_side
+from sysid_node.gap.short_flights.readings import can_be_simulated
+from sysid_node.gap.validation.simulation_error import side_by_side
 from sysid_node.report.files.run_tables import read_columns
 from sysid_node.sim.model.layout import OUTPUTS
 

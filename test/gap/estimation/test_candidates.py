@@ -7,7 +7,7 @@ import pytest
 
 from sysid_node.gap.estimation.candidates import PER_CONTROL, UNOBSERVABLE, Candidate, candidates_of
 from sysid_node.gap.residuals.parameter_priors import bounds
-from sysid_node.sim import EFFECTS
+from sysid_node.sim import EFFECTS, Simulator
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +16,14 @@ def candidates(plain_model) -> list[Candidate]:
 
 
 def test_every_effect_that_a_flight_can_show_is_a_candidate(candidates) -> None:
-    assert {c.effect for c in candidates} == EFFECTS.keys() - UNOBSERVABLE
+    assert {c.effect for c in candidates} == EFFECTS.keys() - UNOBSERVABLE - {"ground_effect"}
+
+
+def test_the_ground_is_a_candidate_where_the_file_says_how_far_it_is(plain_model) -> None:
+    aircraft = plain_model.simulator.aircraft
+    near = replace(aircraft, effects={"ground_effect": {"lift": 0.2, "drag": 0.05, "moment": 0.05, "height": 2.0}})
+    model = replace(plain_model, simulator=Simulator(near, plain_model.simulator.rate))
+    assert "ground_effect" in {c.effect for c in candidates_of(model.simulator, [model])}
 
 
 def test_labels_are_unique(candidates) -> None:

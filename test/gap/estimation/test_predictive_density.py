@@ -13,6 +13,7 @@ from sysid_node.gap.estimation.predictive_density import (
     can_be_divided,
     cross_validated_evidence,
     held_out_evidence,
+    noise_levels,
     probabilities,
     whole_flight_evidence,
 )
@@ -70,3 +71,23 @@ def test_the_evidence_of_a_whole_flight_is_the_integral_of_likelihood_and_prior(
     )
     assert np.ptp(wide.scores) == 0.0
     np.testing.assert_array_equal(wide.flights[0].residual, fit.flights[0].residual)
+
+
+def test_the_noise_of_a_flight_not_fitted_is_estimated_by_channel() -> None:
+    """Truth: rows drawn with powers of 1 and 25 on two of twelve channels, 0.01 on a third, and one unknown that moved.
+
+    What the unknown accounts for is no noise, and no noise is smaller than that of the fit.
+    """
+    random = np.random.default_rng(0)
+    power = np.ones(12)
+    power[[3, 5]] = 25.0, 0.01
+    rows = np.sqrt(0.5 * power) * random.standard_normal((4, 200, 12))
+    slopes = np.zeros((4, 200, 12, 1))
+    slopes[..., 7, 0] = random.standard_normal((4, 200))
+    rows[..., 7] += 30.0 * slopes[..., 7, 0]
+    levels = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e-4]]))
+    assert levels[3] == pytest.approx(25.0, rel=0.1)
+    assert levels[5] == 1.0
+    assert np.delete(levels, 3) == pytest.approx(1.0, abs=0.15)
+    known = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e9]]))
+    assert known[7] > 500.0  # an unknown that the fit knows does not move

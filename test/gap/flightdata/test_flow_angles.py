@@ -12,7 +12,7 @@ from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.validation.multiple_shooting import course_of, simulation_error
+from sysid_node.gap.short_flights.multiple_shooting import course_of, simulation_error
 from sysid_node.gap.validation.noise_floor import noise_floor_errors
 from sysid_node.sim import Simulator
 

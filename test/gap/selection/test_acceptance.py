@@ -8,10 +8,12 @@ import pytest
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.acceptance import (
     ComparisonTable,
+    DerivativeShift,
     RemainingPower,
     RemainingStructure,
     channels_improved,
     is_accepted,
+    nats_by_tolerances,
     rejection,
 )
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -32,6 +34,22 @@ def channels(value: float, rest: float = 0.0, channel: int = 0) -> np.ndarray:
 def removed(without: float, with_it: float, channel: int = 0) -> RemainingPower:
     """Power of one channel, the others at zero."""
     return RemainingPower(channels(without, channel=channel), channels(with_it, channel=channel))
+
+
+def reading(without: float, with_it: float) -> RemainingPower:
+    """Mean squares of the error of one reading of eleven, the others at zero."""
+    return RemainingPower(channels(without)[:11], channels(with_it)[:11])
+
+
+def shifted(without: float, with_it: float) -> tuple[DerivativeShift, DerivativeShift]:
+    """Ten derivatives that the flight determines: their squared distance from the file without and with a cause."""
+    return DerivativeShift(without, 10.0), DerivativeShift(with_it, 10.0)
+
+
+def test_one_common_cause_is_more_probable_than_many_draws() -> None:
+    """Truth: of ten derivatives two sigma off each the joint prior is exp(-20), of ten at the file's values one."""
+    assert nats_by_tolerances(shifted(40.0, 0.0)) == pytest.approx(20.0)
+    assert nats_by_tolerances(shifted(40.0, 10.0 + LIMITS.joint * np.sqrt(20.0))) == 0.0  # as improbable with it
 
 
 def table(**changes: object) -> ComparisonTable:
@@ -58,10 +76,14 @@ def table(**changes: object) -> ComparisonTable:
         ({"contribution": np.full(12, np.inf)}, None),  # without it nothing finite is predicted
         ({"size": LIMITS.plausible + 1e-9}, "so far"),
         ({"size": LIMITS.plausible}, None),
-        ({"power": removed(0.1, 0.09), "excuse": (20.0, 1.0)}, None),  # all derivatives together were not plausible
-        ({"power": removed(0.1, 0.09), "excuse": (20.0, 9.0)}, "too little"),  # nor are they with it
-        ({"power": removed(0.1, 0.09), "excuse": (6.0, 4.0)}, "too little"),  # by less than half
-        ({"power": removed(0.1, 0.09), "excuse": (LIMITS.joint, 0.0)}, "too little"),
+        ({"power": removed(0.1, 0.09), "shifts": shifted(40.0, 10.0)}, None),  # fifteen nats by the joint prior
+        ({"power": removed(0.1, 0.09), "shifts": shifted(10.0 + 2.0 * LOG_ODDS, 10.0)}, "too little"),
+        ({"power": removed(0.1, 0.09), "shifts": shifted(90.0, 60.0)}, "too little"),  # nor plausible with it
+        ({"power": removed(0.1, 0.09), "readings": reading(0.01, 0.007), "reading_motion": np.ones(11)}, None),
+        ({"power": removed(0.1, 0.09), "readings": reading(0.01, 0.008), "reading_motion": np.ones(11)}, "too little"),
+        ({"power": removed(0.1, 0.09), "readings": reading(0.003, 0.0), "reading_motion": np.ones(11)}, None),
+        ({"power": removed(0.1, 0.09), "readings": reading(0.0025, 0.0), "reading_motion": np.ones(11)}, "too little"),
+        ({"power": removed(0.1, 0.09), "readings": reading(9.0, 0.0)}, "too little"),  # of a reading not compared
         ({"log_bayes_factor": 0.0}, "commands"),
         ({"log_bayes_factor": np.nan}, "commands"),
     ],

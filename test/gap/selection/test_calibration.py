@@ -106,3 +106,14 @@ def test_other_thresholds_decide_otherwise() -> None:
     strict = replace(THRESHOLDS, calibration=replace(LIMITS, misfit=0.1))
     assert calibrated_probability(evidence(1e4, 0.2)) > 0.9
     assert calibrated_probability(evidence(1e4, 0.2), strict) == 0.0
+
+
+def test_nats_by_tolerances_count_as_they_are_against_what_was_searched() -> None:
+    """Truth: the odds e^nats over the number of effects, and those of a flexible effect; no more than the whole."""
+    tested = Misspecification(np.zeros(12), np.zeros(12), np.zeros(12))
+    found = evidence_of("mass_error", 9.0, tested, LIMITS.windows, by_tolerances=20.0, searched=40)
+    assert found.by_tolerances == 9.0
+    odds = np.exp(9.0 + LIMITS.flexible) / 40.0
+    assert calibrated_probability(found) == pytest.approx(odds / (1.0 + odds))
+    assert calibrated_probability(replace(found, by_tolerances=0.0)) < 0.2
+    assert evidence_of("mass_error", -3.0, tested, LIMITS.windows, by_tolerances=20.0).by_tolerances == 0.0

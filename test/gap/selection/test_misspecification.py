@@ -12,7 +12,7 @@ from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.calibration import calibrated_probability, evidence_of, is_supported_but_misspecified
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
-from sysid_node.gap.selection.misspecification import misspecification_of
+from sysid_node.gap.selection.misspecification import explained_by, misspecification_of
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import Simulator
 
@@ -49,3 +49,32 @@ def test_a_gyro_that_saturates_is_not_one_that_reads_low(misfit, make_flight, tu
     evidence = misfit(replace(flight, record=clipped))
     assert evidence.misfit > 0.4
     assert is_supported_but_misspecified(evidence)
+
+
+def test_bursts_that_are_in_remainder_and_regressor_are_chance() -> None:
+    """Truth: independent noise that is ten times as strong in one of eight groups, in both alike.
+
+    A remainder of constant power would be explained beyond chance in most draws; counted by groups it is not.
+    """
+    random = np.random.default_rng(1)
+    clusters = np.repeat(np.arange(8), 100)
+    burst = np.where(clusters == 3, 10.0, 1.0)
+    counts = []
+    for _ in range(200):
+        added, remainder = burst[:, None] * random.standard_normal((800, 3)), burst * random.standard_normal(800)
+        remainder /= remainder.std()
+        found = [explained_by(added, remainder, np.zeros((800, 1)), np.eye(1), each) for each in (None, clusters)]
+        counts.append([(f.squares - f.mean) / np.sqrt(f.variance) > THRESHOLDS.calibration.deviations for f in found])
+    naive, robust = np.mean(counts, axis=0)
+    assert naive > 0.3 and robust < 0.05
+
+
+def test_what_goes_with_the_regressor_throughout_is_explained_whatever_the_bursts() -> None:
+    """Truth: a share of the regressor itself in the remainder of every group."""
+    random = np.random.default_rng(2)
+    clusters = np.repeat(np.arange(8), 100)
+    added = random.standard_normal((800, 1))
+    remainder = random.standard_normal(800) + 0.5 * added[:, 0]
+    found = explained_by(added, remainder, np.zeros((800, 1)), np.eye(1), clusters)
+    assert (found.squares - found.mean) / np.sqrt(found.variance) > 20.0
+    assert found.squares - found.mean == pytest.approx(0.25 * 800, rel=0.2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.validation.multiple_shooting import course_of, simulation_error
+from sysid_node.gap.short_flights.multiple_shooting import course_of, simulation_error
 from sysid_node.gap.validation.noise_floor import noise_floor_errors
 from sysid_node.sim.model.layout import OUTPUTS
 

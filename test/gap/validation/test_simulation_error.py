@@ -9,7 +9,8 @@ import pytest
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.validation.simulation_error import WINDOW, side_by_side, simulation_gap, weather_suffices
+from sysid_node.gap.short_flights.readings import WINDOW
+from sysid_node.gap.validation.simulation_error import side_by_side, simulation_gap, weather_suffices
 from sysid_node.sim import Simulator
 
 #: Of each kind: in the actuators, in a sensor that sets the states anew, in a clock.

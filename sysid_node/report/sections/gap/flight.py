@@ -11,7 +11,8 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.validation.simulation_error import READINGS, WINDOW, SideBySide, can_be_simulated, side_by_side
+from sysid_node.gap.short_flights.readings import READINGS, WINDOW, can_be_simulated
+from sysid_node.gap.validation.simulation_error import SideBySide, side_by_side
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, PALE, VERMILION, Figure
 from sysid_node.report.drawing.thinning import thin_curve

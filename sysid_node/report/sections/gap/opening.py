@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.gap.short_flights.readings import WINDOW
 from sysid_node.gap.validation.spectral_error import STAGES
 from sysid_node.report.sections.gap.names import WORDS, percent
 from sysid_node.report.sections.gap.paragraph import paragraph

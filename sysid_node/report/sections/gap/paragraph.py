@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.residuals.excited_axes import quiet_motions
-from sysid_node.gap.validation.simulation_error import WINDOW
+from sysid_node.gap.short_flights.readings import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.report.sections.gap.names import (
     WORDS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_node.gap.validation.multiple_shooting import course_of, simulate_beside, simulation_error
+from sysid_node.gap.short_flights.multiple_shooting import course_of, simulate_beside, simulation_error
 from sysid_node.sim.model.layout import OUTPUTS
 
 SIZE = 100  # samples at 50 Hz: 2 s

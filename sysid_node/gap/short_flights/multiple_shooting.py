@@ -149,7 +149,7 @@ def _previous(series: Scalar) -> Scalar:
 def course_of(model: ResidualModel, size: int) -> Course:
     """The course of a model's flight with short flights of ``size`` samples, padded as the model's signals are.
 
-    The flight must have attitude (``simulation_error.can_be_simulated``).
+    The flight must have attitude (``readings.can_be_simulated``).
     """
     given = model.inputs
     altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
