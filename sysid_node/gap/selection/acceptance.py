@@ -18,6 +18,7 @@ accepted where all of these hold:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -93,7 +94,11 @@ class ComparisonScores(Protocol):
 
     @property
     def power(self) -> RemainingPower:
-        """Power left on flight not fitted."""
+        """Power left on flight not fitted, all flights together."""
+
+    @property
+    def by_flight(self) -> Sequence[tuple[Array, RemainingPower]]:
+        """Of each of several flights the motion's power and the power left."""
 
     @property
     def structure(self) -> RemainingStructure:
@@ -155,6 +160,7 @@ class ComparisonTable:
     contribution: Array
     log_bayes_factor: float
     searched: int
+    by_flight: tuple[tuple[Array, RemainingPower], ...] = ()
     simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
     size: float = 0.0
     shifts: tuple[DerivativeShift, DerivativeShift] = (DerivativeShift(0.0, 0.0), DerivativeShift(0.0, 0.0))
@@ -247,12 +253,14 @@ def readings_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.
 def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
     """Channels (12,) on which the candidate removes enough of the remainder to matter.
 
-    In gusts most of what is left of forces and moments is weather; there what of it is structure counts, and the mean.
+    In one flight is enough: another may show what no effect describes, and more of it than all that this one holds. In
+    gusts most of what is left of forces and moments is weather; there what of it is structure counts, and the mean.
     """
-    removed, motion = scores.power.removed, scores.motion
     least = np.sqrt(limits.noticeable_error**2 + scores.simulator_error**2)
     large = np.maximum(limits.large_error, scores.simulator_error)
-    enough = _matters(scores.power, 1.0, motion, least, limits) | (removed > large**2 * motion)
+    motion, enough = scores.motion, np.zeros(len(CHANNELS), bool)
+    for moved, power in ((motion, scores.power), *scores.by_flight):
+        enough |= _matters(power, 1.0, moved, least, limits) | (power.removed > large**2 * moved)
     if not scores.gusty:
         return np.asarray(enough)
     structure = scores.structure

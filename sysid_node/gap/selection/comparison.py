@@ -73,10 +73,14 @@ class Comparison:
 
         Infinite for the coefficients of a motion that no command excites, so that nothing there matters.
         """
-        flights = self.fitted.evidence.flights
-        power = sum((np.abs(flight.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for flight in flights)
-        quiet = ~excited_channels([flight.model for flight in flights]) & (np.arange(len(CHANNELS)) < len(COEFFICIENTS))
-        return np.where(quiet, np.inf, power)
+        return np.asarray(sum(self._motion_by_flight))
+
+    @cached_property
+    def _motion_by_flight(self) -> list[Array]:
+        """The same of each flight."""
+        models = [flight.model for flight in self.fitted.evidence.flights]
+        quiet = ~excited_channels(models) & (np.arange(len(CHANNELS)) < len(COEFFICIENTS))
+        return [np.where(quiet, np.inf, (np.abs(m.measured[:, 1:]) ** 2).sum(axis=(0, 1))) for m in models]
 
     @cached_property
     def power(self) -> RemainingPower:
@@ -93,6 +97,13 @@ class Comparison:
         return RemainingPower(
             np.where(more, fits.without, predicted.without), np.where(more, fits.with_it, predicted.with_it)
         )
+
+    @cached_property
+    def by_flight(self) -> tuple[tuple[Array, RemainingPower], ...]:
+        """The motion's power, and the power left, of each flight where there are several."""
+        pairs = zip(self.without.evidence.flights, self.fitted.evidence.flights, strict=True)
+        powers = [RemainingPower(power_of(before.residual), power_of(after.residual)) for before, after in pairs]
+        return tuple(zip(self._motion_by_flight, powers, strict=True)) if len(powers) > 1 else ()
 
     @cached_property
     def structure(self) -> RemainingStructure:

@@ -8,8 +8,8 @@ although a scale error explains most of it.
 
 In moving air the remainder is weather, which comes in bursts, and an autopilot moves the surfaces most where the air
 moves most. A remainder and a contribution that are large together are correlated by chance, more than a remainder of
-constant power is. What chance explains is therefore measured there from the scatter between groups of windows
-(White (1980), Econometrica 48(4); by clusters: Liang & Zeger (1986), Biometrika 73(1)).
+constant power is. What chance explains is therefore computed there from the power of each window, as the added
+regressors leave it (heteroskedasticity by groups: White (1980), Econometrica 48(4)).
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit
 from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.estimation.predictive_density import window_groups
 from sysid_node.gap.estimation.spectral_weights import real_rows
 from sysid_node.gap.instruments.moment_equations import weights_without_mean
 from sysid_node.gap.residuals.air_motion import is_gusty
@@ -84,11 +83,8 @@ def _tested(fit: CandidateFit, flight: FlightFit, contribution: Array, axis: int
     unknowns = slopes.reshape(*residual.shape, slopes.shape[2])[:, :, axis] * kept[:, None]
     J = unknowns.reshape(-1, slopes.shape[2])
     remainder = (residual[:, :, axis] * kept).ravel()
-    groups = np.zeros(model.windows.count, int)
-    for number, group in enumerate(window_groups(model)):
-        groups[group] = number
-    clusters = np.repeat(groups, remainder.size // groups.size) if is_gusty(model) else None
-    return float(whole @ whole), explained_by(np.column_stack(added), remainder, J, fit.information, clusters)
+    windows = np.arange(remainder.size) * model.windows.count // remainder.size if is_gusty(model) else None
+    return float(whole @ whole), explained_by(np.column_stack(added), remainder, J, fit.information, windows)
 
 
 def _contribution(model: ResidualModel, point: Array, candidate: Candidate) -> Array:
@@ -111,13 +107,13 @@ def _rows(model: ResidualModel, series: Array, weight: Array) -> Array:
 
 
 def explained_by(
-    added: Array, remainder: Array, slopes: Array, information: Array, clusters: NDArray[np.intp] | None = None
+    added: Array, remainder: Array, slopes: Array, information: Array, windows: NDArray[np.intp] | None = None
 ) -> Explained:
     """What added regressors (R, m) explain of a remainder (R,), the unknowns moving along.
 
     The remainder is that of a fit, so that its gradient in the unknowns is zero. Chance is that of a remainder whose
-    power is one throughout; with ``clusters`` (R,), numbers of groups that are independent of each other, at least that
-    by which the gradient scatters from group to group.
+    power is one throughout; with ``windows`` (R,), numbers of windows, at least that of one whose power changes from
+    window to window as that of the rest does which the added regressors leave.
     """
     crossed = added.T @ slopes
     shares = np.linalg.solve(information, crossed.T)
@@ -126,10 +122,11 @@ def explained_by(
     inverse = np.linalg.inv(free + ridge)
     gradient, count = added.T @ remainder, float(added.shape[1])
     squares, mean, variance = float(gradient @ inverse @ gradient), count, 2.0 * count
-    if clusters is not None and (groups := int(clusters.max()) + 1) > 1:
-        parts = np.zeros((groups, added.shape[1]))
-        np.add.at(parts, clusters, (added - slopes @ shares) * remainder[:, None])
-        parts = parts - parts.mean(axis=0)
-        scatter = inverse @ (parts.T @ parts) * groups / (groups - 1)
+    if windows is not None:
+        regressors = added - slopes @ shares
+        left = remainder - regressors @ (inverse @ gradient)
+        power = np.bincount(windows, left**2) / np.maximum(np.bincount(windows, left != 0.0), 1)
+        level = power / max(float(np.mean(left[left != 0.0] ** 2)), 1e-300)
+        scatter = inverse @ (regressors.T @ (regressors * level[windows][:, None]))
         mean, variance = max(mean, float(np.trace(scatter))), max(variance, 2.0 * float(np.trace(scatter @ scatter)))
     return Explained(squares, mean, variance)

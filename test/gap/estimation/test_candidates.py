@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.gap.estimation.candidates import PER_CONTROL, UNOBSERVABLE, Candidate, candidates_of
 from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.sim import EFFECTS, Simulator
@@ -21,7 +22,8 @@ def test_every_effect_that_a_flight_can_show_is_a_candidate(candidates) -> None:
 
 def test_the_ground_is_a_candidate_where_the_file_says_how_far_it_is(plain_model) -> None:
     aircraft = plain_model.simulator.aircraft
-    near = replace(aircraft, effects={"ground_effect": {"lift": 0.2, "drag": 0.05, "moment": 0.05, "height": 2.0}})
+    stated = {"lift": UncertainValue(0.2), "height": UncertainValue(2.0)}
+    near = replace(aircraft, effects={"ground_effect": stated})
     model = replace(plain_model, simulator=Simulator(near, plain_model.simulator.rate))
     assert "ground_effect" in {c.effect for c in candidates_of(model.simulator, [model])}
 

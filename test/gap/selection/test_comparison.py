@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.acceptance import ComparisonTable, is_accepted
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
-from sysid_node.gap.selection.comparison import Comparison, power_left, probability_against
+from sysid_node.gap.selection.comparison import Comparison, derivative_shift, power_left, probability_against
+from sysid_node.gap.short_flights.readings import READINGS
 from sysid_node.sim import EFFECTS, Simulator
 
 
@@ -80,3 +81,32 @@ def test_what_cannot_be_predicted_without_the_effect_comes_back_without_end(lag)
 def test_an_explanation_against_itself_is_even(lag) -> None:
     assert probability_against(lag.fitted, lag.fitted) == pytest.approx(0.5)
     assert probability_against(lag.without, lag.fitted) == pytest.approx(1.0 - lag.probability)
+
+
+def shift_of(model, label: str, moved: dict[str, float]):
+    """The shift of derivatives, each so many of the file's tolerances off, that a flight determines to a thousandth."""
+    nuisances = nuisances_of(model.simulator.aircraft, model)
+    chosen = [c for c in candidates_of(model.simulator, [model]) if c.label == label]
+    fit = with_candidates(unfitted([model], nuisances), chosen, nuisances, ())
+    point = fit.flights[0].point.copy()
+    for name, tolerances in moved.items():
+        index = model.simulator.names.index(f"derivative_error.{name}")
+        point[index] += tolerances * nuisances.sigma[nuisances.indices.index(index)]
+    return derivative_shift(replace(fit.at([point]), information=1e6 * fit.prior_information))
+
+
+def test_the_shift_of_derivatives_is_counted_in_the_files_tolerances_however_wide_their_priors(plain_model) -> None:
+    """Truth: squares counted by hand; their expectation is the number of derivatives that are known."""
+    known = sum(d.tolerance is not None for d in plain_model.simulator.aircraft.derivatives.values())
+    moved = {"Cm_alpha": 2.0, "CL_alpha": -1.0}
+    plain, widened = (shift_of(plain_model, label, moved) for label in ("", "derivative_error of Cm"))
+    for found in (plain, widened):
+        assert found.distance == pytest.approx(5.0)
+        assert found.expected == pytest.approx(known, rel=1e-4)
+
+
+def test_short_flights_show_what_a_lag_does_to_the_rates(lag) -> None:
+    rates = [READINGS.index(name) for name in ("p", "r")]
+    assert (lag.readings.share_removed[rates] > 0.5).all()
+    assert (lag.readings.removed[rates] > 0.01 * lag.reading_motion[rates]).all()
+    assert np.isfinite(lag.reading_motion[rates]).all() and not lag.reading_errors.any()

@@ -52,29 +52,29 @@ def test_a_gyro_that_saturates_is_not_one_that_reads_low(misfit, make_flight, tu
 
 
 def test_bursts_that_are_in_remainder_and_regressor_are_chance() -> None:
-    """Truth: independent noise that is ten times as strong in one of eight groups, in both alike.
+    """Truth: independent noise that is ten times as strong in one of eight windows, in both alike.
 
-    A remainder of constant power would be explained beyond chance in most draws; counted by groups it is not.
+    A remainder of constant power would be explained beyond chance in most draws; counted by windows it is not.
     """
     random = np.random.default_rng(1)
-    clusters = np.repeat(np.arange(8), 100)
-    burst = np.where(clusters == 3, 10.0, 1.0)
+    windows = np.repeat(np.arange(8), 100)
+    burst = np.where(windows == 3, 10.0, 1.0)
     counts = []
     for _ in range(200):
         added, remainder = burst[:, None] * random.standard_normal((800, 3)), burst * random.standard_normal(800)
         remainder /= remainder.std()
-        found = [explained_by(added, remainder, np.zeros((800, 1)), np.eye(1), each) for each in (None, clusters)]
+        found = [explained_by(added, remainder, np.zeros((800, 1)), np.eye(1), each) for each in (None, windows)]
         counts.append([(f.squares - f.mean) / np.sqrt(f.variance) > THRESHOLDS.calibration.deviations for f in found])
     naive, robust = np.mean(counts, axis=0)
     assert naive > 0.3 and robust < 0.05
 
 
 def test_what_goes_with_the_regressor_throughout_is_explained_whatever_the_bursts() -> None:
-    """Truth: a share of the regressor itself in the remainder of every group."""
+    """Truth: a share of the regressor itself in the remainder of every window."""
     random = np.random.default_rng(2)
-    clusters = np.repeat(np.arange(8), 100)
+    windows = np.repeat(np.arange(8), 100)
     added = random.standard_normal((800, 1))
     remainder = random.standard_normal(800) + 0.5 * added[:, 0]
-    found = explained_by(added, remainder, np.zeros((800, 1)), np.eye(1), clusters)
+    found = explained_by(added, remainder, np.zeros((800, 1)), np.eye(1), windows)
     assert (found.squares - found.mean) / np.sqrt(found.variance) > 20.0
     assert found.squares - found.mean == pytest.approx(0.25 * 800, rel=0.2)
