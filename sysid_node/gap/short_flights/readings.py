@@ -25,6 +25,9 @@ WINDOW = 2.0
 #: Readings that are compared. Heading is left out, because it is the integral of the yaw rate.
 READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
 
+#: Mean square of the error of a simulator that diverges.
+DIVERGED = 1e300
+
 _COLUMNS = tuple(OUTPUTS.index(name) for name in READINGS)
 
 #: The sensor of each reading, by its name in the aircraft file.
@@ -137,10 +140,10 @@ def _squared_errors(flight: FlightEvidence) -> Array:
 def reading_errors(flights: Sequence[FlightEvidence]) -> Array:
     """Mean squares (R,) of the errors of short flights with the parameters of each flight's evidence.
 
-    Infinite where the simulator diverges, zero where no flight can be simulated.
+    ``DIVERGED`` where the simulator diverges, zero where no flight can be simulated.
     """
     found = [_squared_errors(flight) for flight in flights if can_be_simulated(flight.model)]
     if not found:
         return np.zeros(len(READINGS))
     mean = np.concatenate(found).mean(axis=0)
-    return np.where(np.isfinite(mean), mean, np.inf)
+    return np.where(np.isfinite(mean), mean, DIVERGED)
