@@ -1,10 +1,20 @@
 """Which screened candidates are fitted; truth: lists made by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.selection.screening import Screened, ScreenedPair, best_screened, with_found_onsets
+import numpy as np
+import pytest
+
+from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.candidates import Candidate, candidates_of
+from sysid_node.gap.estimation.convergence import converged
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.variable_projection import VariableProjection
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.selection.screening import Screened, ScreenedPair, best_screened, screened, with_found_onsets
+from sysid_node.sim import Simulator
 
 
 def explanation() -> Any:
@@ -42,3 +52,16 @@ def test_onsets_that_were_found_are_the_only_starts_of_the_next_stage() -> None:
         Screened(3.0, stuck, (0.9,)),
     ]  # the best first
     assert [c.starts for c in with_found_onsets([stuck, shift], screened)] == [((0.3,),), shift.starts]
+
+
+def test_another_mass_is_seen_although_derivatives_have_gone_to_their_limits(aircraft, plain) -> None:
+    """Truth: the aircraft is half as heavy again as its file says, and its file's derivatives are right."""
+    light = replace(aircraft, mass=aircraft.mass / 1.5)
+    model = residual_model_of(Simulator(light, 50.0), plain)
+    fit = converged(unfitted([model], nuisances_of(light, model)), rounds=1)
+    problem = VariableProjection(fit)
+    assert not problem.free.all()  # some derivatives stand at their limits
+    (mass,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "mass_error")
+    found = screened(fit, problem, mass)
+    assert found.start[0] == pytest.approx(0.5, rel=0.3)
+    assert found.deviance < problem.deviance(problem.residual(np.empty(0))) - 20.0
