@@ -21,6 +21,7 @@ import numpy as np
 
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
+from sysid_node.interruption import indivisible, on_interrupt
 from sysid_node.view.aircraft_mesh import MovingPart, airframe, surfaces
 from sysid_node.view.entities import ABOUT, APPLICATION, NOTES, TIMELINE, WORLD, curve_path, lane_path, part, place_path
 from sysid_node.view.scene import GREY, NOTHING, Arrow, Body, DrawnAircraft, PlotCurve, Scene
@@ -60,11 +61,14 @@ def save(scene: Scene, path: Path) -> None:
     check_recording(path)
     aside = path.with_name(f".{path.name}.unfinished")
     try:
-        stream = open_file(scene, aside)
-        append(stream, scene)
-        stream.flush()
-        stream.disconnect()
-        aside.replace(path)
+        with on_interrupt(lambda: aside.unlink(missing_ok=True)):
+            with indivisible():  # else it could be made once more after a signal has removed it
+                stream = open_file(scene, aside)
+            append(stream, scene)
+            stream.flush()
+            stream.disconnect()
+            with indivisible():
+                aside.replace(path)
     except OSError as error:
         raise InputError(f"--save {path}: cannot be written ({error.strerror}); give another file") from None
     finally:

@@ -44,7 +44,7 @@ def write_file(path: Path, text: str) -> None:
     """Write a text aside and move it into place. Raises InputError where that cannot be done."""
     aside = _aside(path)
     try:
-        with on_interrupt(lambda: aside.unlink(missing_ok=True)):
+        with indivisible():
             aside.write_text(text, encoding="utf-8")
             aside.replace(path)
     except OSError as error:
