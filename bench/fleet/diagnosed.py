@@ -25,7 +25,7 @@ from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.sim.flying.recording import Recorder
+from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 from sysid_node.sim.pages.effects_page import EXAMPLES
 from sysid_node.sim.simulator import Simulator
@@ -92,7 +92,7 @@ def _fly_one(simulator: Simulator, flight: Mapping[str, Any], truth: Mapping[str
     conditions = SortieConditions(specs, turbulence=flight["turbulence"], seed=flight["seed"])
     sortie = fly_sortie(simulator, deflections, conditions)
     unfinished = path.with_name(f".{path.name}")
-    write_streams(unfinished, Recorder(RATE, RATE, RATE).record(sortie), "mcap", "flu", {})
+    write_streams(unfinished, FlightSampler(RATE, RATE, RATE).record(sortie), "mcap", "flu", {})
     unfinished.rename(path)
 
 
