@@ -91,7 +91,7 @@ def take(state: MonitorState, block: Block) -> None:
         state.raw.clear()
         state.pieces.clear()
     design, residual = _compare_with_reference(state, block)
-    state.count += 1
+    state.count, state.latest = state.count + 1, block
     learning = state.count * PERIOD <= state.settings.learning
     if learning:
         _learn(state, block, residual)

@@ -72,5 +72,6 @@ class MonitorState:
     )  # (D,) terms with a large R^2, which are learned
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) mean statistics by block
     count: int = 0
+    latest: Block | None = None
     alarm: Alarm | None = None
     fault: Fault | None = None

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-#: Kinds of faults: six of a surface, four of a sensor, one of the airframe.
+#: Kinds of faults: seven of a surface, four of a sensor, one of the airframe.
 LOSS, STUCK, HARD_OVER, SHIFTED = "loss of effectiveness", "stuck surface", "hard-over", "surface shifted"
-NOT_FOLLOWING, SLOWER = "surface does not follow", "servo slower"
+NOT_FOLLOWING, SLOWER, RATE_LIMITED = "surface does not follow", "servo slower", "servo at its rate limit"
 AIRSPEED, VANE_OFFSET, VANE_STUCK, SILENT = "airspeed wrong", "vane offset", "vane stuck", "sensor silent"
 DAMAGE = "structural damage"
 #: The evidence by which a fault was found.

@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
+from sysid_node.faults.hypotheses import rate_limits, servo_times
 from sysid_node.faults.hypotheses import servo_check as servos
-from sysid_node.faults.hypotheses import servo_times
+from sysid_node.faults.hypotheses.rate_limits import RateLimits
 from sysid_node.faults.hypotheses.servo_check import ServoCheckState
 from sysid_node.faults.hypotheses.servo_times import ServoTimes
 from sysid_node.faults.model import blocks, servo_follower
@@ -45,6 +46,7 @@ class MessageWatch:
     servos: ServoCheckState
     intake: AlignmentState
     follower: ServoFollower
+    limits: RateLimits
     stale_after: float  # s
     now: float = 0.0  # s, of the last sample
     stamp_ns: int = 0  # header stamp of the last sample
@@ -63,7 +65,8 @@ def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float)
     """A monitor before the first message. A topic that falls silent for ``stale_after`` s is a fault."""
     taken = intake.init(aircraft, blocks.MOST_GAP)
     forces, positions = monitor.init(aircraft, settings), servos.init(aircraft, settings)
-    return MessageWatch(forces, positions, taken, servo_follower.init(aircraft), stale_after)
+    limits = rate_limits.init(aircraft, forces.terms)
+    return MessageWatch(forces, positions, taken, servo_follower.init(aircraft), limits, stale_after)
 
 
 def on_imu(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
@@ -124,7 +127,7 @@ def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
         if now - arrived > watch.stale_after
     ]
     forces = [watch.state.fault] if watch.state.fault and not silent else []
-    return [*silent, *watch.off_command, *watch.servo_times.faults, *forces]
+    return [*silent, *watch.off_command, *watch.servo_times.faults, *watch.limits.faults, *forces]
 
 
 @dataclass
@@ -146,7 +149,11 @@ class Announcements:
 def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
     for moment, sample, _ in samples:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
+        count = watch.state.count
+        rate_limits.move(watch.limits, moment, sample)
         monitor.update(watch.state, moment, servo_follower.deflected(watch.follower, moment, sample))
+        if watch.state.count > count and watch.state.latest is not None:
+            rate_limits.take(watch.limits, watch.state.latest, watch.state.whitening.filter)
 
 
 def _time_of(taken: AlignmentState, stamp_ns: int) -> float:

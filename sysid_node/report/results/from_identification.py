@@ -14,6 +14,7 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.results.response import ModelResponse, goodness_of_fit
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.faults.recorded_rate_limits import rate_limits_of
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
@@ -59,8 +60,13 @@ def identification_result(
         remarks=[
             *(_sentence(remark) for remark in (fit.message, *fit.remarks, carried) if remark),
             *servo_remarks(aircraft, estimates),
+            *(_limited(record, fault.text) for record in records for fault in rate_limits_of(aircraft, record)),
         ],
     )
+
+
+def _limited(record: FlightRecord, fault: str) -> str:
+    return f"Something seems to have failed in {record.name}: {fault}; its deflections are not what was recorded."
 
 
 def _derivative(
