@@ -94,7 +94,7 @@ def consider(
     residuals = v.T @ signals.matrix  # (C, 2N)
     Z = np.tensordot(v.T, changes.signals, axes=(1, 1)) * sigmas[:, None]  # (C, K, 2N), per tolerance
     _accelerations_by_moments(Z, changes)
-    _predict_outputs(Z, equations, solution, place, changes.rates)
+    _predict_outputs(Z, equations, solution, place, signals)
     across = V @ gram
     normal = (across @ X.T) * equations.same_block
     inverse = np.linalg.inv(normal + equations.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
@@ -132,19 +132,25 @@ def _accelerations_by_moments(Z: Array, changes: ColumnChanges) -> None:
 
 
 def _predict_outputs(
-    Z: Array, equations: NormalEquations, solution: Solution, place: NDArray[np.intp], rates: NDArray[np.intp]
+    Z: Array, equations: NormalEquations, solution: Solution, place: NDArray[np.intp], signals: CorrectedSignals
 ) -> None:
-    """Put the model's prediction in the place of the coefficients themselves in Z (C, K, 2N), and of their ``rates``.
+    """Put the model's prediction in the place of the coefficients themselves in Z (C, K, 2N), and of their rates.
 
     A coefficient holds the noise of its own residual. Z would then correlate with the residuals, and an imperfection
-    that makes all coefficients smaller would seem to explain noise.
+    that makes all coefficients smaller would seem to explain noise. The model predicts the corrected coefficient by the
+    corrected regressors; the recorded one is less by what it was corrected by.
     """
+    rates, matrix = signals.changes.rates, signals.matrix
     for c, output in enumerate(place[equations.outputs].tolist()):
         unknowns = np.flatnonzero(equations.belongs[:, c])
         columns, theta = place[equations.columns[unknowns]], solution.theta[unknowns, c]
-        for source, targets in ((output, columns), (int(rates[output]), rates[columns])):
-            Z[..., targets] += Z[..., source, None] * theta
-            Z[..., source] = 0.0
+        share = Z[..., output].copy()
+        Z[..., output] = 0.0
+        predicted = theta @ matrix[columns] - matrix[output]
+        predicted[output] += 1.0
+        Z += share[..., None] * predicted
+        Z[..., rates[columns]] += Z[..., rates[output], None] * theta
+        Z[..., rates[output]] = 0.0
 
 
 def _projection(
