@@ -37,13 +37,6 @@ def test_a_flight_told_more_often_counts_more_and_its_tolerances_once():
     assert four.errors[area] > 0.99 * UNCERTAIN.tolerances["geometry.S"]
 
 
-def test_flights_together_do_not_tell_apart_what_none_of_them_does():
-    """Of a servo's lateness and the stamps', the flights tell the difference: two tell each hardly better than one."""
-    one, both = posterior(1), posterior(1, 2)
-    late = [k for k, of in enumerate(one.imperfections) if of.role == "lateness"]
-    assert (both.errors[late] > 0.6 * one.errors[late]).all()
-
-
 def test_an_exact_aircraft_has_none():
     assert flight_posterior(KESTREL, [flight(1)], BatchSettings()) is None
 
