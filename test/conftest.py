@@ -58,7 +58,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     class ByFolderOrFile(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return next(filter(nodeid.startswith, _TOGETHER), super()._split_scope(nodeid))
+            return next(filter(nodeid.startswith, _TOGETHER), nodeid.split("::", 1)[0])
 
     if config.getoption("dist") != "loadfile":
         return None

@@ -41,6 +41,9 @@ from sysid_node.online.systematic.many_instruments import Scores
 
 Array = NDArray[np.float64]
 
+#: Root mean square of a coefficient below which it is rounding, and tells nothing: that of real instruments' noise is
+#: above 1e-4.
+STILL = 1e-8
 #: Share of its energy by which an exogenous signal is set apart from the others.
 PROJECTION_RIDGE = 1e-8
 
@@ -104,9 +107,10 @@ def consider(
     left = inverse @ ((across @ residuals.T) * equations.belongs) * equations.belongs  # (P, C)
     both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)  # (C, K + 1, 2N)
     scores, misfit = Scores.none(sigmas.size), np.ones(C)
+    moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(equations.block.max()) + 1):
         project = _projection(equations, changes, place, gram, block)
-        for c in np.flatnonzero((equations.block == block) & (noise > 0.0)).tolist():
+        for c in np.flatnonzero((equations.block == block) & (noise > 0.0) & moves).tolist():
             q, D = project @ both[c].T, both[c, :-1]
             further = project.shape[0] - int(equations.belongs[:, c].sum())  # than the unknowns take
             misfit[c] = max(float(q[:, -1] @ q[:, -1]) / (float(noise[c]) * max(further, 1)), 1.0)

@@ -23,6 +23,9 @@ LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to first order.
 NOTABLE_SHARE, NOTABLE = 0.5, 5e-4
+#: Tolerances by which an imperfection is taken out of the signals at most, as signals change in proportion to small ones
+#: only.
+LARGEST_CORRECTION = 6.0
 EVERY = 4  # pieces between looks, once there are ``EARLY`` s of data
 EARLY = 10.0
 
@@ -99,7 +102,9 @@ def to_take_out(imperfect: Imperfections, servos: ServoModel, last: SystematicEr
     if last is None:
         return np.zeros(S + 3 * m)
     late, curved = last.servos.lateness[at] - servos.lateness[at], last.servos.curvature[at] - servos.curvature[at]
-    return np.concatenate([last.considered.estimate[:S], late, curved, last.considered.estimate[S + 2 * m :]])
+    most = LARGEST_CORRECTION * prior(imperfect, servos)[0][:S]
+    sources = np.clip(last.considered.estimate[:S], -most, most)
+    return np.concatenate([sources, late, curved, last.considered.estimate[S + 2 * m :]])
 
 
 def noise_per_gram(equations: NormalEquations, spread: Uncertainty, total: Information) -> Array:
