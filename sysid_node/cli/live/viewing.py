@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -19,6 +19,9 @@ from sysid_node.interruption import on_interrupt
 from sysid_node.view.live import LiveScene
 from sysid_node.view.recording import append, check_recording, open_file, open_window, require_rerun, say
 
+if TYPE_CHECKING:
+    from sysid_node.ros.support.flight_watch import FlightWatch
+
 #: What ``--view`` stands for without a file: a window.
 WINDOW = Path("-")
 
@@ -27,11 +30,8 @@ LOG = "view.log"
 _NICE = 10  # lower priority than the identifier's: on a busy computer the screen waits, not the flight
 
 
-def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame, arguments: list[str] | None = None) -> None:
-    """Show the flight until ROS is shut down or the process is interrupted, or write it into a file.
-
-    ``arguments``: those of a program that ROS itself interrupts; None for a command. Raises InputError.
-    """
+def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame) -> None:
+    """Show the flight until the process is interrupted, or write it into a file. Raises InputError."""
     import rclpy  # noqa: PLC0415  # reads its domain from the environment
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
@@ -39,13 +39,28 @@ def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame, argument
 
     os.nice(_NICE)
     scene = LiveScene(aircraft)
-    if save is not None:
-        check_recording(save)
-    stream: Any = open_window(scene.declared) if save is None else open_file(scene.declared, save)
-    handlers = SignalHandlerOptions.NO if arguments is None else SignalHandlerOptions.ALL
-    rclpy.init(args=arguments, signal_handler_options=handlers)
-    watch, words = FlightWatch(frame), ""
+    stream = _opened(scene, save)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    watch = FlightWatch(frame)
     with on_interrupt(lambda: _end(stream)):
+        _show(scene, watch, stream)
+    watch.close()
+
+
+def _opened(scene: LiveScene, save: Path | None) -> Any:
+    """The recording into which the scene goes: a window, or a file. Raises InputError."""
+    if save is None:
+        return open_window(scene.declared)
+    check_recording(save)
+    return open_file(scene.declared, save)
+
+
+def _show(scene: LiveScene, watch: FlightWatch, stream: Any) -> None:
+    """Add what the watch hears to the recording, until ROS is shut down."""
+    import rclpy  # noqa: PLC0415
+
+    words = ""
+    try:
         while rclpy.ok():
             watch.listen(PERIOD)
             news = scene.update(watch.start_ns, *watch.take(), watch.faults)
@@ -53,8 +68,8 @@ def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame, argument
             if news.about != words:
                 say(stream, news.about)
             words = news.about
-    watch.close()
-    _end(stream)
+    finally:
+        _end(stream)
 
 
 def _end(stream: Any) -> None:
@@ -86,21 +101,29 @@ def viewer_beside(aircraft: str, wanted: Path | None, folder: Path) -> Iterator[
 
 def main() -> None:
     """Entry point of ``ros2 run sysid_node view``: its parameters are ``aircraft``, ``save`` and ``body_frame``."""
-    import rclpy  # noqa: PLC0415
+    import sysid_node.ros  # noqa: F401, PLC0415  # finds sysid_msgs in a virtual environment
+    from sysid_node.ros.support.spin import run_program  # noqa: PLC0415
 
-    rclpy.init()
-    node = rclpy.create_node("view_parameters")
-    given = {name: str(node.declare_parameter(name, default).value)
-             for name, default in (("aircraft", ""), ("save", ""), ("body_frame", "flu"))}  # fmt: skip
-    node.destroy_node()
-    rclpy.try_shutdown()
+    sys.exit(run_program(_serve))
+
+
+def _serve() -> None:
+    from sysid_node.ros.support.flight_watch import FlightWatch  # noqa: PLC0415
+
+    require_rerun()
+    os.nice(_NICE)
+    watch = FlightWatch()
     try:
+        given = {
+            name: str(watch.node.declare_parameter(name, default).value)
+            for name, default in (("aircraft", ""), ("save", ""), ("body_frame", "flu"))
+        }
         if not given["aircraft"]:
-            raise InputError("parameter aircraft: needed, e.g. --ros-args -p aircraft:=cdrw")
+            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
         if given["body_frame"] not in ("flu", "frd"):
             raise InputError(f"parameter body_frame: {given['body_frame']!r}; expected flu or frd")
-        save = Path(given["save"]) if given["save"] else None
-        watch_live(load_aircraft(given["aircraft"]), save, given["body_frame"], sys.argv)  # type: ignore[arg-type]
-    except InputError as error:
-        print(f"view: {error}", file=sys.stderr)
-        sys.exit(2)
+        watch.frame = cast("BodyFrame", given["body_frame"])
+        scene = LiveScene(load_aircraft(given["aircraft"]))
+        _show(scene, watch, _opened(scene, Path(given["save"]) if given["save"] else None))
+    finally:
+        watch.close()

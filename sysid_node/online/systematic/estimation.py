@@ -23,8 +23,8 @@ LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to first order.
 NOTABLE_SHARE, NOTABLE = 0.5, 5e-4
-#: Tolerances by which an imperfection is taken out of the signals at most, as signals change in proportion to small ones
-#: only.
+#: Tolerances by which an imperfection is taken out of the signals at most: signals change in proportion to small
+#: imperfections only.
 LARGEST_CORRECTION = 6.0
 EVERY = 4  # pieces between looks, once there are ``EARLY`` s of data
 EARLY = 10.0
