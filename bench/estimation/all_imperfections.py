@@ -1,6 +1,6 @@
 """Coverage of the intervals where everything is a little off at once.
 
-    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--page docs/results/all_imperfections.md]
+    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--page FILE]
     python -m bench.estimation.all_imperfections RESULTS.jsonl --flights 0 --before OTHER.jsonl [--page ...]
 
 Each flight is that of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3`, with imperfections drawn as aircraft
@@ -230,14 +230,15 @@ def main() -> None:
     """Fly what is missing, and make the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("results", type=Path, help="file of JSON lines: read, and continued")
-    parser.add_argument("--flights", type=int, default=60, help="numbers of flights from 1 on (default: 60)")
+    parser.add_argument("--flights", type=int, default=60, help="how many flights (default: 60)")
+    parser.add_argument("--first", type=int, default=1, help="number of the first flight (default: 1)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     parser.add_argument("--before", type=Path, help="results of another version, to be held against these")
     args = parser.parse_args()
     lines = _read(args.results)
     aircraft = load_aircraft("cdrw")
     simulator = Simulator(aircraft, RATE)
-    for number in range(1, args.flights + 1):
+    for number in range(args.first, args.first + args.flights):
         if all(line["number"] != number for line in lines):
             lines.append(flown(simulator, aircraft, number))
             with args.results.open("a", encoding="utf-8") as file:
