@@ -4,7 +4,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo loop docs test lint format build bench fuzz clean distclean
+.PHONY: help demo loop install docs test lint format build bench fuzz clean distclean
 
 VENV ?= .venv
 RATE ?= 1
@@ -36,6 +36,9 @@ demo: $(DONE)/build $(DONE)/run $(if $(VIEW),$(DONE)/view)  ## identify the bund
 
 loop: $(DONE)/build $(DONE)/run $(DONE)/desk  ## closed loop over DDS: something fails at 30 s, the controller adapts
 	@$(BIN)/python -m sysid_node.cli loop $(ARGS)
+
+install: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet  ## what every command of sysid needs; then: . .venv/bin/activate
+	@echo "the command: $(VENV)/bin/sysid"
 
 docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out/docs/index.html; a warning is an error
 	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs

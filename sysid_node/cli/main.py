@@ -41,6 +41,18 @@ COMMANDS = {
     "loop": "an adaptive controller in closed loop, over DDS",
 }
 
+#: The file under ``requirements/`` that brings a package which not every command needs.
+REQUIREMENTS = {
+    "jax": "desk",
+    "jaxlib": "desk",
+    "jinja2": "run",
+    "plotly": "run",
+    "rich": "run",
+    "rosbags": "run",
+    "scipy": "run",
+    "yaml": "run",
+}
+
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 ENDINGS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
@@ -117,6 +129,10 @@ def exit_code(command: str, work: Callable[[], int], *, debug: bool = False) -> 
             traceback.print_exc()
         if isinstance(error, InputError):
             return _say(command, str(error), BAD_INPUT)
+        missing = (error.name or "").partition(".")[0] if isinstance(error, ModuleNotFoundError) else ""
+        if missing in REQUIREMENTS:
+            needs = f"needs the package {missing}, which is not installed; run: pip install -r requirements/"
+            return _say(command, f"{needs}{REQUIREMENTS[missing]}.txt", BAD_INPUT)
         return _say(command, f"failed: {type(error).__name__}: {error} (more with --debug)", FAILED)
 
 

@@ -32,6 +32,16 @@ def said(capsys) -> str:
     [
         (InputError("bag x: cut short;\n  try this"), 2, "sysid convert: bag x: cut short; try this"),
         (KeyboardInterrupt(), 130, "sysid convert: interrupted"),
+        (
+            ModuleNotFoundError("No module named 'jax.numpy'", name="jax.numpy"),
+            2,
+            "sysid convert: needs the package jax, which is not installed; run: pip install -r requirements/desk.txt",
+        ),
+        (
+            ModuleNotFoundError("No module named 'mine'", name="mine"),
+            1,
+            "sysid convert: failed: ModuleNotFoundError: No module named 'mine' (more with --debug)",
+        ),
         (RuntimeError("a\nb"), 1, "sysid convert: failed: RuntimeError: a b (more with --debug)"),
         (
             OSError(28, "No space left"),
