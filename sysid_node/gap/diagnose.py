@@ -71,12 +71,12 @@ class Diagnosis:
     @property
     def gap(self) -> Gap:
         """The gap of forces, moments and kinematics by frequency."""
-        return self.check.gap
+        return self.check.stated[0]
 
     @property
     def simulation_gap(self) -> Gap | None:
         """The gap of short simulated flights; none where none can be simulated."""
-        return self.check.simulation_gap
+        return self.check.stated[1]
 
     @property
     def size(self) -> Gap:

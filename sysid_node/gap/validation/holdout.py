@@ -42,6 +42,7 @@ class Check:
     final: Evidence
     gap: Gap  # of forces, moments and kinematics by frequency
     weather_suffices: bool = False  # whether weather and the sensors' noise account for the whole gap
+    fitted: Check | None = None  # with fitted derivatives, where the explanation keeps the file's
 
     @property
     def models(self) -> tuple[ResidualModel, ...]:
@@ -57,6 +58,21 @@ class Check:
     def gaps(self) -> list[Gap]:
         """The gap by each measure: by frequency, then of short simulated flights where there are any."""
         return [self.gap, *([self.simulation_gap] if self.simulation_gap else [])]
+
+    @property
+    def stated(self) -> tuple[Gap, Gap | None]:
+        """The gap by frequency and that of short flights, as they are reported.
+
+        The causes were judged beside the file's derivatives where the explanation keeps these. What derivatives fitted
+        within their tolerances would leave is stated nevertheless.
+        """
+        spectral, simulated = self.gap, self.simulation_gap
+        if self.fitted is None:
+            return spectral, simulated
+        by_fitted = self.fitted.simulation_gap
+        if simulated and by_fitted:
+            simulated = spectral_error.within_tolerances(simulated, by_fitted)
+        return spectral_error.within_tolerances(spectral, self.fitted.gap), simulated
 
     def as_in_file(self, left: OveridentificationTest) -> Check:
         """The validation of the aircraft file as it is, on the same flights."""
@@ -148,4 +164,5 @@ def _with_better_derivatives(
         return attribution, checked
     filed = found.as_in_file(attribution.structure_left)
     gap = spectral_error.gap_of(filed.base, found.final, attribution.structure_left)
-    return explanation, replace(found, base=replace(filed.base, scores=found.base.scores), gap=gap)
+    base = replace(filed.base, scores=found.base.scores)
+    return explanation, replace(found, base=base, gap=gap, fitted=checked)

@@ -8,7 +8,7 @@ Intervals are by a bootstrap over groups of windows.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,22 @@ def gap_from(overall: Array, draws: Array, channels: dict[str, dict[str, float]]
     shrink = float(shrinkage(overall))
     return Gap(**values, shrink_percent=shrink, ci95=interval(shrinkage(draws)), per_channel=channels,
                intervals=intervals)  # fmt: skip
+
+
+def within_tolerances(gap: Gap, fitted: Gap) -> Gap:
+    """The gap with the smaller of two errors within tolerances: of the file's derivatives, and of fitted ones.
+
+    ``gap`` is that of causes beside the file's derivatives, which are within their tolerances, too; ``fitted`` is that
+    of derivatives fitted within them, without causes.
+    """
+    if fitted.tolerances >= gap.tolerances:
+        return gap
+    channels = {
+        name: {**errors, "tolerances": fitted.per_channel.get(name, errors)["tolerances"]}
+        for name, errors in gap.per_channel.items()
+    }
+    ends = {**gap.intervals, "tolerances": fitted.intervals["tolerances"]}
+    return replace(gap, tolerances=fitted.tolerances, per_channel=channels, intervals=ends)
 
 
 def interval(draws: Array) -> Interval:

@@ -8,7 +8,7 @@ import pytest
 
 from sysid_node.aircraft.model import Geometry, Inertia
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.validation.spectral_error import gap_of, interval, shrinkage
+from sysid_node.gap.validation.spectral_error import Gap, gap_of, interval, shrinkage, within_tolerances
 
 
 def test_what_is_closed_is_a_share_of_what_could_be() -> None:
@@ -22,6 +22,18 @@ def test_all_is_never_more_than_all() -> None:
     before = random.uniform(0.1, 3.0, 10000)
     floor = before * random.uniform(0.0, 0.9, 10000)
     np.testing.assert_array_equal(shrinkage(np.stack([before, before, floor, floor], axis=-1)), 100.0)
+
+
+def gap_with(tolerances: float) -> Gap:
+    """A gap whose errors within tolerances are this; of the other numbers each is its own."""
+    rows = {"q": {"before": 0.6, "tolerances": tolerances, "after": 0.1, "noise_floor": 0.05}}
+    ends = {"before": (0.5, 0.7), "tolerances": (tolerances, 1.0), "after": (0.0, 0.2), "noise_floor": (0.0, 0.1)}
+    return Gap(0.6, tolerances, 0.1, 0.05, 90.0, (80.0, 95.0), rows, ends)
+
+
+@pytest.mark.parametrize(("fitted", "stated"), [(0.4, 0.4), (0.7, 0.6)])
+def test_within_tolerances_the_better_of_fitted_and_filed_derivatives_is_stated(fitted: float, stated: float) -> None:
+    assert within_tolerances(gap_with(0.6), gap_with(fitted)) == gap_with(stated)
 
 
 class Windows:
