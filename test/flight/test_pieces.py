@@ -53,6 +53,16 @@ def test_the_pieces_are_the_flight(bags: Path, storage: str, size: int) -> None:
     assert [one for piece in pieces for one in piece.commands] == read_commands(bags / storage)
 
 
+def test_commands_read_in_place_of_positions_are_the_commands_too(bags: Path) -> None:
+    topics = topic_names([f"actuators:={COMMANDS}"])
+    whole = read_streams(bags / "mcap", topics)
+    with flight_pieces(bags / "mcap", AIRCRAFT, topics, size=250) as flight:
+        pieces = list(flight.pieces)
+    parts = [piece.streams.actuators.positions for piece in pieces if len(piece.streams.actuators.arrival)]
+    np.testing.assert_array_equal(np.concatenate(parts), whole.actuators.positions)
+    assert [one for piece in pieces for one in piece.commands] == read_commands(bags / "mcap")
+
+
 def test_joints_that_come_later_keep_the_places_of_the_earlier(tmp_path: Path) -> None:
     store, none = type_store(), np.zeros(0)
     write_streams(tmp_path / "base", made_streams(0.2))

@@ -41,20 +41,22 @@ def read_pieces(
 ) -> Iterator[dict[str, RawMessages]]:
     """The same in pieces of ``size`` messages or a few more: those of one log time are not parted.
 
-    Without a size there is one piece; none where the bag holds no message of these.
+    Without a size there is one piece; none where the bag holds no message of these. A connection may stand under
+    several names: commands that are read in place of the positions are the commands, too.
     """
-    every = [connection for connections in chosen.values() for connection in connections]
+    every = {connection.id: connection for connections in chosen.values() for connection in connections}
     found, last = {name: _Parts([], [], []) for name in chosen}, None
-    by_connection = {connection.id: name for name, connections in chosen.items() for connection in connections}
+    names = {key: [name for name, some in chosen.items() if connection in some] for key, connection in every.items()}
     count = 0
-    for place, (connection, log_ns, message) in enumerate(reader.messages(every) if every else ()):
+    for place, (connection, log_ns, message) in enumerate(reader.messages(every.values()) if every else ()):
         if size is not None and count >= size and log_ns != last:
             yield _packed(found)
             found, count = {name: _Parts([], [], []) for name in chosen}, 0
-        data, logs, order = found[by_connection[connection.id]]
-        data.append(message)
-        logs.append(log_ns)
-        order.append(place)
+        for name in names[connection.id]:
+            data, logs, order = found[name]
+            data.append(message)
+            logs.append(log_ns)
+            order.append(place)
         last, count = log_ns, count + 1
     if count:
         yield _packed(found)
