@@ -1,9 +1,10 @@
 """Damaged input for every reader and command: none may crash, hang, print a traceback or end with other than 0 or 2.
 
-Each case is a process of its own, with a limit of time and of memory. What breaks is kept as a case, with its input and
-its command; at the end stands a table of what was tried and what broke.
+Each case is a process of its own, with a limit of time and of memory. The next case is always of the kind that has
+taken the least processor time so far, so that all kinds have the same share of it. What breaks is kept as a case, with
+its input and its command; at the end stands a table of what was tried and what broke.
 
-    python -m bench.robustness.fuzz [--seconds 600] [--seed 1] [--logs ../shared/logs] [--out out/fuzz]
+    python -m bench.robustness.fuzz [--seconds 600] [--cases 10000] [--seed 1] [--logs LOGS] [--out out/fuzz]
     python -m bench.robustness.fuzz --again out/fuzz/0001
 """
 
@@ -22,10 +23,11 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from bench.pages import publish, table
 from bench.robustness.seeds import Seeds
 from bench.robustness.targets import Targets
 from sysid_node.cli.main import main as sysid
@@ -36,7 +38,7 @@ SLOW_LONGEST, SLOW_MEMORY = 600.0, 16 * 2**30  # the same of one that compiles; 
 WITHOUT_QUIET = ("check",)
 PRELOADED = ("sysid_node.api.identification", "sysid_node.api.fleet_run", "sysid_node.view.recording", "rerun", "jax")
 KEPT = 3  # cases of each kind of break
-SLOW_EVERY = 40  # rounds between cases of the slow kinds
+_WHO = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 
 
 class Outcome(NamedTuple):
@@ -106,35 +108,60 @@ def preload() -> None:
         importlib.import_module(name)
 
 
-def hunt(
-    seeds: Seeds, seconds: float, rounds: int, seed: int, out: Path
-) -> tuple[Counter[str], Counter[tuple[str, str]]]:
-    """Cases tried by kind, and breaks by kind and what was wrong; the first of each are kept under ``out``.
+class Tally:
+    """What was tried: cases and their processor time (s) by kind, breaks by kind and what was wrong."""
 
-    A round has one case of each quick kind, and one round in ``SLOW_EVERY``, beginning with the last of so many, of
-    each slow one; the hunt ends after ``rounds`` or ``seconds``.
+    def __init__(self, kinds: Iterable[str]) -> None:
+        self.seconds = dict.fromkeys(kinds, 0.0)
+        self.tried: Counter[str] = Counter()
+        self.broke: Counter[tuple[str, str]] = Counter()
+
+    def next(self) -> str:
+        """The kind that has taken the least time so far."""
+        return min(self.seconds, key=lambda kind: (self.seconds[kind], self.tried[kind]))
+
+    def text(self) -> str:
+        """The table, and what broke."""
+        rows = [
+            [kind, f"{self.tried[kind]}", f"{sum(n for (of, _), n in self.broke.items() if of == kind)}", f"{used:.0f}"]
+            for kind, used in self.seconds.items()
+        ]
+        sums = (self.tried, self.broke, self.seconds)
+        rows.append(["all", f"{sums[0].total()}", f"{sums[1].total()}", f"{sum(sums[2].values()):.0f}"])
+        lines = [f"- {count} x {kind}: {what}" for (kind, what), count in self.broke.most_common()]
+        return "\n".join(
+            [table(("input", "tried", "broke", "processor time, s"), rows), *([""] if lines else []), *lines]
+        )
+
+
+def hunt(seeds: Seeds, seconds: float, cases: int, seed: int, out: Path, fast: bool = False) -> Tally:
+    """What so many ``cases`` found, or those that were done in so many seconds; breaks are kept under ``out``.
+
+    Each kind draws its cases from numbers of its own. ``fast`` leaves out the kinds that compile or fit.
     """
-    rng = random.Random(seed)
     targets = Targets(seeds)
-    quick, slow = targets.quick(), targets.slow()
-    tried: Counter[str] = Counter()
-    broke: Counter[tuple[str, str]] = Counter()
-    end = time.monotonic() + seconds
-    for number in range(1, rounds + 1):
-        if time.monotonic() > end:
-            break
-        for kind, case in {**quick, **(slow if number % SLOW_EVERY == 0 else {})}.items():
-            place = Path(tempfile.mkdtemp(prefix="sysid-fuzz-"))
-            words = case(place, rng)
-            limits = (SLOW_LONGEST, SLOW_MEMORY) if kind in slow else (LONGEST, MEMORY)
-            found = outcome_of(words, place, *limits)
-            tried[kind] += 1
-            if found.broke:
-                broke[kind, found.broke] += 1
-                if broke[kind, found.broke] <= KEPT:
-                    _keep(place, out / f"{sum(broke.values()):04d}", words, found)
-            shutil.rmtree(place, ignore_errors=True)
-    return tried, broke
+    quick, slow = targets.quick(), {} if fast else targets.slow()
+    kinds = {**quick, **slow}
+    rngs = {kind: random.Random(f"{seed} {kind}") for kind in kinds}
+    tally, end = Tally(kinds), time.monotonic() + seconds
+    while tally.tried.total() < cases and time.monotonic() < end:
+        kind, before = tally.next(), _spent()
+        place = Path(tempfile.mkdtemp(prefix="sysid-fuzz-"))
+        words = kinds[kind](place, rngs[kind])
+        found = outcome_of(words, place, *((SLOW_LONGEST, SLOW_MEMORY) if kind in slow else (LONGEST, MEMORY)))
+        tally.tried[kind] += 1
+        if found.broke:
+            tally.broke[kind, found.broke] += 1
+            if tally.broke[kind, found.broke] <= KEPT:
+                _keep(place, out / f"{tally.broke.total():04d}", words, found)
+        shutil.rmtree(place, ignore_errors=True)
+        tally.seconds[kind] += _spent() - before
+    return tally
+
+
+def _spent() -> float:
+    """Processor time of this process and of those that have ended, s."""
+    return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, _WHO))
 
 
 def _keep(place: Path, folder: Path, words: Sequence[str], found: Outcome) -> None:
@@ -160,24 +187,21 @@ def main() -> None:
     """Hunt, keep, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--rounds", type=int, default=10**9, help="at most; each has a case of every kind")
+    parser.add_argument("--cases", type=int, default=10**9, help="at most")
+    parser.add_argument("--fast", action="store_true", help="without simulate, excite and gap, which compile")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--logs", type=Path, help="a folder of sound logs to damage, too")
     parser.add_argument("--out", type=Path, default=Path("out/fuzz"))
     parser.add_argument("--again", type=Path, help="run a kept case again")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     if args.again:
         print(again(args.again))
         return
     preload()
     with tempfile.TemporaryDirectory(prefix="sysid-seeds-") as folder:
-        tried, broke = hunt(Seeds.made(Path(folder), args.logs), args.seconds, args.rounds, args.seed, args.out)
-    print("| input | tried | broke |\n|---|---:|---:|")
-    for kind, count in tried.items():
-        print(f"| {kind} | {count} | {sum(n for (of, _), n in broke.items() if of == kind)} |")
-    print(f"| all | {sum(tried.values())} | {sum(broke.values())} |")
-    for (kind, what), count in broke.most_common():
-        print(f"{count:5d} x {kind}: {what}")
+        tally = hunt(Seeds.made(Path(folder), args.logs), args.seconds, args.cases, args.seed, args.out, args.fast)
+    publish("bench/robustness/fuzz.py", tally.text(), args.page)
 
 
 if __name__ == "__main__":
