@@ -26,6 +26,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -201,19 +202,29 @@ def test_excitation_is_bounded_and_leaves_nothing_behind(client: Client) -> None
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(values=st.tuples(*[ANY] * 9), seconds=st.integers(-(2**31), 2**31 - 1), text=st.text("aeilorv/_ .", max_size=8))
+@given(
+    values=st.tuples(*[ANY] * 9),
+    seconds=st.integers(-(2**31), 2**31 - 1),
+    text=st.text("aeilorv/_ .", max_size=8),
+    cut=st.integers(1, 30),
+)
 def test_whatever_is_sent_commands_stay_within_the_limits(
-    client: Client, vehicles: Vehicles, values: tuple[float, ...], seconds: int, text: str
+    client: Client, vehicles: Vehicles, values: tuple[float, ...], seconds: int, text: str, cut: int
 ) -> None:
-    """Every input of the controller, and that of the simulator."""
+    """Every input of the controller, and that of the simulator; some messages are cut off."""
     stamped = Header(stamp=Time(sec=seconds, nanosec=0), frame_id=text)
     client.say_imu(values[:3])
     client.say_air(values[3:7])
+    at_odd_times = (client.imu, Imu(header=stamped)), (client.air, AirData(header=stamped, true_airspeed=SPEED))
+    for publishers, message in at_odd_times:
+        for publisher in publishers:
+            publisher.publish(message)
     anything = JointState(header=stamped, name=["elevator", text, "roll", "pitch_rate"], position=list(values[:4]))
     wrong_length = JointState(header=stamped, name=["elevator"], position=list(values))
     for message in (anything, wrong_length):
         for publisher in (client.excitation, client.points, client.command, *client.others):
             publisher.publish(message)
+            publisher.publish(serialize_message(message)[:-cut])
     client.faults.publish(fault(text, text))
     estimate = DerivativeEstimate(name="Cm_de", value=values[7], lower=values[8], upper=values[0], valid=True)
     client.estimates.publish(DerivativeEstimates(header=stamped, aircraft="cdrw", derivatives=[estimate]))

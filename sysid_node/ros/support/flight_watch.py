@@ -11,12 +11,14 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
+from sysid_node.flight.live.messages import UNREADABLE
 from sysid_node.flight.live.news import FlightNews
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.types import Estimates
@@ -27,6 +29,7 @@ FAULTS = "fault_monitor/faults"
 
 #: Least time between two messages of a topic that are decoded, s: more than the eye sees are left out as they come.
 _PERIODS = {IMU: 0.02, AIR_DATA: 0.02, ACTUATORS: 0.02, DERIVATIVES: 0.1, FAULTS: 0.0}
+_QUIET = 10.0  # s between two lines in the log about damaged messages
 
 
 class FlightWatch:
@@ -71,16 +74,26 @@ class FlightWatch:
         self.node.destroy_node()
 
     def _sparsely(self, kind: Any, topic: str, take: Callable[[Any], None]) -> Callable[[bytes], None]:
-        """A callback that decodes serialised messages, and leaves out those that follow too soon by their stamps."""
+        """A callback that decodes serialised messages, and leaves out those that follow too soon by their stamps.
+
+        Those that are damaged are left out, too, and the log says so.
+        """
         period, due = round(NANOSECONDS * _PERIODS[topic]), 0
 
         def on_message(raw: bytes) -> None:
             nonlocal due
-            seconds, nanoseconds = struct.unpack_from("<iI" if raw[1] & 1 else ">iI", raw, 4)  # after CDR's own header
-            stamp = seconds * NANOSECONDS + nanoseconds
-            if not 0 < due - stamp <= period:
-                due = stamp + period
-                take(deserialize_message(raw, kind))
+            try:
+                seconds, nanoseconds = struct.unpack_from("<iI" if raw[1] & 1 else ">iI", raw, 4)  # after CDR's header
+                stamp = seconds * NANOSECONDS + nanoseconds
+                if 0 < due - stamp <= period:
+                    return
+                message = deserialize_message(raw, kind)
+            except (struct.error, IndexError, rclpy_implementation.RMWError):
+                name = self.node.resolve_topic_name(topic)
+                self.node.get_logger().warning(f"{name}: a message is {UNREADABLE}", throttle_duration_sec=_QUIET)
+                return
+            due = stamp + period
+            take(message)
 
         return on_message
 
