@@ -21,7 +21,16 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
-from sysid_node.flight.checks import DUPLICATE, OUT_OF_ORDER, UNSTAMPED, air_data_faults, gap, imu_faults
+from sysid_node.flight.checks import (
+    BEYOND,
+    DUPLICATE,
+    LATEST_STAMP_NS,
+    OUT_OF_ORDER,
+    UNSTAMPED,
+    air_data_faults,
+    gap,
+    imu_faults,
+)
 from sysid_node.flight.commanded import (
     AROUND,
     RecordedCommands,
@@ -92,15 +101,16 @@ def seconds_since(start_ns: int | np.int64, stamps: Stamps) -> Array:
 
 
 def screen(arrival: Arrival, values: Array, faults: NDArray[np.object_], last: int | None = None) -> ScreenedMessages:
-    """Leave out messages that have a fault (N,), then those whose stamp is absent, repeated or late.
+    """Leave out messages that have a fault (N,), then those whose stamp is absent, impossible, repeated or late.
 
     ``last`` is the latest stamp (ns) among the topic's messages before these; None = these are the first.
     """
     good = np.array([fault is None for fault in faults], bool) if faults.size else np.empty(0, bool)
     rejected = Counter(faults[~good].tolist())
-    stamped = arrival.stamp_ns > 0
+    stamped, beyond = arrival.stamp_ns > 0, arrival.stamp_ns >= LATEST_STAMP_NS
     rejected[UNSTAMPED] = int(np.count_nonzero(good & ~stamped))
-    kept = np.flatnonzero(good & stamped)
+    rejected[BEYOND] = int(np.count_nonzero(good & beyond))
+    kept = np.flatnonzero(good & stamped & ~beyond)
     step, back = _steps(arrival.stamp_ns[kept], last)
     rejected[DUPLICATE] = int(np.count_nonzero(step == 0))
     rejected[OUT_OF_ORDER] = int(np.count_nonzero(step < 0))

@@ -34,7 +34,10 @@ DENSITY = f"air_density not within {DENSITY_LOW:g} to {DENSITY_HIGH:g} kg/m^3"
 THROTTLE = f"throttle over {THROTTLE_LIMIT:g} (percent?)"
 THRUST = f"thrust over {THRUST_LIMIT:g} N"
 
+#: ROS counts a stamp's seconds in 32 bits; a day is left for what is stamped some time after a message.
+LATEST_STAMP_NS = (2**31 - 86_400) * 1_000_000_000
 UNSTAMPED = "no stamp"
+BEYOND = "stamp beyond January 2038"
 DUPLICATE = "duplicate stamp"
 OUT_OF_ORDER = "out of order"
 CLOCK_STEP = "clock step"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from typing import Any
@@ -30,7 +31,9 @@ from sysid_node.flight.autopilots.base import (
     adapter_for,
 )
 from sysid_node.flight.autopilots.known import ADAPTERS
+from sysid_node.flight.checks import LATEST_STAMP_NS
 from sysid_node.flight.live.conditions import Conditions
+from sysid_node.flight.live.messages import TOO_LATE
 from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.parameter import NodeParameter, annotated_yaml, check_each
@@ -103,6 +106,7 @@ class AdapterNode(Node):
             JointSample: (self.create_publisher(JointState, ACTUATORS, 100), joint_message),
         }
         self._conditions = Conditions()
+        self._left_out: Counter[str] = Counter()  # messages since the last report, by resolved topic
         self._monitors = [self._listen(kind, topic) for topic, kind in kinds.items()]
         self.add_on_set_parameters_callback(_refuse)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -126,7 +130,9 @@ class AdapterNode(Node):
                 sample = self._adapter.hear(topic, message)
             except AttributeError as error:  # the messages are of another release than the adapter knows
                 raise InputError(f"topic {topic}: {error}; {self._adapter.remedy}") from error
-            if sample is not None:
+            if sample is not None and abs(sample.stamp_ns) >= LATEST_STAMP_NS:
+                self._left_out[monitor.name] += 1
+            elif sample is not None:
                 publisher, as_message = self._out[type(sample)]
                 publisher.publish(as_message(sample))
 
@@ -138,7 +144,9 @@ class AdapterNode(Node):
             for monitor in self._monitors
             if monitor.waited() > UNHEARD
         }
-        say(self, self._conditions.update(present))
+        late = {name: f"{count} messages are {TOO_LATE}" for name, count in self._left_out.items()}
+        self._left_out.clear()
+        say(self, self._conditions.update({**late, **present}))
         status = DiagnosticSource(full_name(self), self._name).input(self._monitors, {}, self._stale_after)
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()

@@ -10,7 +10,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight import align as alignment
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import AIR_INTERVAL, align, counts_by_reason, flight_record
-from sysid_node.flight.checks import DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
+from sysid_node.flight.checks import BEYOND, DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
 from sysid_node.flight.streams import Arrival
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -105,10 +105,10 @@ def test_no_interpolation_across_a_gap():
 def test_faulty_stamps_are_counted_by_reason():
     streams = made_streams(2.0)
     stamps = streams.imu.arrival.stamp_ns.copy()
-    stamps[50], stamps[60], stamps[70] = stamps[49], 0, stamps[70] - 20_000_000
+    stamps[50], stamps[60], stamps[70], stamps[80] = stamps[49], 0, stamps[70] - 20_000_000, 2**31 * 10**9
     aligned = align(AIRCRAFT, dataclasses.replace(streams, imu=with_stamps(streams.imu, stamps)), 1.0)
     counts = aligned.rejected[IMU]
-    assert (counts[DUPLICATE], counts[UNSTAMPED], counts[OUT_OF_ORDER]) == (1, 1, 1)
+    assert (counts[DUPLICATE], counts[UNSTAMPED], counts[OUT_OF_ORDER], counts[BEYOND]) == (1, 1, 1, 1)
     assert np.all(np.diff(aligned.stamps) > 0)
 
 

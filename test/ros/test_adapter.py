@@ -3,24 +3,30 @@
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import partial
 from importlib.util import find_spec
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import rclpy
 import yaml
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Vector3
 from harness import ROOT, Probe
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import FluidPressure, Imu, JointState
+from std_msgs.msg import Header
 from sysid_msgs.msg import AirData
 
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.attitude import Attitude
-from sysid_node.flight.autopilots.base import ImuSample, Sample, header_ns
+from sysid_node.flight.autopilots.base import AdapterSettings, ImuSample, Sample, header_ns
 from sysid_node.flight.autopilots.mavros import IMU, PRESSURE, Mavros
 from sysid_node.flight.autopilots.px4 import Px4
 from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler
@@ -57,6 +63,18 @@ def adapter(kind: type, **values: object) -> AdapterNode:
     return AdapterNode({"mine": kind}, parameter_overrides=overrides)
 
 
+@pytest.fixture(scope="module")
+def standard(ros: None) -> Iterator[tuple[AdapterNode, Any, Any]]:
+    """A node, and publishers of what it hears."""
+    node, other = adapter(Standard), rclpy.create_node("autopilot")
+    publishers = [other.create_publisher(*one, 100) for one in ((Imu, IMU), (FluidPressure, PRESSURE))]
+    while not all(publisher.get_subscription_count() for publisher in publishers):
+        rclpy.spin_once(node, timeout_sec=0.05)
+    yield node, *publishers
+    node.destroy_node()
+    other.destroy_node()
+
+
 def test_messages_go_through(probe: Probe) -> None:
     node = adapter(Standard, air_temperature=15.0)
     heard: dict[str, Any] = {}
@@ -88,6 +106,61 @@ def test_messages_go_through(probe: Probe) -> None:
     assert (list(heard["actuators"].name), list(heard["actuators"].position)) == (["elevator"], [0.25])
     assert {conversion.stamp_ns(message.header.stamp) for message in heard.values()} == {STAMP}
     assert probe.diagnostics["adapter: input"].hardware_id == "mine"
+
+
+ANY = st.floats(allow_nan=True, allow_infinity=True)
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(values=st.tuples(*[ANY] * 12), seconds=st.integers(-(2**31), 2**31 - 1), nanoseconds=st.integers(0, 2**32 - 1))
+def test_whatever_an_autopilot_sends_it_goes_on(
+    standard: tuple[AdapterNode, Any, Any], values: tuple[float, ...], seconds: int, nanoseconds: int
+) -> None:
+    node, imu, pressure = standard
+    header = Header(stamp=Time(sec=seconds, nanosec=nanoseconds))
+    axes = [dict(zip("xyz", values[i : i + 3], strict=True)) for i in (0, 3)]
+    imu.publish(Imu(header=header, linear_acceleration=Vector3(**axes[0]), angular_velocity=Vector3(**axes[1])))
+    for variance in (0.0, values[6]):
+        pressure.publish(FluidPressure(header=header, fluid_pressure=values[7], variance=variance))
+    imu.publish(serialize_message(Imu(header=header))[:-9])
+    for _ in range(6):
+        rclpy.spin_once(node, timeout_sec=0.002)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    values=st.lists(st.floats(width=32, allow_nan=True, allow_infinity=True), min_size=11, max_size=11),
+    stamps=st.tuples(*[st.integers(0, 2**64 - 1)] * 2),
+    source=st.integers(-128, 127),
+)
+def test_whatever_a_px4_sends_has_samples(values: list[float], stamps: tuple[int, int], source: int) -> None:
+    """Its messages are not installed here; any object with their fields will do."""
+    px4 = Px4(AdapterSettings("elevator=servo1:0:1 throttle=motor1:0:1"))
+    both = {"timestamp": stamps[0], "timestamp_sample": stamps[1], "control": values[:8], "rho": values[8]}
+    imu = {"gyro_rad": values[:3], "accelerometer_m_s2": values[3:6], "accelerometer_timestamp_relative": 0}
+    air = {"airspeed_source": source, "true_airspeed_m_s": values[9]}
+    constant = {"RELATIVE_TIMESTAMP_INVALID": 2**31 - 1}
+    message = SimpleNamespace(q=[1.0, 0.0, 0.0, 0.0], **both, **imu, **air, **constant)
+    for topic in px4.topics:
+        px4.hear(topic, message)
+    message.timestamp = message.timestamp_sample
+    for topic in px4.topics:
+        px4.hear(topic, message)
+
+
+def test_a_stamp_that_ros_cannot_hold_is_said(standard: tuple[AdapterNode, Any, Any], probe: Probe, capfd: Any) -> None:
+    """It ended the node."""
+    node, imu, _ = standard
+    said = ""
+
+    def heard() -> bool:
+        nonlocal said
+        imu.publish(Imu(header=Header(stamp=Time(sec=2**31 - 1, nanosec=2**32 - 1))))
+        rclpy.spin_once(node, timeout_sec=0.05)
+        said += capfd.readouterr().err
+        return f"{IMU}: " in said and "messages are stamped beyond January 2038" in said
+
+    probe.until(heard)
 
 
 def test_an_attitude_is_published_in_ros_axes() -> None:

@@ -204,15 +204,16 @@ def test_excitation_is_bounded_and_leaves_nothing_behind(client: Client) -> None
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     values=st.tuples(*[ANY] * 9),
-    seconds=st.integers(-(2**31), 2**31 - 1),
+    seconds=st.integers(-(2**31), 2**31 - 1) | st.just(2**31 - 1),
+    nanoseconds=st.integers(0, 2**32 - 1),
     text=st.text("aeilorv/_ .", max_size=8),
     cut=st.integers(1, 30),
 )
 def test_whatever_is_sent_commands_stay_within_the_limits(
-    client: Client, vehicles: Vehicles, values: tuple[float, ...], seconds: int, text: str, cut: int
+    client: Client, vehicles: Vehicles, values: tuple[float, ...], seconds: int, nanoseconds: int, text: str, cut: int
 ) -> None:
     """Every input of the controller, and that of the simulator; some messages are cut off."""
-    stamped = Header(stamp=Time(sec=seconds, nanosec=0), frame_id=text)
+    stamped = Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=text)
     client.say_imu(values[:3])
     client.say_air(values[3:7])
     at_odd_times = (client.imu, Imu(header=stamped)), (client.air, AirData(header=stamped, true_airspeed=SPEED))

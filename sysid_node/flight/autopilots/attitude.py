@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from sysid_node.flight.checks import RATE_LIMIT
+
 #: An attitude is not propagated over more than this time, s.
 OLDEST = 0.1
 
@@ -73,8 +75,12 @@ class LastAttitude:
         self._stamp_ns, self._attitude = stamp_ns, attitude
 
     def at(self, stamp_ns: int, rates: tuple[float, float, float]) -> Attitude | None:
-        """The attitude at a time (ns), at these body rates (rad/s); None where the newest is over 0.1 s away."""
+        """The attitude at a time (ns), at these body rates (rad/s).
+
+        None where the newest is over 0.1 s away, or the rates are none of an aircraft (see ``flight.checks``).
+        """
         seconds = (stamp_ns - self._stamp_ns) / 1e9
-        if self._attitude is None or not abs(seconds) <= OLDEST:
+        turning = all(abs(rate) <= RATE_LIMIT for rate in rates)
+        if self._attitude is None or not turning or not abs(seconds) <= OLDEST:
             return None
         return propagated(self._attitude, rates, seconds)

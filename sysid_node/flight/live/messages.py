@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from sysid_node.flight.cdr.message_reader import Text
+from sysid_node.flight.checks import LATEST_STAMP_NS
 from sysid_node.flight.frames import tilt_from_quaternion
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
@@ -17,6 +18,9 @@ Texts = tuple[Text, ...]
 Paths = tuple[tuple[str, ...], tuple[str, ...]]
 
 UNREADABLE = "not a message of this type"
+TOO_LATE = "stamped beyond January 2038"
+#: Seconds of a stamp from which on a message is left out.
+LATEST_SECONDS = LATEST_STAMP_NS // 1_000_000_000
 
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _VECTORS = tuple(f"{vector}.{axis}" for vector in ("angular_velocity", "linear_acceleration") for axis in "xyz")

@@ -25,8 +25,10 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import STEP_BACK_NS, STEP_FORWARD_NS, Rejected, buffer_ns, gap_ns
 from sysid_node.flight.checks import (
+    BEYOND,
     CLOCK_STEP,
     DUPLICATE,
+    LATEST_STAMP_NS,
     OUT_OF_ORDER,
     UNSTAMPED,
     air_data_fault,
@@ -55,8 +57,8 @@ class _Clock:
 
     def fault(self, stamp: int) -> str | None:
         """What is wrong with the next stamp, or None: it is taken."""
-        if stamp <= 0:
-            return UNSTAMPED
+        if not 0 < stamp < LATEST_STAMP_NS:
+            return UNSTAMPED if stamp <= 0 else BEYOND
         step = 1 if self.last is None else stamp - self.last
         if 0 < step <= STEP_FORWARD_NS:
             self.last, self.leapt_to = stamp, None

@@ -18,7 +18,7 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.flight.frames import BodyFrame, euler_from_quaternion, turn_vectors
-from sysid_node.flight.live.messages import UNREADABLE
+from sysid_node.flight.live.messages import LATEST_SECONDS, TOO_LATE, UNREADABLE
 from sysid_node.flight.live.news import FlightNews
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.types import Estimates
@@ -76,7 +76,7 @@ class FlightWatch:
     def _sparsely(self, kind: Any, topic: str, take: Callable[[Any], None]) -> Callable[[bytes], None]:
         """A callback that decodes serialised messages, and leaves out those that follow too soon by their stamps.
 
-        Those that are damaged are left out, too, and the log says so.
+        Those that are damaged or stamped too late are left out, too, and the log says so.
         """
         period, due = round(NANOSECONDS * _PERIODS[topic]), 0
 
@@ -88,12 +88,15 @@ class FlightWatch:
                 if 0 < due - stamp <= period:
                     return
                 message = deserialize_message(raw, kind)
+                reason = TOO_LATE if seconds >= LATEST_SECONDS else ""
             except (struct.error, IndexError, rclpy_implementation.RMWError):
+                reason = UNREADABLE
+            if reason:
                 name = self.node.resolve_topic_name(topic)
-                self.node.get_logger().warning(f"{name}: a message is {UNREADABLE}", throttle_duration_sec=_QUIET)
-                return
-            due = stamp + period
-            take(message)
+                self.node.get_logger().warning(f"{name}: a message is {reason}", throttle_duration_sec=_QUIET)
+            else:
+                due = stamp + period
+                take(message)
 
         return on_message
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -20,7 +21,7 @@ from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.conditions import Conditions, ReportedStates
-from sysid_node.flight.live.messages import UNREADABLE, Numbers, Paths, Texts
+from sysid_node.flight.live.messages import LATEST_SECONDS, TOO_LATE, UNREADABLE, Numbers, Paths, Texts
 from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.parameter import NodeParameter, check_each
 from sysid_node.ros.support import conversion
@@ -64,7 +65,7 @@ class LoopNode(Node, ABC):
         self.inputs: dict[str, TopicMonitor] = {}  # by topic; the monitors' names are the resolved ones
         self.present: Mapping[str, str] = {}  # the conditions that were found last
         self._needed: set[str] = set()  # topics without which the node cannot do its work
-        self._unreadable: dict[str, int] = {}  # messages since the last report, by resolved topic
+        self._left_out: Counter[tuple[str, str]] = Counter()  # since the last report, by resolved topic and reason
         self._conditions, self._states = Conditions(), ReportedStates()
         self._table, self._live = table, live
         declare(self, table, lambda values: check_each(table, values))
@@ -100,21 +101,23 @@ class LoopNode(Node, ABC):
         profile: QoSProfile | int,
         needed: bool = True,
     ) -> None:
-        """Subscribe to the numbers and texts at ``paths`` of messages that stay serialised; skip unreadable ones.
+        """Subscribe to the numbers and texts at ``paths`` of messages that stay serialised; leave bad ones out.
 
-        To make objects of all parts of a message would take longer than the work on it. Where a topic that is
-        ``needed`` is silent, the node says so.
+        Bad messages cannot be read, or are stamped too late; they are counted. To make objects of all parts of a
+        message would take longer than the work on it. Where a topic that is ``needed`` is silent, the node says so.
         """
         reader = MessageReader(fields_of, f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}", *paths)
 
         def on_message(raw: bytes) -> None:
             try:
                 message = reader.read(raw)
+                reason = TOO_LATE if message[0][0] >= LATEST_SECONDS else ""
             except DamageError:
-                name = self.inputs[topic].name
-                self._unreadable[name] = self._unreadable.get(name, 0) + 1
-                return
-            take(*message)
+                reason = UNREADABLE
+            if reason:
+                self._left_out[self.inputs[topic].name, reason] += 1
+            else:
+                take(*message)
 
         self.hear(kind, topic, on_message, profile, needed, raw=True)
 
@@ -156,14 +159,14 @@ class LoopNode(Node, ABC):
 
     def _on_tick(self) -> None:
         silent = self._silent()
-        unreadable = {name: f"{count} messages are {UNREADABLE}" for name, count in self._unreadable.items()}
-        self._unreadable = {}
+        left_out = {name: f"{count} messages are {why}" for (name, why), count in self._left_out.items()}
+        self._left_out.clear()
         self.present = self.conditions()
-        say(self, self._conditions.update({**silent, **unreadable, **self.present}))
+        say(self, self._conditions.update({**silent, **left_out, **self.present}))
         for line in self._states.update(self.states()):
             self.get_logger().warning(line)
         level, line, values = self.words()
-        missing = [f"{name}: {text}" for name, text in {**silent, **unreadable}.items() if name not in line]
+        missing = [f"{name}: {text}" for name, text in {**silent, **left_out}.items() if name not in line]
         pairs = [KeyValue(key=k, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for k, v in values.items()]
         status = DiagnosticStatus(
             level=max(level, DiagnosticStatus.WARN) if missing else level,

@@ -1,5 +1,7 @@
 """Attitudes against sysid_node.flight.frames, and against SciPy's rotations."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -40,3 +42,11 @@ def test_what_is_no_attitude_is_none() -> None:
     last.heard(0, Attitude(1.0, 0.0, 0.0, 0.0))
     assert last.at(100_000_000, (0.0, 0.0, 0.0)) is not None
     assert last.at(-101_000_000, (0.0, 0.0, 0.0)) is None
+
+
+@pytest.mark.parametrize("rate", [math.inf, -math.inf, math.nan, 1e200])
+def test_there_is_no_attitude_at_rates_that_no_aircraft_has(rate: float) -> None:
+    """The sine of an infinite angle used to end the adapter."""
+    last = LastAttitude()
+    last.heard(0, Attitude(1.0, 0.0, 0.0, 0.0))
+    assert last.at(1_000_000, (0.0, rate, 0.0)) is None

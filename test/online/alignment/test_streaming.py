@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from made_flights import JOINTS, made_aircraft, made_streams
 
 from sysid_node.flight.align import BUFFER_NS, STEP_FORWARD_NS
-from sysid_node.flight.checks import CLOCK_STEP, DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
+from sysid_node.flight.checks import BEYOND, CLOCK_STEP, DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.alignment.streaming import (
     BREAK_NS,
@@ -174,6 +174,7 @@ def test_reasons_by_topic():
     f.imu(START + 1 * MS, (0.0, 0.0, -9.8, 90.0, 0.0, 0.0))
     f.imu(0)
     f.imu(-5)
+    f.imu(2**31 * 10**9)
     f.imu(START + 2 * MS)
     f.imu(START + 2 * MS)
     f.imu(START + 1 * MS)
@@ -181,7 +182,8 @@ def test_reasons_by_topic():
     f.air(START, (18.0, 0.05, 0.0, 1.2))
     f.joints(START + 5 * MS, (0.5, 20.0, 0.0, 0.0, 0.0, 0.0))
     f.joints(START + 6 * MS, (0.1,), ("aileron",))
-    assert f.rejected(IMU) == {"angular rate over 35 rad/s (deg/s?)": 1, UNSTAMPED: 2, DUPLICATE: 1, OUT_OF_ORDER: 1}
+    stamps = {UNSTAMPED: 2, BEYOND: 1, DUPLICATE: 1, OUT_OF_ORDER: 1}
+    assert f.rejected(IMU) == {"angular rate over 35 rad/s (deg/s?)": 1, **stamps}
     assert f.rejected(AIR_DATA) == {"angle_of_attack over pi/2 rad (degrees?)": 1, DUPLICATE: 1}
     assert f.rejected(ACTUATORS) == {
         "joint 'elevator' over pi/2 rad (degrees?)": 1,
@@ -250,7 +252,7 @@ def test_air_data_without_imu_fill_no_memory():
 # Clocks that are set
 
 
-@pytest.mark.parametrize("leap", [-600_000_000_000, -2_000_000_000, STEP_FORWARD_NS + 10**9, 50 * 365 * 86400 * 10**9])
+@pytest.mark.parametrize("leap", [-600_000_000_000, -2_000_000_000, STEP_FORWARD_NS + 10**9, 10 * 365 * 86400 * 10**9])
 @pytest.mark.parametrize("first", [IMU, AIR_DATA])
 def test_a_clock_set_for_all_topics_breaks_the_time_and_mixes_nothing(leap, first):
     f = Feed()
