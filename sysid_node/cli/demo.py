@@ -1,9 +1,15 @@
-"""``sysid demo``: plays a recorded flight on ROS topics, identifies it live, and shows the estimates."""
+"""``sysid demo``: plays a recorded flight on ROS topics, identifies it live, and shows the estimates.
+
+Few aircraft measure where their surfaces are. Where the bag holds commands and positions, the flight is identified from
+the commands, and at the end it is said what the positions would have added.
+"""
 
 from __future__ import annotations
 
 import argparse
+import statistics
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,9 +27,12 @@ from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.align import stamp_spans, why_nothing_aligned
 from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.commands import COMMANDS, holds_commands
+from sysid_node.flight.logs.opening import carried_by
 from sysid_node.flight.streams import Streams
-from sysid_node.flight.topics import INPUT_TOPICS
+from sysid_node.flight.topics import ACTUATORS, INPUT_TOPICS, topic_names
 from sysid_node.flight.truth import read_truth
+from sysid_node.online import replay
 from sysid_node.online.alignment.in_pieces import AlignedSamples, align_streams
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
@@ -42,19 +51,19 @@ PUBLISH_RATE = 10.0  # Hz
 AFTERWARDS = 0.2  # s to listen after the flight's end, before its estimates are called stale
 DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics sends its last totals
 #: A bag may be played faster than it was flown; no message may be lost on a busy computer.
-RELIABLE = [
-    f"qos_overrides./{topic}.subscription.{policy}"
-    for topic in INPUT_TOPICS
-    for policy in ("reliability:=reliable", "depth:=5000")
-]
+RELIABLE = ("reliability:=reliable", "depth:=5000")
 
 
 @dataclass(frozen=True)
 class DemoFlight:
-    """The flight that is played, its aircraft, and the true derivatives."""
+    """The flight that is played, its aircraft, and the true derivatives.
+
+    ``topics``: the names under which the identifier hears its inputs.
+    """
 
     bag: Path
     aircraft: Aircraft
+    topics: Mapping[str, str]
     streams: Streams
     aligned: AlignedSamples
     truth: dict[str, float]  # empty where it is not known
@@ -63,6 +72,11 @@ class DemoFlight:
     def start_ns(self) -> int:
         """The header stamp of time zero."""
         return int(self.aligned.stamps[0]) - round(1e9 * float(self.aligned.time[0]))
+
+    @property
+    def from_commands(self) -> bool:
+        """Whether commands are heard in place of the surfaces' positions."""
+        return self.topics[ACTUATORS] == COMMANDS
 
     @property
     def reference(self) -> ReferenceValues:
@@ -79,6 +93,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument("--aircraft", default="cdrw", help="file or name (default: cdrw)")
     parser.add_argument("--rate", type=float, default=1.0, help="how many times as fast as flown (default: 1)")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/demo"), help="default: out/demo")
+    parser.add_argument("--positions", action="store_true", help="take measured positions of the surfaces")
     options.add_view(parser)
     options.add_force(parser)
     return parser
@@ -88,14 +103,19 @@ def run(args: argparse.Namespace) -> None:
     """Plays and identifies the flight, then writes the report and prints a summary."""
     if not args.rate > 0.0:
         raise InputError(f"--rate {args.rate:g}: expected a number over zero")
-    flight = _read(args.bag, load_aircraft(args.aircraft))
+    aircraft = load_aircraft(args.aircraft)
+    commanded = not args.positions and holds_commands(args.bag)
+    flight = _read(args.bag, aircraft, topic_names([f"{ACTUATORS}:={COMMANDS}"] if commanded else []))
     own_domain()
     inputs, logs = options.inputs_of([args.bag], args.aircraft), ("identifier.log", "player.log", "view.log")
     with output_folder(args.out, "demo", inputs=inputs, force=args.force, working=logs) as out:
         with viewer_beside(args.aircraft, args.view, args.out):
             follower, history = _fly(flight, args.aircraft, args.rate, args.out)
         out.publish(lambda folder: write_run(folder, _result(flight, follower, history)))
-    print(_summary(flight, history[-1], args.out))
+    print(_summary(flight, history[-1]))
+    if flight.from_commands:
+        print(_with_positions(flight, history[-1]))
+    print(f"report: {args.out / 'report.html'}")
     lost = _lost(flight, follower)
     if lost:
         print(f"{lost} messages were lost on the way; a lower --rate loses fewer")
@@ -114,12 +134,12 @@ def _result(flight: DemoFlight, follower: Follower, history: list[Estimates]) ->
     )
 
 
-def _read(bag: Path, aircraft: Aircraft) -> DemoFlight:
-    streams = read_streams(bag)
-    aligned = align_streams(aircraft, streams, OnlineSettings().max_gap)
+def _read(bag: Path, aircraft: Aircraft, topics: Mapping[str, str]) -> DemoFlight:
+    streams, settings = read_streams(bag, topics), OnlineSettings()
+    aligned = align_streams(aircraft, streams, settings.max_gap, carried_by(streams, settings.actuators))
     if not aligned.time.size:
         raise InputError(why_nothing_aligned(streams.name, stamp_spans(streams), aligned.rejected))
-    return DemoFlight(bag, aircraft, streams, aligned, read_truth(bag))
+    return DemoFlight(bag, aircraft, topics, streams, aligned, read_truth(bag))
 
 
 def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Follower, list[Estimates]]:
@@ -136,7 +156,9 @@ def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Fol
     follower = Follower(flight.start_ns)
     try:
         identifier = ["--ros-args", "-p", f"aircraft:={aircraft}", "-p", f"publish_rate:={PUBLISH_RATE}"]
-        identifier += [word for override in RELIABLE for word in ("-p", override)]
+        for ours, theirs in flight.topics.items():
+            identifier += ["-r", f"{ours}:={theirs}"]
+            identifier += [word for how in RELIABLE for word in ("-p", f"qos_overrides.{theirs}.subscription.{how}")]
         player = [str(flight.bag), "--rate", str(rate), "--wait", "20"]
         with node_process("identifier", identifier, out) as identifying, node_process("player", player, out) as playing:
             _watch(flight, follower, identifying, playing)
@@ -170,7 +192,8 @@ def _picture(flight: DemoFlight, follower: Follower, width: int, height: int | N
         title=f"{flight.aircraft.name}, {flight.bag.name}",
         seconds=follower.history[-1].time if follower.history else 0.0,
         duration=float(flight.aligned.time[-1]),
-        remark=" · ".join(f"{topic} {float(rate):.0f} Hz" for topic, rate in rates if rate),
+        # At the end the rates, of the last second, are those of silence.
+        remark=" · ".join(f"{topic} {float(rate):.0f} Hz" for topic, rate in rates if float(rate or 0) > 0.0),
         estimates=follower.history[-1] if follower.history else None,
     )
     return live_table(moment, tuple(flight.aircraft.derivatives), flight.reference, width, height)
@@ -189,14 +212,24 @@ def _lost(flight: DemoFlight, follower: Follower) -> int:
     return sent - sum(int(follower.word("input", f"{topic}: received") or 0) for topic in INPUT_TOPICS)
 
 
-def _summary(flight: DemoFlight, final: Estimates, out: Path) -> str:
-    """Three lines: valid derivatives, intervals that contain the reference, and the report."""
+def _summary(flight: DemoFlight, final: Estimates) -> str:
+    """Two lines: valid derivatives, and intervals that contain the reference."""
     valid = [d for d in final.derivatives.values() if d.valid]
     expected = flight.reference.values
     inside = sum(d.lower <= expected[d.name] <= d.upper for d in valid)
     what = "true value" if flight.truth else "aircraft file's value"
+    heard = "from commands" if flight.from_commands else "from measured positions"
     return (
-        f"{len(valid)} of {len(final.derivatives)} derivatives valid after {final.time:.0f} s of flight\n"
-        f"{inside} of these {len(valid)} intervals contain the {what}\n"
-        f"report: {out / 'report.html'}"
+        f"{len(valid)} of {len(final.derivatives)} derivatives valid after {final.time:.0f} s of flight, {heard}\n"
+        f"{inside} of these {len(valid)} intervals contain the {what}"
     )
+
+
+def _with_positions(flight: DemoFlight, final: Estimates) -> str:
+    """One line: what measured positions of the surfaces would have given, by a replay of the same flight."""
+    measured, settings = _read(flight.bag, flight.aircraft, topic_names()).aligned, OnlineSettings()
+    (best,) = replay.run(flight.aircraft, settings, measured.time, measured.samples, measured.time[-1:])
+    both = [name for name, d in best.derivatives.items() if d.valid and final.derivatives[name].valid]
+    ratio = [best.derivatives[name].standard_error / final.derivatives[name].standard_error for name in both]
+    width = f", with intervals {statistics.median(ratio):.2f} times as wide (median)" if ratio else ""
+    return f"with measured positions {sum(d.valid for d in best.derivatives.values())} would be valid{width}"

@@ -41,6 +41,13 @@ def read_commands(path: str | Path) -> list[JointMessage]:
         return decoded_commands(found)
 
 
+def holds_commands(path: str | Path) -> bool:
+    """Whether a bag holds commands beside the topic ``actuators``. Raises InputError where it cannot be read."""
+    path = Path(path)
+    with open_bag(path) as reader, reading(path):
+        return bool(command_connections(reader))
+
+
 def command_connections(reader: Reader) -> list[Connection]:
     """The connections of a bag on which commands were recorded; empty where there are none."""
     return [c for c in reader.connections if (c.topic, c.msgtype) == (COMMANDS, COMMANDS_TYPE)]

@@ -36,7 +36,11 @@ def test_it_identifies_the_bundled_flight_and_writes_the_report(tmp_path: Path) 
     valid = [name for name, found in summary["derivatives"].items() if found["valid"]]
     assert len(valid) >= 20, summary["derivatives"]
     # a busy machine may still be reading when the player has finished
-    assert re.search(rf"{len(valid)} of 27 derivatives valid after (5\d|60) s", done.stdout)
+    assert re.search(rf"{len(valid)} of 27 derivatives valid after (5\d|60) s of flight, from commands\n", done.stdout)
+    assert re.search(r"with measured positions 2\d would be valid, with intervals \d\.\d\d times as wide", done.stdout)
+    for name in ("elevator", "aileron", "rudder"):
+        servo = summary["servos"][name]
+        assert servo["valid"] and servo["lower"] < 0.04 < servo["upper"], servo  # s, the bag's truth
 
 
 @pytest.mark.parametrize(

@@ -28,9 +28,14 @@ class BudgetRow:
 
 
 def context(run: RunResult) -> Mapping[str, Any]:
-    """The rows, in the derivatives' order."""
-    final = run.final
-    return {"rows": [_row(name, shares) for name, shares in final.budget.items() if shares] if final else []}
+    """The rows, in the derivatives' order; without any, whether the estimates state systematic errors all the same.
+
+    The messages of the live node do, but hold no budget.
+    """
+    if run.final is None:
+        return {"rows": [], "stated": False}
+    rows = [_row(name, shares) for name, shares in run.final.budget.items() if shares]
+    return {"rows": rows, "stated": any(d.systematic_error > 0.0 for d in run.final.derivatives.values())}
 
 
 def _row(name: str, shares: Mapping[str, float]) -> BudgetRow:

@@ -16,7 +16,7 @@ from sysid_node.report.pages.render import render_page
 from sysid_node.report.pages.run_page import SECTIONS
 from sysid_node.report.results.run_result import Prior, References, RunData, RunResult
 from sysid_node.report.results.signals import RunSignals, Spectra
-from sysid_node.report.sections import derivatives
+from sysid_node.report.sections import budget, derivatives
 
 VOID = {"meta", "link", "br", "rect", "line", "circle", "path"}
 
@@ -258,3 +258,11 @@ def test_figures_are_valid_plotly(full):
     assert full.figures
     for figure in full.figures:
         assert graph_objects.Figure(figure).data, "a key that Plotly does not know raises"
+
+
+def test_a_live_estimate_whose_errors_have_no_parts_is_not_called_exact():
+    noise = DerivativeEstimate("Cm_q", -1.0, 0.1, -1.2, -0.8, True, "ok")
+    live = noise._replace(systematic_error=0.05)
+    for estimate, stated in ((noise, False), (live, True)):
+        run = RunResult("kestrel", "iv_rft", [Estimates(1.0, {"Cm_q": estimate}, {})])
+        assert budget.context(run) == {"rows": [], "stated": stated}
