@@ -44,7 +44,7 @@ class Seeds:
     def made(cls, folder: Path, logs: Path | None) -> Seeds:
         """Six seconds of a bundled flight in every form; the aircraft file, its exports, catalogues; logs, if any."""
         aircraft = load_aircraft("cdrw")
-        streams = _first(read_streams(ROOT / "bags" / "cdrw_multistep"), 6.0)
+        streams = beginning(read_streams(ROOT / "bags" / "cdrw_multistep"), 6.0)
         for storage in ("mcap", "sqlite3"):
             write_streams(folder / storage, streams, storage)
         record = flight_record(aircraft, streams, 0.2)
@@ -64,7 +64,7 @@ def _command(*words: str) -> None:
         raise RuntimeError(f"sysid {words[0]} of sound input does not end well")
 
 
-def _first(streams: Streams, seconds: float) -> Streams:
+def beginning(streams: Streams, seconds: float) -> Streams:
     """The messages of the first seconds of a flight."""
     end = int(streams.imu.arrival.log_ns[0]) + int(seconds * 1e9)
     parts = {}

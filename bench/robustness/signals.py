@@ -1,8 +1,8 @@
 """Ctrl-C and SIGTERM at random times in every command: exit code, lines on stderr, and what is left behind.
 
-A time is that of the processor, from when Python begins to import to what the whole command takes, so that a busy
-computer meets the same places in the program. A command that is done before the signal arrives counts as such. What is
-left behind is anything beside ``--out`` or in it but finished results and finished steps of a diagnosis.
+A time is that of the processor, from when Python begins to import to what the whole command has taken before, so that
+a busy computer meets the same places in the program. A command that is done before the signal arrives counts as such.
+What is left behind is anything beside ``--out`` or in it but finished results and finished steps of a diagnosis.
 
     python -m bench.robustness.signals [--times 20] [--seed 1] [--only replay,gap] [--page docs/results/signals.md]
 """
@@ -25,58 +25,61 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from bench.pages import publish, table
+from bench.robustness.seeds import beginning
+from sysid_node.flight.bag.reader import read_streams
+from sysid_node.flight.bag.writer import write_streams
 
 ROOT = Path(__file__).resolve().parents[2]
-BAG = str(ROOT / "bags" / "cdrw_multistep")
+BAG = ROOT / "bags" / "cdrw_multistep"
+SHORT = 10.0  # s of the flight that the longer commands read
 SOONEST = 0.1  # s of processor time: by then Python has begun with the program itself
 PATIENCE = 120.0  # s by the clock until a command must have ended
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 
 class Case(NamedTuple):
-    """A command, and the processor time (s) within which the signal comes.
-
-    ``{made}`` stands for a folder with what commands read, ``{out}`` for what this one writes.
-    """
+    """A command: ``{made}`` stands for a folder with what commands read, ``{out}`` for what this one writes."""
 
     words: Sequence[str]
-    seconds: float
     quiet: bool = True
 
 
 _OUT = ("--out", "{out}")
+_SHORT = ("{made}/short", "--aircraft", "cdrw")
+_FLOWN = ("--aircraft", "cdrw", "--manoeuvre", "doublet", "--duration", "5")
 CASES: Mapping[str, Case] = MappingProxyType(
     {
-        "replay": Case(("replay", BAG, "--aircraft", "cdrw", *_OUT), 8.0),
-        "identify": Case(("identify", BAG, "--aircraft", "cdrw", "--method", "equation_error", *_OUT), 5.0),
-        "identify, output error": Case(
-            ("identify", BAG, "--aircraft", "cdrw", "--method", "output_error", *_OUT), 20.0
-        ),
-        "simulate": Case(("simulate", "--aircraft", "cdrw", "--manoeuvre", "3211", *_OUT), 8.0),
-        "excite": Case(("excite", "--aircraft", "cdrw", "--manoeuvre", "doublet", *_OUT), 10.0),
-        "gap": Case(("gap", BAG, "--aircraft", "cdrw", *_OUT), 25.0),
-        "fleet": Case(("fleet", "{made}/fleet.csv", "--workers", "1", *_OUT), 8.0),
-        "convert": Case(("convert", "{made}/log.csv", "--aircraft", "cdrw", *_OUT), 1.5),
-        "check": Case(("check", BAG), 1.5, quiet=False),
-        "view": Case(("view", "{made}/run", "--save", "{out}.rrd"), 2.5),
-        "report": Case(("report", "{made}/run"), 1.5),
-        "export": Case(("export", "cdrw", "--format", "jsbsim", *_OUT), 1.0),
-        "import": Case(("import", "{made}/model.xml", "--format", "jsbsim", *_OUT), 2.0),
-        "aircraft": Case(("aircraft", "cdrw", *_OUT), 2.0),
-        "demo": Case(("demo", BAG, "--rate", "10", *_OUT), 4.0, quiet=False),
-        "loop": Case(("loop", "--seconds", "5", *_OUT), 6.0, quiet=False),
+        "replay": Case(("replay", *_SHORT, *_OUT)),
+        "identify": Case(("identify", *_SHORT, "--method", "equation_error", *_OUT)),
+        "identify, output error": Case(("identify", *_SHORT, "--method", "output_error", *_OUT)),
+        "simulate": Case(("simulate", *_FLOWN, *_OUT)),
+        "excite": Case(("excite", *_FLOWN, *_OUT)),
+        "gap": Case(("gap", *_SHORT, *_OUT)),
+        "fleet": Case(("fleet", "{made}/fleet.csv", "--workers", "1", *_OUT)),
+        "convert": Case(("convert", "{made}/log.csv", "--aircraft", "cdrw", *_OUT)),
+        "check": Case(("check", str(BAG)), quiet=False),
+        "view": Case(("view", "{made}/run", "--save", "{out}.rrd")),
+        "report": Case(("report", "{made}/run")),
+        "export": Case(("export", "cdrw", "--format", "jsbsim", *_OUT)),
+        "import": Case(("import", "{made}/model.xml", "--format", "jsbsim", *_OUT)),
+        "aircraft": Case(("aircraft", "cdrw", *_OUT)),
+        "demo": Case(("demo", "{made}/short", "--rate", "10", *_OUT), quiet=False),
+        "loop": Case(("loop", "--seconds", "5", *_OUT), quiet=False),
     }
 )
 
 
 def make(folder: Path) -> None:
-    """What commands read: a run, a CSV, a model, a catalogue."""
+    """What commands read: a short flight, a run, a CSV, a model, a catalogue."""
+    write_streams(folder / "short", beginning(read_streams(BAG), SHORT))
     for words in (
-        ["replay", BAG, "--aircraft", "cdrw", "--out", str(folder / "run"), "--quiet", "--set", "publish_rate=1"],
+        ["replay", str(BAG), "--aircraft", "cdrw", "--out", str(folder / "run"), "--quiet", "--set", "publish_rate=1"],
         ["export", "cdrw", "--format", "jsbsim", "--out", str(folder / "model.xml"), "--quiet"],
     ):
         subprocess.run([sys.executable, "-m", "sysid_node.cli", *words], check=True, cwd=ROOT)
-    (folder / "fleet.csv").write_text(f"path,aircraft,tail\n{BAG},cdrw,7\n{BAG},cdrw,8\n", encoding="utf-8")
+    (folder / "fleet.csv").write_text(
+        f"path,aircraft,tail\n{folder}/short,cdrw,7\n{folder}/short,cdrw,8\n", encoding="utf-8"
+    )
     from sysid_node import load  # noqa: PLC0415  # a command of its own takes as long
     from sysid_node.flight.csv import write_csv  # noqa: PLC0415
 
@@ -93,6 +96,26 @@ def worked(process: int) -> float:
     return float("inf") if ended else (int(text[11]) + int(text[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def whole(case: Case, made: Path) -> float:
+    """Processor time that a command takes undisturbed, s; the second of two runs, as the first may compile."""
+    for _ in range(2):
+        with tempfile.TemporaryDirectory() as name:
+            with subprocess.Popen(command_of(case, Path(name, "out"), made), stdout=subprocess.DEVNULL) as process:
+                took, now = 0.0, 0.0
+                while now < float("inf"):
+                    took, now = now, worked(process.pid)
+                    time.sleep(0.01)
+            if process.returncode:
+                raise SystemExit(f"{' '.join(case.words)} ended with {process.returncode}")
+    return took
+
+
+def command_of(case: Case, out: Path, made: Path) -> list[str]:
+    """The command that reads ``made`` and writes ``out``."""
+    words = [word.replace("{out}", str(out)).replace("{made}", str(made)) for word in case.words]
+    return [sys.executable, "-m", "sysid_node.cli", *words, *(["--quiet"] if case.quiet else [])]
+
+
 def ended(case: Case, made: Path, number: signal.Signals, after: float) -> str:
     """How a command ended that was sent a signal after some processor time (s), in words; "as it should" if so."""
     with tempfile.TemporaryDirectory() as name:
@@ -100,8 +123,7 @@ def ended(case: Case, made: Path, number: signal.Signals, after: float) -> str:
         folder.mkdir()
         shutil.copytree(made, inputs)
         before = _content(inputs)
-        words = [word.replace("{out}", str(folder / "out")).replace("{made}", str(inputs)) for word in case.words]
-        command = [sys.executable, "-m", "sysid_node.cli", *words, *(["--quiet"] if case.quiet else [])]
+        command = command_of(case, folder / "out", inputs)
         with subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=ROOT
         ) as process:
@@ -152,14 +174,15 @@ def main() -> None:
         make(Path(name))
         for command in args.only.split(";"):
             case = CASES[command]
+            seconds = whole(case, Path(name))
             for number in CODES:
-                times = [rng.uniform(SOONEST, case.seconds) for _ in range(args.times)]
+                times = [rng.uniform(SOONEST, seconds) for _ in range(args.times)]
                 found = Counter(ended(case, Path(name), number, after) for after in times)
                 good, done = found.pop("as it should", 0), found.pop("was done", 0)
                 other = "; ".join(f"{count} x {what}" for what, count in found.most_common()) or "-"
-                rows.append([command, number.name, f"{good}", f"{done}", other])
+                rows.append([command, number.name, f"{seconds:.1f}", f"{good}", f"{done}", other])
                 print(rows[-1], file=sys.stderr, flush=True)
-    heads = ("command", "signal", "ended as it should", "was done before", "else")
+    heads = ("command", "signal", "within s", "ended as it should", "was done before", "else")
     publish("bench/robustness/signals.py", table(heads, rows), args.page)
 
 
