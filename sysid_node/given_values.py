@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
+#: PyYAML raises ValueError for dates like 2026-13-45 and for numbers with too many digits.
+_UNREADABLE = (yaml.YAMLError, ValueError, RecursionError)
 _WORDS = {"y", "Y", "n", "N"}  # booleans to rcl, texts to PyYAML
 
 
@@ -52,7 +54,7 @@ def _of_rule(rule: str, full_name: str) -> Iterator[Given]:
     node, _, name = left.rpartition(":")
     try:
         value = yaml.safe_load(text)
-    except yaml.YAMLError:
+    except _UNREADABLE:
         return
     if separator and (not node or full_name.endswith(f"/{node}")):
         yield Given(name, value, "on the command line")
@@ -61,7 +63,7 @@ def _of_rule(rule: str, full_name: str) -> Iterator[Given]:
 def _of_file(path: Path, full_name: str) -> Iterator[Given]:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+    except (OSError, *_UNREADABLE):
         return
     for pattern, block in _blocks(content, ""):
         if _matches(pattern, full_name):
@@ -98,7 +100,7 @@ def _flat(block: Any, name: str) -> Iterator[tuple[str, Any]]:
 def fits(value: Any, default: Any) -> bool:
     """Whether a value, read by PyYAML, is of the default's type to rcl, which also takes 1e3 for a number."""
     if isinstance(default, bool):
-        return isinstance(value, bool) or value in _WORDS
+        return isinstance(value, bool) or (isinstance(value, str) and value in _WORDS)
     if isinstance(default, float):
         return isinstance(value, float) or (isinstance(value, str) and _is_number(value))
     if isinstance(default, list):

@@ -84,7 +84,7 @@ def _csv_rows(path: Path, text: str) -> Iterator[_Row]:
 def _yaml_rows(path: Path, text: str) -> tuple[Iterable[_Row], str]:
     try:
         content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date like 2026-13-45
         raise InputError(f"catalogue {path}: is no YAML: {' '.join(str(error).split())}") from error
     if not isinstance(content, dict) or not isinstance(content.get("flights"), list):
         raise InputError(f"catalogue {path}: expected a key 'flights' with a list")

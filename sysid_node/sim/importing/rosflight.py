@@ -197,7 +197,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
         found = yaml.safe_load(text)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
-    except (yaml.YAMLError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date like 2026-13-45
         raise InputError(f"{path}: not valid YAML: {str(error).splitlines()[0]}") from error
     parameters: dict[str, Any] = {}
     for node in found.values() if isinstance(found, dict) else ():

@@ -98,6 +98,7 @@ def test_addresses_are_expanded_by_fsspec(tmp_path: Path) -> None:
         ("f.yaml", "flights: 3\n", "expected a key 'flights' with a list"),
         ("f.yaml", "flights: [{path: a, tial: 7}]\n", r"flights\[0\]: unknown key 'tial'"),
         ("f.yaml", "flights: [a\n", "is no YAML"),
+        ("f.yaml", "flights: [{path: a, date: 2026-13-45}]\n", "is no YAML: month must be in 1..12"),
     ],
 )
 def test_a_wrong_catalogue_is_one_line(tmp_path: Path, name: str, text: str, said: str) -> None:

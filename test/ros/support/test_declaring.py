@@ -3,9 +3,11 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sysid_node.errors import InputError
-from sysid_node.given_values import given_values
+from sysid_node.given_values import fits, given_values
 from sysid_node.parameter import NodeParameter
 from sysid_node.ros.support.declaring import refuse_mistyped
 
@@ -27,7 +29,18 @@ FILE = "/**:\n  ros__parameters:\n    adapt: true\n    gain: 2.0\n    method: iv
 
 
 @pytest.mark.parametrize(
-    "rule", ["adapt:=0", "adapt:=maybe", "gain:=high", "gain:=3", "method:=1", "lines:=fast", "node:adapt:=1"]
+    "rule",
+    [
+        "adapt:=0",
+        "adapt:=maybe",
+        "gain:=high",
+        "gain:=3",
+        "method:=1",
+        "lines:=fast",
+        "node:adapt:=1",
+        "adapt:=[true]",
+        "adapt:={a: 1}",
+    ],
 )
 def test_a_value_of_a_wrong_type_is_refused_over_a_file(tmp_path: Path, rule: str) -> None:
     name = rule.removeprefix("node:").partition(":=")[0]
@@ -57,6 +70,12 @@ def test_files_count_for_the_nodes_that_they_name(tmp_path: Path, head: str, hit
     text = f"{outer}:\n{inner}{':' if inner else ''}\n    ros__parameters:\n      adapt: 0\n      a: {{b: 1}}\n"
     found = {given.name: given.value for given in given_values(arguments(tmp_path, text), "/uav1/node")}
     assert found == ({"adapt": 0, "a.b": 1} if hit else {})
+
+
+@given(text=st.text(max_size=12) | st.sampled_from(["2026-13-45", "1" * 5000, "[" * 2000, "&a [*a]", "!!set {a}"]))
+def test_whatever_is_given_is_read_or_left_to_ros(text: str) -> None:
+    for one in given_values(["--ros-args", "-p", f"adapt:={text}"], "/node"):
+        assert fits(one.value, True) in (True, False)
 
 
 def test_what_ros_refuses_itself_is_left_to_it(tmp_path: Path) -> None:

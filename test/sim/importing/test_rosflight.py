@@ -126,6 +126,7 @@ def test_between_the_points_the_error_is_that_of_interpolation(tmp_path):
     [
         ("{}", "no wing_s under ros__parameters"),
         ("[1", "not valid YAML"),
+        ("a: 2026-13-45", "not valid YAML"),
         ("a: {ros__parameters: {wing_s: 1.0, wing_b: big}}", "wing_b: got 'big', expected a number"),
         ("a: {ros__parameters: {wing_s: 1.0}}", "wing_b is missing"),
         (f"a: {{ros__parameters: {{wing_s: {10**400}}}}}", "wing_s: got 1000.*, expected a number"),
