@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import NoReturn
 
 from sysid_node.errors import InputError, InputWarning, ModelWarning
@@ -52,6 +53,10 @@ REQUIREMENTS = {
     "scipy": "run",
     "yaml": "run",
 }
+
+LONGEST_NAME = 255  # bytes of a file's name
+_OUTPUTS = ("out", "save")  # arguments that have their own checks
+_NAMES_OR_FILES = ("model", "estimate")  # arguments that are no paths to argparse, but may be
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 ENDINGS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
@@ -103,6 +108,7 @@ def _run(command: str, arguments: Sequence[str]) -> int:
     if not args.command:
         parser.print_help()
         return BAD_INPUT
+    _refuse_long_names(args)
     with warnings.catch_warnings():
         warnings.simplefilter("always", InputWarning)
         if not args.debug:  # of NumPy, about numbers that are checked where they matter
@@ -113,6 +119,19 @@ def _run(command: str, arguments: Sequence[str]) -> int:
     for line in dict.fromkeys(later):
         print(line, file=sys.stderr)
     return DONE
+
+
+def _refuse_long_names(args: argparse.Namespace) -> None:
+    """Raise InputError where an input's name is longer than any that a file has.
+
+    The system says so in whatever place first looks for the file, as an error of another kind.
+    """
+    for name, value in vars(args).items():
+        for one in value if isinstance(value, list) else [value]:
+            place = Path(one) if isinstance(one, Path) or name in _NAMES_OR_FILES else Path()
+            too_long = any(len(os.fsencode(part)) > LONGEST_NAME for part in place.parts)
+            if too_long and name not in _OUTPUTS:
+                raise InputError(f"{one!s:.40}...: is longer than the {LONGEST_NAME} bytes that a name may have")
 
 
 def exit_code(command: str, work: Callable[[], int], *, debug: bool = False) -> int:

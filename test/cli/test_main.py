@@ -55,6 +55,23 @@ def test_errors_are_one_line_and_a_code(capsys, error, code, line):
     assert said(capsys) == line
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["check", "NAME"],
+        ["replay", "NAME", "--aircraft", "cdrw", "--out", "o"],
+        ["identify", "a.csv", "NAME", "--aircraft", "cdrw", "--method", "equation_error", "--out", "o"],
+        ["convert", "NAME", "--out", "o"],
+        ["import", "NAME", "--format", "jsbsim", "--out", "o"],
+        ["report", "NAME"],
+    ],
+)
+def test_a_name_that_no_file_can_have_is_one_line(capsys, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    assert main([word.replace("NAME", 300 * "x") for word in words]) == 2
+    assert said(capsys) == f"sysid {words[0]}: {40 * 'x'}...: is longer than the 255 bytes that a name may have"
+
+
 @pytest.mark.parametrize("arguments", [["--debug", *CONVERT], [*CONVERT, "--debug"]])
 def test_debug_shows_the_traceback(capsys, arguments):
     """There is no log.csv."""
