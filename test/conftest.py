@@ -135,6 +135,25 @@ def looked_at(tmp_path) -> Callable[..., list[dict]]:
     return look
 
 
+@pytest.fixture
+def fit_everywhere(looked_at) -> Callable[..., None]:
+    """Asserts that reports are whole at every width, light and dark: none overflows, no plot is empty or unlinked."""
+
+    def look(*paths: Path) -> None:
+        paper = set()
+        for dark in (False, True):
+            for page in looked_at(*paths, dark=dark):
+                where = f"{page['name']}, {page['width']} px, {'dark' if dark else 'light'}"
+                assert page["overflow"] <= 0 and not page["out"], f"{where}: {page['out']}"
+                assert page["plots"] > 0 and not page["empty"], f"{where}: {page['empty']}"
+                assert not page["labels"], f"{where}: {page['labels']}"
+                assert page["linked"] == page["plots"], f"{where}: {page['plots'] - page['linked']} plots without data"
+                paper.add((dark, page["paper"]))
+        assert len(paper) == 2  # one colour of paper in the light, another in the dark
+
+    return look
+
+
 #: Memory of a test worker from which freed memory is given back, and from which compiled programs are let go, MB. The
 #: programs of the gap for two lengths of flights take 700 MB beside 400 MB of libraries; to load them again costs 4 s.
 _LARGE, _TOO_LARGE = 1000.0, 1300.0

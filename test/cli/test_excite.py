@@ -80,6 +80,11 @@ def test_the_page_is_whole_and_stands_alone(folder):
     assert "doublet:rudder" in page
 
 
+def test_its_page_and_an_aircrafts_fit_every_width_light_and_dark(folder, tmp_path, fit_everywhere):
+    assert main(["aircraft", "cdfp", "--out", str(tmp_path / "aircraft"), "--quiet"]) == 0
+    fit_everywhere(folder / "report.html", tmp_path / "aircraft" / "report.html")
+
+
 def test_running_again_replaces(folder):
     assert sysid("--aircraft", "cdfp", "--manoeuvre", SPEC, "--out", folder, "--open-loop", *FAST) == 0
     assert json.loads((folder / "summary.json").read_text())["autopilot"] is False

@@ -23,11 +23,14 @@ def test_the_gap_closes_on_flight_held_out(lagging) -> None:
     assert gap.ci95[0] <= gap.shrink_percent <= gap.ci95[1]
 
 
-def test_its_report_is_drawn_without_a_complaint(lagging, tmp_path, browse) -> None:
-    write_gap_report(tmp_path / "report.html", lagging)
-    page = browse(tmp_path / "report.html")
+def test_its_report_is_drawn_and_fits_every_width(lagging, tmp_path, browse, fit_everywhere) -> None:
+    report = tmp_path / "gap" / "report.html"
+    report.parent.mkdir()
+    write_gap_report(report, lagging)
+    page = browse(report)
     assert page.complaints == []
     assert page.drawn == page.plots > len(lagging.simulation_gap.per_channel)
+    fit_everywhere(report)
 
 
 def test_tolerances_are_no_gap(aircraft, wrong_derivatives) -> None:

@@ -24,19 +24,26 @@ def node_process(name: str, arguments: Sequence[str], folder: Path) -> Iterator[
     command = [sys.executable, "-m", f"sysid_node.ros.{name}", *arguments]
     with log.open("wb") as file:
         process = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT)
-        with on_interrupt(lambda: _end(process)):
-            try:
-                yield process
-            finally:
-                _end(process)
+        with ended_at_last(process):
+            yield process
     if process.returncode:
         lines = log.read_text(encoding="utf-8").splitlines() or ["the log is empty"]
         raise RuntimeError(f"the {name} ended with code {process.returncode}: {lines[-1]}")
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """Interrupt a process, and kill it where it does not end."""
-    process.send_signal(signal.SIGINT)
+@contextlib.contextmanager
+def ended_at_last(process: subprocess.Popen[bytes], number: int = signal.SIGINT) -> Iterator[None]:
+    """A context at whose end, and before a signal ends this process, ``process`` is ended by the signal ``number``."""
+    with on_interrupt(lambda: _end(process, number)):
+        try:
+            yield
+        finally:
+            _end(process, number)
+
+
+def _end(process: subprocess.Popen[bytes], number: int) -> None:
+    """Send a process a signal, and kill it where it does not end."""
+    process.send_signal(number)
     try:
         process.wait(PATIENCE)
     except subprocess.TimeoutExpired:

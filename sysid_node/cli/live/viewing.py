@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.cli.live.processes import ended_at_last
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.interruption import on_interrupt
@@ -27,6 +28,7 @@ WINDOW = Path("-")
 
 PERIOD = 0.2  # s between two updates of the screen
 LOG = "view.log"
+_PATIENCE = 5.0  # s for the viewer to take the last news
 _NICE = 10  # lower priority than the identifier's: on a busy computer the screen waits, not the flight
 
 
@@ -73,8 +75,11 @@ def _show(scene: LiveScene, watch: FlightWatch, stream: Any) -> None:
 
 
 def _end(stream: Any) -> None:
-    """Send what has not been sent yet."""
-    stream.flush()
+    """Send what has not been sent yet, as far as the viewer takes it: one that hangs must not hold a flight's end."""
+    try:
+        stream.flush(timeout_sec=_PATIENCE)
+    except RuntimeError:
+        return  # disconnecting would wait for it as well
     stream.disconnect()
 
 
@@ -92,11 +97,8 @@ def viewer_beside(aircraft: str, wanted: Path | None, folder: Path) -> Iterator[
     command += [] if wanted == WINDOW else ["--save", str(wanted)]
     with (folder / LOG).open("wb") as log:
         process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
-        try:
+        with ended_at_last(process, signal.SIGTERM):  # SIGINT is ignored by what a shell starts in the background
             yield
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait()
 
 
 def main() -> None:
