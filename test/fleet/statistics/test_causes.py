@@ -53,14 +53,23 @@ def test_what_one_tail_shows_is_its_own_and_has_a_date():
 
 
 def test_two_findings_after_maintenance_are_the_tails_own():
-    """Without a date at which something was done to the tail, two are too few."""
-    there = gap(("vane_bias", 0.99, 0.02, []))
+    """Without a date at which something was done to the tail, two that are not sure are too few."""
+    there = gap(("vane_bias", 0.55, 0.02, []))
     flights = flights_of(lambda j, i: there if j == 2 and i >= 6 else gap(), flights=8)
     day = (START + datetime.timedelta(days=5, hours=12)).timestamp() / DAY
     (unknown,), (known,) = pooled_causes(flights), pooled_causes(flights, {("cdrw", "t2"): [day]})
     assert unknown.tails[2].own < 0.5 < known.tails[2].own
     assert known.account == "tail"
     assert max(t.own for t in known.tails if t.tail != "t2") < 0.01
+
+
+def test_two_sure_findings_of_four_flights_are_the_tails_own():
+    """Of thirty causes, chance would hardly name the same one twice in one tail, and in no other."""
+    there = gap(("actuator_lag of elevator", 0.99, 0.09, []))
+    (cause,) = pooled_causes(flights_of(lambda j, i: there if j == 2 and i in (0, 2) else gap(), tails=3, flights=4))
+    assert cause.account == "tail"
+    assert cause.tails[2].own > 0.5
+    assert cause.shared < 0.01
 
 
 def test_one_flights_finding_is_neither():
