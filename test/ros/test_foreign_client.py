@@ -61,10 +61,13 @@ class Client:
         self.excitation = make(JointState, "/uav1/actuators/excitation", 10)
         self.points = make(JointState, "/uav1/set_points", BEST_EFFORT)
         self.estimates = make(DerivativeEstimates, "/uav1/identifier/derivatives", 10)
+        self.others_estimates = make(DerivativeEstimates, "/uav3/identifier/derivatives", 10)
+        self.excitation_of_others: list[tuple[int, list[float]]] = []  # stamps in ns, rad
         self.command = make(JointState, "/uav2/actuators/command", 10)
         hear = self.node.create_subscription
         hear(JointState, "/uav1/actuators/command", self._on_command, 100)
         hear(JointState, "/uav1/adaptive_controller/tracking", self._on_tracking, 100)
+        hear(JointState, "/uav3/actuators/excitation", self._on_excitation, 100)
         hear(Imu, "/uav2/imu/data", self.simulated.append, BEST_EFFORT)
         hear(DiagnosticArray, "/diagnostics", self._on_diagnostics, 100)
         self.node.create_timer(0.02, self._fly)
@@ -72,6 +75,10 @@ class Client:
     def _on_command(self, message: JointState) -> None:
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         self.commands.append((stamp, dict(zip(message.name, message.position, strict=True))))
+
+    def _on_excitation(self, message: JointState) -> None:
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        self.excitation_of_others.append((stamp, list(message.position)))
 
     def _on_tracking(self, message: JointState) -> None:
         self.tracking = dict(zip(message.name, message.position, strict=True))
@@ -177,6 +184,16 @@ def fault(part: str, kind: str) -> DiagnosticArray:
     """A fault as the fault monitor reports it."""
     pairs = [KeyValue(key="part", value=part), KeyValue(key="kind", value=kind)]
     return DiagnosticArray(status=[DiagnosticStatus(name=f"fault_monitor: {part}", values=pairs)])
+
+
+def known_derivatives() -> DerivativeEstimates:
+    """All that the exciter is asked for, with narrow intervals."""
+    names = ("Cm_de", "Cm_alpha", "Cm_q", "Cl_da", "Cl_p", "Cn_dr", "Cn_r", "Cn_beta", "CL_alpha")
+    rows = [
+        DerivativeEstimate(name=name, value=1.0, lower=0.999, upper=1.001, standard_error=5e-4, valid=True, status="ok")
+        for name in names
+    ]
+    return DerivativeEstimates(aircraft="cdrw", derivatives=rows)
 
 
 def last(client: Client) -> dict[str, float]:
@@ -293,6 +310,30 @@ def test_a_reported_fault_of_a_surface_keeps_the_exciter_going(client: Client) -
 
     client.faults.publish(fault("imu/data", "sensor silent"))
     client.until(said)
+    assert client.call(Trigger, "/uav3/exciter/stop", Trigger.Request()).success
+
+
+def test_a_reported_fault_has_a_watching_exciter_begin_again_at_once(client: Client) -> None:
+    """Without reports of faults it began 16 s after a lost elevator was named, as estimates stayed valid so long."""
+    name, known = "uav3/exciter: state", known_derivatives()
+    client.faults.publish(DiagnosticArray())
+    assert client.call(Trigger, "/uav3/exciter/start", Trigger.Request()).success
+
+    def done() -> bool:
+        client.others_estimates.publish(known)
+        return client.said(name).startswith("known after")
+
+    client.until(done)
+    client.spin(0.2)
+    client.excitation_of_others.clear()
+    client.until(lambda: len(client.excitation_of_others) > 5)
+    assert not any(any(moved) for _, moved in client.excitation_of_others)
+    reported = client.node.get_clock().now().nanoseconds
+    client.faults.publish(fault("elevator", "loss of effectiveness"))
+    client.until(lambda: any(any(moved) for _, moved in client.excitation_of_others))
+    begun = next(stamp for stamp, moved in client.excitation_of_others if any(moved))
+    assert begun - reported < 3_000_000_000, "a busy machine is slow, too"
+    client.until(lambda: "begun again: elevator: loss of effectiveness" in str(client.status[name].values))
     assert client.call(Trigger, "/uav3/exciter/stop", Trigger.Request()).success
 
 
