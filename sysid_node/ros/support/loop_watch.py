@@ -84,10 +84,14 @@ class LoopWatch:
         return next((str(pair.value) for pair in pairs if pair.key == key), "")
 
     def news(self) -> dict[str, str]:
-        """By node, gains, excitation and faults in words, without the numbers that change all the time."""
+        """By node, gains, excitation and faults in words, without the numbers that change all the time.
+
+        What the fault monitor says of topics on which it hears nothing, by their resolved names, is no fault.
+        """
         gains = "; ".join(f"{axis}: {self.value(CONTROLLER, f'{axis}: gains')}" for axis in ("pitch", "lateral"))
         known = CONTROLLER in self.words
-        faults = "; ".join(fault.partition(",")[0] for fault in self.said(MONITOR).split("; "))
+        said = [part for part in self.said(MONITOR).split("; ") if not part.startswith("/")]
+        faults = "; ".join(fault.partition(",")[0] for fault in said)
         return {
             CONTROLLER: RUNNING.sub("", gains) if known else "",
             "exciter": self.value("exciter", "last event"),
