@@ -46,7 +46,7 @@ class Case(NamedTuple):
 
 _OUT = ("--out", "{out}")
 _SHORT = ("{made}/short", "--aircraft", "cdrw")
-_FLOWN = ("--aircraft", "cdrw", "--manoeuvre", "doublet", "--duration", "5")
+_FLOWN = ("--aircraft", "cdrw", "--manoeuvre", "doublet", "--duration", "9")
 CASES: Mapping[str, Case] = MappingProxyType(
     {
         "replay": Case(("replay", *_SHORT, *_OUT)),
