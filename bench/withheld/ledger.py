@@ -66,7 +66,7 @@ def weighed_by(label: Mapping[str, Any], said: Mapping[str, Any]) -> Iterator[We
     for cause in (*said["causes"], *said.get("doubted", ())):
         if not judging.always_there(label, cause):
             own = cause["grounds"]
-            yield cause["effect"], own["foretold"], own["misfit"], judging.there(label, cause)
+            yield cause["effect"], own["log_bayes_factor"], own["misspecification"], judging.there(label, cause)
 
 
 def causes(path: Path) -> Iterator[tuple[int, Weighed]]:

@@ -146,10 +146,10 @@ def _grounds(cause: Cause) -> dict[str, Any]:
     evidence = cause.evidence
     return {
         "share": cause.share,
-        "foretold": evidence.log_bayes_factor,
+        "log_bayes_factor": evidence.log_bayes_factor,
         "tolerances": evidence.by_tolerances,
-        "misfit": evidence.misfit,
-        "pliable": evidence.flexible,
+        "misspecification": evidence.misfit,
+        "flexible": evidence.flexible,
     }
 
 

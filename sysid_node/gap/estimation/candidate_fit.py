@@ -91,6 +91,11 @@ class CandidateFit:
         return tuple(i for c in self.candidates for i in c.widened)
 
     @property
+    def log_widening(self) -> float:
+        """Nats by which the prior is less dense at its maximum: widened priors, and which of several are widened."""
+        return self.nuisances.widened + sum(c.log_choices for c in self.candidates)
+
+    @property
     def uncertain(self) -> NDArray[np.bool_]:
         """Which of all unknowns (unknowns,) count as uncertain when flights are predicted.
 
@@ -147,12 +152,12 @@ class CandidateFit:
     def prior_score(self) -> float:
         """Log prior density of where all unknowns stand, in nats, zero at its maximum.
 
-        Wider priors lower it by the logarithm of how much wider they are.
+        Wider priors lower it by the logarithm of how much wider they are (``log_widening``).
         """
         now, spread, _ = self.stacked
         centre, sigma = prior(self.simulator, self.indices)
         squares = float(np.sum((now / spread) ** 2) + np.sum(((self.values - centre) / sigma) ** 2))
-        return -0.5 * squares - self.nuisances.widened
+        return -0.5 * squares - self.log_widening
 
     @property
     def sizes(self) -> tuple[int, int, int]:

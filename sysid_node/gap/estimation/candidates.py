@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import log
 
 import numpy as np
 
+from sysid_node.aircraft.names import LATERAL
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, derivative_tolerances
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -68,6 +70,7 @@ class Candidate:
     indices: tuple[int, ...]  # none where only priors of nuisances are widened
     starts: tuple[tuple[float, ...], ...]
     widened: tuple[int, ...] = ()  # nuisances whose priors are widened
+    choices: int = 1  # from how many of its kind it is, each as probable before the flight
 
     @property
     def entries(self) -> tuple[int, ...]:
@@ -75,8 +78,13 @@ class Candidate:
         return (*self.indices, *self.widened)
 
     @property
+    def log_choices(self) -> float:
+        """Nats by which it is less probable before the flight than if there were no others of its kind."""
+        return log(self.choices)
+
+    @property
     def scope(self) -> str:
-        """The control, or the coefficient, on which it acts alone; empty where it acts on all."""
+        """The control, coefficient or derivative on which it acts alone; empty where it acts on all."""
         return self.label.partition(" of ")[2]
 
     @property
@@ -98,7 +106,7 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
         if effect in unseen:
             continue
         if effect == DERIVATIVE_ERROR:
-            found += _per_coefficient(simulator)
+            found += _per_coefficient(simulator, lateral=any(model.flight.lateral for model in models))
         elif effect in PER_CONTROL:
             found += _per_control(simulator, effect, length)
         else:
@@ -178,17 +186,31 @@ def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str
     return [*alone, Candidate(effect, f"{effect} of each control", indices, tuple(zip(*starts, strict=True)))]
 
 
-def _per_coefficient(simulator: Simulator) -> list[Candidate]:
-    """Derivatives beyond their tolerances, one coefficient's at a time: all together would fit almost anything."""
+def _per_coefficient(simulator: Simulator, *, lateral: bool) -> list[Candidate]:
+    """Derivatives beyond their tolerances, one coefficient's at a time: all together would fit almost anything.
+
+    Of a coefficient all may be off, or one alone by a gross error while the others stay within their tolerances (a
+    contaminated normal prior: Box & Tiao (1968), Biometrika 55(1)), any of them as probably as another. Without the
+    latter a cause that shifts all of them, as another inertia does, would have no rival in which one has moved. Alone
+    are those with respect to the motion: a control's are what its effectiveness is, constants what biases are.
+    """
     by_coefficient: dict[str, list[int]] = {}
     tolerances = derivative_tolerances(simulator.aircraft)
     for i, (effect, parameter) in enumerate(simulator.parameters):
-        if effect == DERIVATIVE_ERROR and parameter.name in tolerances:
-            by_coefficient.setdefault(parameter.name.partition("_")[0], []).append(i)
-    return [
-        Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {coefficient}", (), ((),), tuple(entries))
-        for coefficient, entries in by_coefficient.items()
-    ]
+        coefficient = parameter.name.partition("_")[0]
+        if effect == DERIVATIVE_ERROR and parameter.name in tolerances and (lateral or coefficient not in LATERAL):
+            by_coefficient.setdefault(coefficient, []).append(i)
+    found = []
+    other = {"0", *simulator.aircraft.control_symbols}
+    for coefficient, entries in by_coefficient.items():
+        found.append(Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {coefficient}", (), ((),), tuple(entries)))
+        names = {i: simulator.parameters[i][1].name for i in entries if len(entries) > 1}
+        alone = {i: name for i, name in names.items() if name.partition("_")[2] not in other}
+        found += [
+            Candidate(DERIVATIVE_ERROR, f"{DERIVATIVE_ERROR} of {name}", (), ((),), (i,), len(alone))
+            for i, name in alone.items()
+        ]
+    return found
 
 
 def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:

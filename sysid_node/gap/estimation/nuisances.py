@@ -73,11 +73,6 @@ class Nuisances:
         sigma, limit = (self.sigma * wide)[keep], (self.limit * wide)[keep]
         return Nuisances(indices, sigma, limit, self.shared[keep], more, factors[keep])
 
-    @property
-    def factors_of_shared(self) -> Array:
-        """Factors by which the priors of the shared ones are widened where they are a cause."""
-        return self.factors[self.shared]
-
     def places(self, flight: int) -> NDArray[np.intp]:
         """Places of one flight's nuisance parameters among those of all flights, the shared ones first."""
         shared = int(self.shared.sum())

@@ -208,7 +208,7 @@ class VariableProjection:
             return np.inf
         shapes = [(flight.model.windows.count, flight.weights.size) for flight in self.fit.flights]
         data = sum(count * size for count, size in shapes)
-        total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.nuisances.widened, 0
+        total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.log_widening, 0
         for flight, shape in zip(self.fit.flights, shapes, strict=True):
             part = rows[first : first + shape[0] * shape[1]].reshape(shape)
             first += part.size

@@ -1,4 +1,4 @@
-"""Log Bayes factor of two explanations under a likelihood that gusts cannot influence.
+"""Log Bayes factors of two explanations under a likelihood that gusts cannot influence.
 
 Rotating air is in every flight and obeys the same law in each. An effect that only changes how the aircraft answers
 gusts (a structural mode, other moments of inertia) therefore predicts flights held out as well, and the better the
@@ -30,10 +30,26 @@ def log_bayes_factor(fit: CandidateFit, other: CandidateFit) -> float:
     model that is not exact is no more certain than it predicts (quasi-likelihood: Burnham & Anderson (2002), Model
     Selection and Multimodel Inference, sect. 2.5).
     """
+    powers = _noise(fit)
+    return _log_evidence(fit, powers) - _log_evidence(other, powers)
+
+
+def log_bayes_factor_of_alternatives(fit: CandidateFit, other: CandidateFit) -> float:
+    """The same of two explanations of which neither contains the other, in their pooled noise.
+
+    In the noise that one of them leaves, which is least where this one fits best, it would be favoured, and so would
+    the other in its own.
+    """
+    pairs = zip(_noise(fit), _noise(other), strict=True)
+    powers = tuple(0.5 * (mine + theirs) for mine, theirs in pairs)
+    return _log_evidence(fit, powers) - _log_evidence(other, powers)
+
+
+def _noise(fit: CandidateFit) -> tuple[Array, ...]:
+    """Power (L, 12) by flight of the noise that a fit leaves, with what stays coherent with the commands."""
     test = overidentification_of(fit)
     scatter = 1.0 + test.coherent / (0.5 * test.chance**2)
-    powers = tuple(power * scatter for power in fit.powers)
-    return _log_evidence(fit, powers) - _log_evidence(other, powers)
+    return tuple(power * scatter for power in fit.powers)
 
 
 def _log_evidence(fit: CandidateFit, powers: Sequence[Array]) -> float:
@@ -43,4 +59,5 @@ def _log_evidence(fit: CandidateFit, powers: Sequence[Array]) -> float:
     squares = equations.constant - 2.0 * float(equations.right @ step) + float(step @ equations.information @ step)
     precision, _ = prior_terms(fit)
     _, volume = np.linalg.slogdet(equations.information)
-    return -0.5 * (squares + float(volume) - float(np.log(precision).sum()))
+    chosen = sum(candidate.log_choices for candidate in fit.candidates)
+    return -0.5 * (squares + float(volume) - float(np.log(precision).sum())) - chosen

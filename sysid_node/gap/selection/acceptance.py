@@ -60,8 +60,9 @@ class RemainingStructure:
 class DerivativeShift:
     """How far all derivatives together are from the aircraft file."""
 
-    distance: float  # sum of the squared deviations, each in the file's tolerance
-    expected: float  # of that sum, if the tolerances are right
+    distance: float  # sum of the squared deviations, each in the standard deviation of its prior
+    expected: float  # of that sum, if the priors are right
+    log_widening: float = 0.0  # nats by which the prior is less dense where a candidate widens it
 
     @property
     def deviations(self) -> float:
@@ -227,7 +228,8 @@ def relieves(
 
     A mass that is a fifth off shifts every coefficient by two tolerances. Each alone is excused; that all are is not:
     so many independent draws are less probable than one common cause. The logarithm of the ratio of the two joint prior
-    densities is half the difference of the squared distances, each beyond its expectation.
+    densities is half the difference of the squared distances, each beyond its expectation, less what the density loses
+    where the candidate is a gross error of derivatives and their priors are wider.
     """
     return nats_by_tolerances(shifts, limits) > limits.log_bayes_factor(searched)
 
@@ -236,8 +238,8 @@ def nats_by_tolerances(
     shifts: tuple[DerivativeShift, DerivativeShift], limits: Acceptance = THRESHOLDS.acceptance
 ) -> float:
     """Nats by which the derivatives' joint prior favours the candidate; zero where they are not plausible with it."""
-    without, with_it = (shift.distance - shift.expected for shift in shifts)
-    return 0.5 * (without - with_it) if shifts[1].deviations < limits.joint else 0.0
+    without, with_it = (0.5 * (shift.distance - shift.expected) + shift.log_widening for shift in shifts)
+    return without - with_it if shifts[1].deviations < limits.joint else 0.0
 
 
 def readings_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:

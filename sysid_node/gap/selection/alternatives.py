@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate
-from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor_of_alternatives
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
 from sysid_node.gap.selection.fitted_set import FittedSet
@@ -159,7 +159,7 @@ class _Alternative:
     def lead(self) -> float:
         chosen = self.position.chosen
         predictive = self.fitted.evidence.total - chosen.evidence.total
-        return predictive + log_bayes_factor(self.fitted.fit, chosen.fit)
+        return predictive + log_bayes_factor_of_alternatives(self.fitted.fit, chosen.fit)
 
 
 def _are_alike(fitted: FittedSet, candidate: Candidate) -> bool:

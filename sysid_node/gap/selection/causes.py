@@ -17,7 +17,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.predictive_density import probabilities
-from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor, log_bayes_factor_of_alternatives
 from sysid_node.gap.residuals.excited_axes import excited_windows
 from sysid_node.gap.selection.acceptance import is_relevant, nats_by_tolerances
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
@@ -195,5 +195,11 @@ def _shares(sets: Sequence[FittedSet], others: Sequence[FittedSet]) -> Array:
     """Probabilities (K,) of fitted sets that hold a cause, then of others that do not."""
     predictive = probabilities([each.evidence.scores for each in (*sets, *others)])
     best = sets[int(np.argmax(predictive[: len(sets)]))]
-    leads = np.array([log_bayes_factor(best.fit, each.fit) for each in others])
+    leads = np.array([_lead(best.fit, each.fit) for each in others])
     return combined_shares(predictive, len(sets), leads)
+
+
+def _lead(fit: CandidateFit, other: CandidateFit) -> float:
+    """Log Bayes factor against another explanation, in pooled noise where this one does not contain the other."""
+    labels, others = ({c.label for c in each.candidates} for each in (fit, other))
+    return (log_bayes_factor if others < labels else log_bayes_factor_of_alternatives)(fit, other)

@@ -187,7 +187,7 @@ class Comparison:
 
 
 def derivative_shift(fit: CandidateFit) -> DerivativeShift:
-    """How far the derivatives are from the file, in the file's tolerances, however wide a candidate makes their priors.
+    """How far the derivatives are from the file, in the standard deviations of their priors.
 
     Of a derivative that the flights determine the expectation of its square is one, of another the share of its prior's
     variance that they take away (the prior predictive check of Box (1980), J. R. Stat. Soc. A 143(4), for parameters).
@@ -196,11 +196,9 @@ def derivative_shift(fit: CandidateFit) -> DerivativeShift:
     now, spread, _ = fit.stacked
     shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
     places = [k for k, i in enumerate(shared) if fit.simulator.names[i].startswith(DERIVATIVE_ERROR)]
-    widened = np.isin([shared[k] for k in places], fit.widened)
-    factors = np.where(widened, fit.nuisances.factors_of_shared[places], 1.0) if widened.any() else 1.0
     variance = np.diag(fit.covariance)[len(fit.indices) :][places]
     known = np.clip(1.0 - variance / spread[places] ** 2, 0.0, 1.0)
-    return DerivativeShift(float(np.sum((now[places] / (spread[places] / factors)) ** 2)), float(known.sum()))
+    return DerivativeShift(float(np.sum((now[places] / spread[places]) ** 2)), float(known.sum()), fit.log_widening)
 
 
 def _flown(fitted: FittedSet) -> list[FlightEvidence]:

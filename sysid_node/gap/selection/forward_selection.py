@@ -6,7 +6,7 @@ compared with its alternatives (``alternatives``), and those that are improbable
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
@@ -21,10 +21,10 @@ from sysid_node.gap.instruments.overidentification import (
     pooled_overidentification,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import is_accepted, predicts_better, relieves
+from sysid_node.gap.selection.acceptance import is_accepted, relieves
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
-from sysid_node.gap.selection.comparison import Comparison, derivative_shift, probability_against
+from sysid_node.gap.selection.comparison import Comparison, derivative_shift
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.screening import best_screened, with_found_onsets
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -80,11 +80,16 @@ class Attribution:
         """The same causes with the sizes of least squares."""
         return replace(self, corrected=self.chosen.fit, size_source=None)
 
-    def without_least_probable(self) -> Attribution:
-        """The explanation without its least probable cause."""
-        weakest = min(self.causes, key=lambda cause: cause.probability)
-        causes = tuple(cause for cause in self.causes if cause is not weakest)
-        return self._explained_by(weakest.without, causes)
+    def with_fewer_causes(self) -> Iterator[Attribution]:
+        """Each cause left out in turn, the least probable first; of three also each alone, the most probable first."""
+        by_probability = sorted(self.causes, key=lambda cause: cause.probability)
+        if len(self.causes) > 1:
+            for left_out in by_probability:
+                yield self._explained_by(left_out.without, tuple(c for c in self.causes if c is not left_out))
+        if len(self.causes) > 2:
+            alone = {each.added.label: each for each in self.first_stage if each.added}
+            kept = [cause for cause in reversed(by_probability) if cause.candidate.label in alone]
+            yield from (self._explained_by(alone[cause.candidate.label], (cause,)) for cause in kept)
 
     def without_causes(self) -> Attribution:
         """The derivatives within their tolerances alone."""
@@ -133,8 +138,8 @@ def _forward(
     """The explanation that forward selection ends with, and what was fitted in each stage, the best first.
 
     In each stage candidates are added to the best explanations of the stage before, of which the best need not be part
-    of the best larger one. It goes on as long as a candidate is accepted and the larger explanation predicts better
-    than the best smaller one.
+    of the best larger one. It goes on as long as a candidate is accepted, and the larger explanation is accepted in
+    place of the best smaller one, too: what mends a poor explanation need not be worth another cause.
     """
     best, frontier, stages = base, [base], list[list[FittedSet]]()
     for count, (width, most) in enumerate(THRESHOLDS.search.stages):
@@ -145,7 +150,8 @@ def _forward(
         better = [
             larger
             for smaller, larger in fitted
-            if predicts_better(probability_against(larger, best)) and is_accepted(Comparison(base, smaller, larger))
+            if is_accepted(Comparison(base, best, larger))
+            and (smaller is best or is_accepted(Comparison(base, smaller, larger)))
         ]
         if not better:
             break

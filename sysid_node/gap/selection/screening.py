@@ -15,6 +15,7 @@ import numpy as np
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
 from sysid_node.gap.estimation.candidates import PER_CONTROL, SHARED, Candidate
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.gap.selection.fitted_set import FittedSet
@@ -103,11 +104,12 @@ def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Threshol
 
 
 def _likely_variants(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> list[ScreenedPair]:
-    """The pairs without the less likely variants of effects that all controls may share.
+    """The pairs without the less likely variants of effects that all controls may share, and of wrong derivatives.
 
     Such an effect may act on all controls alike, on one, or on each by itself. Its variants are compared by their
     deviance, with a penalty for every parameter; the best is kept, and the one that acts on all alike, so that another
-    is chosen only where it predicts better.
+    is chosen only where it predicts better. Of a coefficient all derivatives may be off, or one of them alone; the
+    variant with the least deviance is kept, in which the priors are.
     """
 
     def penalised(pair: ScreenedPair) -> float:
@@ -115,13 +117,20 @@ def _likely_variants(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> l
 
     best: dict[tuple[int, str], ScreenedPair] = {}
     for pair in sorted(pairs, key=penalised):
-        best.setdefault((id(pair.explanation), pair.screened.candidate.effect), pair)
+        best.setdefault((id(pair.explanation), _varied(pair.screened.candidate)), pair)
     chosen = {id(pair) for pair in best.values()}
-    return [
-        pair
-        for pair in pairs
-        if pair.screened.candidate.effect not in SHARED or not pair.screened.candidate.scope or id(pair) in chosen
-    ]
+    return [pair for pair in pairs if not _is_variant(pair.screened.candidate) or id(pair) in chosen]
+
+
+def _varied(candidate: Candidate) -> str:
+    """What a candidate is a variant of: its effect, and of wrong derivatives the coefficient."""
+    coefficient = candidate.scope.partition("_")[0] if candidate.effect == DERIVATIVE_ERROR else ""
+    return f"{candidate.effect} {coefficient}"
+
+
+def _is_variant(candidate: Candidate) -> bool:
+    """Whether a candidate is tried only where it is the best of those of its kind."""
+    return candidate.effect == DERIVATIVE_ERROR or (candidate.effect in SHARED and bool(candidate.scope))
 
 
 def with_found_onsets(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:

@@ -121,9 +121,9 @@ def validate(
 def standing_explanation(attribution: Attribution, validator: Validator) -> tuple[Attribution, Check]:
     """The first explanation that stands, and its validation.
 
-    In this order: all causes; the same with the sizes of least squares; without the least probable cause; no cause.
-    Each is also tried with the file's own derivatives, and kept so where these predict better. An explanation whose
-    predictions are not finite is passed over.
+    In this order: all causes; the same with the sizes of least squares; without one of the causes, without two; no
+    cause. Each is also tried with the file's own derivatives, and kept so where these predict better. An explanation
+    whose predictions are not finite is passed over.
     """
     for explanation in _explanations(attribution):
         try:
@@ -143,8 +143,7 @@ def _explanations(attribution: Attribution) -> Iterator[Attribution]:
         yield attribution
         if attribution.corrected is not attribution.chosen.fit:
             yield attribution.by_least_squares()
-    if len(attribution.causes) > 1:
-        yield attribution.without_least_probable()
+    yield from attribution.with_fewer_causes()
 
 
 def _with_better_derivatives(

@@ -47,12 +47,15 @@ def test_lags_limits_and_delays_act_on_all_controls_on_one_or_on_each(candidates
         assert found == {"": [EFFECTS[effect].shared], **alone, "each control": list(controls)}
 
 
-def test_derivatives_are_candidates_by_coefficient(candidates, plain_model) -> None:
+def test_derivatives_are_candidates_by_coefficient_and_one_alone(candidates, plain_model) -> None:
     names = plain_model.simulator.names
-    for candidate in (c for c in candidates if c.effect == "derivative_error"):
-        coefficient = candidate.label.rpartition(" ")[2]
-        assert not candidate.indices and candidate.widened
-        assert all(names[i].startswith(f"derivative_error.{coefficient}_") for i in candidate.widened)
+    found = {c.scope: c for c in candidates if c.effect == "derivative_error"}
+    assert not any(c.indices for c in found.values())
+    wide = {scope: [names[i].partition(".")[2] for i in c.widened] for scope, c in found.items()}
+    assert wide["Cl"] == ["Cl_beta", "Cl_p", "Cl_r", "Cl_da", "Cl_dr"]
+    assert {scope for scope in wide if scope.startswith("Cl_")} == {"Cl_beta", "Cl_p", "Cl_r"}
+    assert wide["Cl_p"] == ["Cl_p"]
+    assert (found["Cl"].choices, found["Cl_p"].choices) == (1, 3)  # one of three may be off, each as probably
 
 
 def test_every_fit_starts_within_its_bounds_and_not_at_neutral(candidates, plain_model) -> None:

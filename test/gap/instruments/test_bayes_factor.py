@@ -6,7 +6,7 @@ from sysid_node.gap.estimation.candidate_fit import unfitted
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
+from sysid_node.gap.instruments.bayes_factor import log_bayes_factor, log_bayes_factor_of_alternatives
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.sim import Simulator
@@ -38,3 +38,6 @@ def test_a_lag_shows_in_what_was_commanded(tried) -> None:
     base, trial = tried({"actuator_lag": {"time_constant": 0.08}}, "actuator_lag")
     assert log_bayes_factor(trial.fit, base.fit) > 20.0
     assert log_bayes_factor(trial.fit, trial.fit) == pytest.approx(0.0, abs=1e-9)
+    pooled = log_bayes_factor_of_alternatives(trial.fit, base.fit)
+    assert pooled > 10.0
+    assert log_bayes_factor_of_alternatives(base.fit, trial.fit) == pytest.approx(-pooled)

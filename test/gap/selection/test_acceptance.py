@@ -52,6 +52,13 @@ def test_one_common_cause_is_more_probable_than_many_draws() -> None:
     assert nats_by_tolerances(shifted(40.0, 10.0 + LIMITS.joint * np.sqrt(20.0))) == 0.0  # as improbable with it
 
 
+def test_one_gross_error_is_weighed_by_the_same_joint_prior() -> None:
+    """Truth: one of ten derivatives six sigma off; its prior made five times as wide, with one choice among three."""
+    widening = float(np.log(5.0) + np.log(3.0))
+    gross = (DerivativeShift(36.0, 10.0), DerivativeShift(36.0 / 25.0, 10.0, widening))
+    assert nats_by_tolerances(gross) == pytest.approx(18.0 * 24.0 / 25.0 - widening)
+
+
 def table(**changes: object) -> ComparisonTable:
     """A candidate that is accepted: it removes 90 % of what is left of CL, a tenth of the motion's power."""
     scores = ComparisonTable(

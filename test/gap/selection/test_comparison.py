@@ -95,14 +95,23 @@ def shift_of(model, label: str, moved: dict[str, float]):
     return derivative_shift(replace(fit.at([point]), information=1e6 * fit.prior_information))
 
 
-def test_the_shift_of_derivatives_is_counted_in_the_files_tolerances_however_wide_their_priors(plain_model) -> None:
-    """Truth: squares counted by hand; their expectation is the number of derivatives that are known."""
+@pytest.mark.parametrize(
+    ("label", "squares", "log_widening"),
+    [
+        ("", 36.0, 0.0),
+        ("derivative_error of Cm_alpha", 36.0 / 25.0, np.log(5.0) + np.log(2.0)),  # or else Cm_q, as probably
+        ("derivative_error of Cm", 36.0 / 25.0, 4.0 * np.log(5.0)),
+    ],
+)
+def test_the_joint_prior_of_derivatives_counts_how_wide_a_candidate_makes_it(
+    plain_model, label: str, squares: float, log_widening: float
+) -> None:
+    """Truth: normal densities by hand, priors five times as wide; the squares' mean is the number that are known."""
     known = sum(d.tolerance is not None for d in plain_model.simulator.aircraft.derivatives.values())
-    moved = {"Cm_alpha": 2.0, "CL_alpha": -1.0}
-    plain, widened = (shift_of(plain_model, label, moved) for label in ("", "derivative_error of Cm"))
-    for found in (plain, widened):
-        assert found.distance == pytest.approx(5.0)
-        assert found.expected == pytest.approx(known, rel=1e-4)
+    found = shift_of(plain_model, label, {"Cm_alpha": 6.0, "CL_alpha": -1.0})
+    assert found.distance == pytest.approx(squares + 1.0)
+    assert found.expected == pytest.approx(known, rel=1e-4)
+    assert found.log_widening == pytest.approx(log_widening)
 
 
 def test_short_flights_show_what_a_lag_does_to_the_rates(lag) -> None:

@@ -44,6 +44,14 @@ def test_the_best_of_each_explanation_are_kept_at_most_two_of_one_effect() -> No
     assert best_screened(screened, 1) == [screened[0], screened[-1]]
 
 
+def test_of_the_wrong_derivatives_of_a_coefficient_the_likeliest_are_fitted() -> None:
+    base = explanation()
+    scopes = ("Cm_alpha", "Cm", "Cm_q", "Cn", "Cn_beta", "Cl")
+    pairs = [ScreenedPair(base, Screened(float(k), labelled("derivative_error", s), ())) for k, s in enumerate(scopes)]
+    kept = [pair.screened.candidate.scope for pair in best_screened(pairs, 6)]
+    assert kept == ["Cm_alpha", "Cn"]  # of one effect no more than two
+
+
 def test_onsets_that_were_found_are_the_only_starts_of_the_next_stage() -> None:
     stuck, shift = labelled("stuck_surface", "elevator"), labelled("cg_shift")
     screened = [

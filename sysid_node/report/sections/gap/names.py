@@ -58,7 +58,7 @@ def parameter_words(name: str) -> str:
 def label_words(label: str) -> str:
     """A cause in words: ``"derivative_error of Cm"`` is ``"derivative error of pitching moment"``."""
     effect, separator, part = label.partition(" of ")
-    return f"{words_of(effect)}{separator}{WORDS.get(part, words_of(part))}"
+    return f"{words_of(effect)}{separator}{parameter_words(part)}"
 
 
 def in_pilots_units(value: float, error: float, unit: str) -> tuple[float, float, str]:
