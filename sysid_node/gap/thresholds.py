@@ -149,6 +149,10 @@ class Acceptance:
         "deviation of all derivatives together from the file up to which their tolerances excuse it",
     )
 
+    bias: float = _threshold(
+        3.0, "1 sigma", "size of a bias, beyond its error, from which it is more than what the file states of it"
+    )
+
     def log_bayes_factor(self, searched: int) -> float:
         """Nats above which a candidate is accepted that was picked from so many effects (Bonferroni)."""
         return log(self.probability / (1.0 - self.probability)) + log(searched)

@@ -164,9 +164,15 @@ def nuisances_of(
 
 def _biases(aircraft: Aircraft) -> dict[str, float]:
     """1 sigma of every bias by name: the file's ``noise.bias``, or the noise of a sample where the file states none."""
-    stated = dict(aircraft.noise_bias) != default_noise_bias(ideal=aircraft.ideal)
-    sigma = {sensor: aircraft.noise_bias[sensor] if stated else 0.0 for sensor in _BIASES.values()}
-    return {name: sigma[sensor] or aircraft.noise[sensor] for name, sensor in _BIASES.items()}
+    stated = stated_biases(aircraft)
+    return {name: stated.get(name) or aircraft.noise[sensor] for name, sensor in _BIASES.items()}
+
+
+def stated_biases(aircraft: Aircraft) -> dict[str, float]:
+    """1 sigma of every bias by name that the file states (``noise.bias``); empty where it states none."""
+    if dict(aircraft.noise_bias) == default_noise_bias(ideal=aircraft.ideal):
+        return {}
+    return {name: aircraft.noise_bias[sensor] for name, sensor in _BIASES.items()}
 
 
 #: Effects of the file that are no nuisance: what differs from flight to flight, and the beginning of a failure.

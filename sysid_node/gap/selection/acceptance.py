@@ -8,8 +8,8 @@ accepted where all of these hold:
 2. with it the explanation predicts flight that was not fitted better, beyond doubt;
 3. it matters by one of these: on some channel of forces, moments and kinematics it removes a share of the remainder,
    and a share of the whole gap comes back without it; it removes such a share of the error of some reading of short
-   simulated flights, in which what an instrument does adds up; or the derivatives are much more probable together with
-   it, by the file's tolerances;
+   simulated flights, in which what an instrument does adds up; the derivatives are much more probable together with it,
+   by the file's tolerances; or it is a bias beyond what the file states of it;
 4. its log Bayes factor, from what the commands predict, makes up for its having been picked from many effects. Gusts
    can imitate the first three, and a model that is not exact repeats its error with every manoeuvre.
 
@@ -134,6 +134,10 @@ class ComparisonScores(Protocol):
         """Of all derivatives together from the file: without and with the candidate."""
 
     @property
+    def bias(self) -> float:
+        """Largest bias that was added beyond its standard error, in 1 sigma that the file states; zero without one."""
+
+    @property
     def readings(self) -> RemainingPower:
         """Mean squares (11,) of the errors of short simulated flights, by reading, on flight not fitted if there is."""
 
@@ -165,6 +169,7 @@ class ComparisonTable:
     simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
     size: float = 0.0
     shifts: tuple[DerivativeShift, DerivativeShift] = (DerivativeShift(0.0, 0.0), DerivativeShift(0.0, 0.0))
+    bias: float = 0.0
     readings: RemainingPower = RemainingPower(np.zeros(1), np.zeros(1))
     reading_motion: Array = field(default_factory=lambda: np.full(1, np.inf))
     reading_errors: Array = field(default_factory=lambda: np.zeros(1))
@@ -218,7 +223,9 @@ def _is_large(scores: ComparisonScores, limits: Acceptance) -> bool:
     """Whether the candidate matters by any of the measures of rule 3, the cheapest first."""
     if np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap)):
         return True
-    return relieves(scores.shifts, scores.searched, limits) or bool(readings_improved(scores, limits).any())
+    if relieves(scores.shifts, scores.searched, limits) or scores.bias > limits.bias:
+        return True
+    return bool(readings_improved(scores, limits).any())
 
 
 def relieves(

@@ -14,7 +14,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
 from sysid_node.gap.estimation.candidates import TIME_EFFECTS
-from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, stated_biases
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, exported_parameters, probabilities
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
@@ -159,6 +159,25 @@ class Comparison:
         errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))[[fit.indices.index(i) for i in sizes]]
         changes = np.abs(fit.flights[0].point[sizes] - fit.simulator.neutral()[sizes])
         return float(np.max((changes - 2.0 * errors) / fit.simulator.scales[sizes], initial=0.0))
+
+    @property
+    def bias(self) -> float:
+        """Largest bias that was added beyond its standard error, in 1 sigma that the file states.
+
+        Zero for what is no bias, and where the file does not state what stays constant in a flight.
+        """
+        fit, added = self.fitted.fit, self.fitted.added
+        stated = stated_biases(fit.simulator.aircraft)
+        names = {i: fit.simulator.names[i] for i in (added.indices if added else ())}
+        known = [(i, stated[name]) for i, name in names.items() if stated.get(name)]
+        return max((self._beyond_error(i) / sigma for i, sigma in known), default=0.0)
+
+    def _beyond_error(self, index: int) -> float:
+        """By how much a value that was added differs from the file's beyond two standard errors."""
+        fit = self.fitted.fit
+        place = fit.indices.index(index)
+        change = fit.flights[0].point[index] - fit.simulator.neutral()[index]
+        return float(abs(change) - 2.0 * np.sqrt(max(fit.covariance[place, place], 0.0)))
 
     @cached_property
     def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:

@@ -11,7 +11,8 @@ from bench.withheld import judging, ledger
 LABEL = {"seed": 7, "plant": "cdfp", "kind": "one", "turbulence": "none", "programme": "steps", "servo_lag": 0.007,
          "effects": {"actuator_lag": {"time_constant": 0.08}}}  # fmt: skip
 CAUSE = {"effect": "actuator_lag", "indistinguishable_from": [], "probability": 0.9,
-         "parameters": {"time_constant": [0.083, 0.002]}, "grounds": {"log_bayes_factor": 120.0, "misspecification": 0.1}}  # fmt: skip
+         "parameters": {"time_constant": [0.083, 0.002]},
+         "grounds": {"log_bayes_factor": 120.0, "misspecification": 0.1}}  # fmt: skip
 GAP = {"before": 0.5, "after": 0.1, "noise_floor": 0.09, "shrink_percent": 97.0, "ci95": [90.0, 99.0]}
 SAID = {"verdict": "explained", "causes": [CAUSE], "doubted": [], "gap": GAP}
 

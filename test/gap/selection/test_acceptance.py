@@ -91,6 +91,8 @@ def table(**changes: object) -> ComparisonTable:
         ({"power": removed(0.1, 0.09), "readings": reading(0.003, 0.0), "reading_motion": np.ones(11)}, None),
         ({"power": removed(0.1, 0.09), "readings": reading(0.0025, 0.0), "reading_motion": np.ones(11)}, "too little"),
         ({"power": removed(0.1, 0.09), "readings": reading(9.0, 0.0)}, "too little"),  # of a reading not compared
+        ({"power": removed(0.1, 0.09), "bias": LIMITS.bias + 1e-9}, None),  # more than the file states of it
+        ({"power": removed(0.1, 0.09), "bias": LIMITS.bias}, "too little"),
         ({"power": removed(9.03, 9.0), "by_flight": ((np.ones(12), removed(0.1, 0.01)),)}, None),  # another hides it
         ({"power": removed(9.03, 9.0), "by_flight": ((np.ones(12), removed(0.1, 0.09)),)}, "too little"),
         ({"log_bayes_factor": 0.0}, "commands"),

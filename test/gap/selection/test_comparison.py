@@ -10,10 +10,12 @@ from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.predictive_density import Evidence
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.selection.acceptance import ComparisonTable, is_accepted
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift, power_left, probability_against
+from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.short_flights.readings import READINGS
 from sysid_node.sim import EFFECTS, Simulator
 
@@ -112,6 +114,22 @@ def test_the_joint_prior_of_derivatives_counts_how_wide_a_candidate_makes_it(
     assert found.distance == pytest.approx(squares + 1.0)
     assert found.expected == pytest.approx(known, rel=1e-4)
     assert found.log_widening == pytest.approx(log_widening)
+
+
+@pytest.mark.parametrize(("stated", "beyond"), [({"accel": 0.03, "gyro": 0.001}, 8.0), ({}, 0.0)])
+def test_a_bias_is_counted_beyond_its_error_in_what_the_file_states_of_it(
+    plain_model, stated: dict[str, float], beyond: float
+) -> None:
+    """Truth: 0.3 m/s^2, known to 0.03, are eight times the stated 0.03 beyond two standard errors."""
+    aircraft = plain_model.simulator.aircraft
+    known = replace(aircraft, noise_bias={**aircraft.noise_bias, **stated})
+    model = replace(plain_model, simulator=Simulator(known, 50.0))
+    nuisances = nuisances_of(known, model)
+    (bias,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "imu_bias")
+    fit = with_candidates(unfitted([model], nuisances), [bias], nuisances, [0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    fit = replace(fit, information=np.diag(np.full(fit.prior_information.shape[0], 0.03**-2)))
+    added = FittedSet(fit, Evidence(np.zeros(1), ()), bias)
+    assert Comparison(added, added, added).bias == pytest.approx(beyond)
 
 
 def test_short_flights_show_what_a_lag_does_to_the_rates(lag) -> None:
