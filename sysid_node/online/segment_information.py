@@ -53,12 +53,16 @@ def measure_segment(state: EstimatorState, lines: Array) -> Information:
 
 def information_of(state: EstimatorState, lines: Array, begin: float, end: float) -> Information:
     """The information in the transform ``lines`` of begin..end (s), with cross-spectra where not all is exact."""
-    model = state.model
-    edges = information.edges(model.spectrum.omega, begin, end) if model.imperfections else None
-    clean = information.clean_lines(lines, state.line_model, edges)
-    info = information.measure_clean(clean, lines[-1], model.spectrum, begin, end, edges)
-    if model.imperfections is not None:
-        info.spectra = cross_spectra.cross_spectra(clean, model.layout.transformed)
+    model, layout = state.model, state.model.layout
+    if model.imperfections is None:
+        clean = information.clean_lines(lines, state.line_model)
+        return information.measure_clean(clean, lines[-1], model.spectrum, begin, end)
+    edges = information.edges(model.spectrum.omega, begin, end)
+    clean = information.clean_lines_and_rates(
+        lines, state.line_model, edges, model.spectrum.omega, layout.differentiated
+    )
+    info = information.measure_clean(clean[:, : layout.width], lines[-1], model.spectrum, begin, end, edges)
+    info.spectra = cross_spectra.cross_spectra(np.delete(clean, np.s_[layout.transformed : layout.width], axis=1))
     return info
 
 

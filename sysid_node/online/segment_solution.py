@@ -27,6 +27,7 @@ from sysid_node.online.regression.selection_bias import selection_bias_factors
 from sysid_node.online.segment_information import finished_information, line_seconds, measure_segment
 from sysid_node.online.state import EstimatorState, FinishedSums, InstrumentChecks, ModelTests, SegmentSolution
 from sysid_node.online.systematic import estimation
+from sysid_node.online.systematic.corrected_signals import CorrectedSignals, corrected_signals
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import line_model, remapped
 from sysid_node.online.systematic.servo_model import ServoModel
@@ -49,11 +50,11 @@ def solve_with_servos(state: EstimatorState, lines: Array) -> None:
         step = estimation.notable_step(imperfect, servos, latest.systematic)
         if step is None:
             return
-        _move_servos(state, step)
+        move_servos(state, step)
     _solve_all(state, measure_segment(state, lines))
 
 
-def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
+def move_servos(state: EstimatorState, servos: ServoModel) -> None:
     """Replace the controls by what these servos make of them, in all that is remembered."""
     model, imperfect, before = state.model, state.model.imperfections, state.servos
     assert imperfect is not None
@@ -82,7 +83,9 @@ def _move_servos(state: EstimatorState, servos: ServoModel) -> None:
 def _solve_all(state: EstimatorState, segment: Information) -> None:
     """Renew the estimates and their covariances, from the finished segments and the present one."""
     past = finished_information(state)
-    total = past + segment
+    recorded = past + segment
+    signals = _corrected_signals(state, recorded)
+    total = recorded if signals is None else signals.information
     gram = total.grams.sum(axis=0)
     strength, solution, compensation = _solve(state, total, gram)
     equations, table, now = state.equations, state.model.table, state.transform.last
@@ -91,19 +94,24 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
     if state.flow.active:
         spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
     gusts = _gust_shares(state, total, equations, solution, spread)
-    scale = solution.residual[:, None] * np.abs(solution.inverse.diagonal())
     inflation = gust_correlation.inflation(spread, gusts)
     variance = inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
     mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
     none = np.zeros(len(equations.coefficients), dtype=bool)
     selection_bias = selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior)
     bounds = weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts)
-    systematic = _systematic(state, total, solution, spread, inflation)
+    before = ReferenceEstimates(now, equations, solution, spread)
+    if signals is not None:
+        before = _with_recorded_signals(equations, recorded, compensation, now)
+    systematic = _systematic(state, signals, solution, before.solution, spread, inflation)
+    if systematic is not None:
+        variance = variance * systematic.considered.misfit[:, None]
+    scale = before.solution.residual[:, None] * np.abs(before.solution.inverse.diagonal())
     state.latest = SegmentSolution(
         time=now,
         pieces=state.finished.pieces,
         total=total,
-        solution=solution,
+        solution=before.solution,
         uncertainty=spread,
         compensation=compensation,
         finished=FinishedSums(past.grams.sum(axis=0), past.integrals),
@@ -113,33 +121,57 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
         tests=ModelTests(*_lag_test(state, solution, spread, gram, systematic), none, none),
         systematic=systematic,
     )
-    state.changes.monitor.references.append(ReferenceEstimates(now, equations, solution, spread))
+    state.changes.monitor.references.append(before)
 
 
-def _systematic(
-    state: EstimatorState, total: Information, solution: Solution, spread: Uncertainty, inflation: Array
-) -> SystematicErrors | None:
-    """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for."""
+def _with_recorded_signals(
+    equations: NormalEquations, recorded: Information, compensation: Array | None, now: float
+) -> ReferenceEstimates:
+    """The solution with the signals as they were recorded, which those between renewals and the tests for changes are.
+
+    What is off in the signals is the same before a change and after it.
+    """
+    solution = least_squares.solve(equations, recorded.grams.sum(axis=0), compensation)
+    return ReferenceEstimates(now, equations, solution, least_squares.uncertainty(equations, solution, recorded))
+
+
+def _corrected_signals(state: EstimatorState, recorded: Information) -> CorrectedSignals | None:
+    """The signals without what is so far estimated of the imperfections; None where there are none."""
     model, servos = state.model, state.servos
-    if model.imperfections is None or servos is None or not solution.usable:
+    if model.imperfections is None or servos is None:
         return None
     last = state.latest.systematic if state.latest is not None else None
-    if last is not None and last.holds(state.finished.pieces, servos, total.energy):
-        return last
-    return estimation.systematic_errors(
+    return corrected_signals(
         model.imperfections,
         model.aircraft,
         model.layout,
         model.spectrum,
         model.instrument_model,
         servos,
-        state.equations,
-        solution,
-        spread,
-        total,
-        inflation,
-        state.finished.pieces,
-        last.changes if last is not None else None,
+        recorded,
+        estimation.to_take_out(model.imperfections, servos, last),
+        last.known if last is not None else None,
+    )
+
+
+def _systematic(
+    state: EstimatorState,
+    signals: CorrectedSignals | None,
+    corrected: Solution,
+    recorded: Solution,
+    spread: Uncertainty,
+    inflation: Array,
+) -> SystematicErrors | None:
+    """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for."""
+    imperfect, servos, equations = state.model.imperfections, state.servos, state.equations
+    if imperfect is None or servos is None or signals is None or not corrected.usable:
+        return None
+    correction = signals.correction(equations, corrected, recorded)
+    last = state.latest.systematic if state.latest is not None else None
+    if last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
+        return replace(last, correction=correction)
+    return estimation.systematic_errors(
+        imperfect, servos, equations, corrected, spread, signals, inflation, correction, state.finished.pieces
     )
 
 

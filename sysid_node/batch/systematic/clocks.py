@@ -19,7 +19,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.systematic.flight_posterior import Imperfection
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.servos import servos_of
-from sysid_node.online.systematic.servo_model import of_servo
+from sysid_node.online.systematic.servo_model import CUBIC, of_servo
 
 _AIR = ("V", "alpha", "beta")
 #: Columns that each key's lateness moves; ``delays.actuators`` moves the controls.
@@ -29,6 +29,7 @@ LATE_COLUMNS: Mapping[str, tuple[str, ...]] = {
     "air_data_lag.time_constant": _AIR,
     "delays.actuators": (),
 }
+_Response = tuple[float, float, float]  # lateness (s), curvature (s^2), third coefficient (s^3)
 SETTLED = 2.0  # s by which a record is continued at its ends, so that its other end does not reach round
 
 
@@ -38,7 +39,10 @@ def is_timing(one: Imperfection) -> bool:
 
 
 def corrected(aircraft: Aircraft, record: FlightRecord, values: Mapping[Imperfection, float]) -> FlightRecord:
-    """The record with the lateness ``values`` (s; curvature s^2) of instruments and servos taken out."""
+    """The record with the lateness ``values`` (s) of instruments and servos taken out.
+
+    A servo's curvature is in s^2, its third coefficient in s^3.
+    """
     late: dict[str, float] = {}
     for one, value in values.items():
         if one.role == "source" and one.key in LATE_COLUMNS:
@@ -65,11 +69,13 @@ def _read_later(time: Array, values: Array, delay: float) -> Array:
 
 
 def _followed(aircraft: Aircraft, record: FlightRecord, name: str, servo: Mapping[str, float]) -> Array:
-    """The control's deflection behind a servo with the ``lateness`` and ``curvature`` given."""
+    """The control's deflection behind a servo with the ``lateness``, ``curvature`` and ``third`` given."""
     place = list(aircraft.controls).index(name)
-    applied = of_servo(servos_of(aircraft)[1 + place]) if record.commanded else (0.0, 0.0)
+    applied = of_servo(servos_of(aircraft)[1 + place]) if record.commanded else (0.0, 0.0, 0.0)
     values = record[aircraft.controls[name].symbol]
-    found = servo.get("lateness", applied[0]), servo.get("curvature", applied[1])
+    late, curved = servo.get("lateness", applied[0]), servo.get("curvature", applied[1])
+    third = applied[2] + CUBIC * (late * curved - applied[0] * applied[1]) + servo.get("third", 0.0)
+    found = late, curved, third
     known = np.isfinite(values)
     if found == applied or np.count_nonzero(known) < 2:
         return values
@@ -80,7 +86,7 @@ def _followed(aircraft: Aircraft, record: FlightRecord, name: str, servo: Mappin
     return values + np.interp(record.time, even, _change(signal, step, applied, found))
 
 
-def _change(signal: Array, step: float, applied: tuple[float, float], found: tuple[float, float]) -> Array:
+def _change(signal: Array, step: float, applied: _Response, found: _Response) -> Array:
     """What the other servo changes of an evenly sampled ``signal`` (N,)."""
     margin = int(SETTLED / step)
     size = next_fast_len(signal.size + 2 * margin, real=True)
@@ -89,6 +95,6 @@ def _change(signal: Array, step: float, applied: tuple[float, float], found: tup
     blend = 0.5 - 0.5 * np.cos(np.pi * (np.arange(after) + 1) / (after + 1))
     whole = np.concatenate([np.full(margin, signal[0]), signal, signal[-1] + (signal[0] - signal[-1]) * blend])
     s = 2j * np.pi * rfftfreq(size, step)
-    (L0, B0), (L, B) = applied, found
-    gain = ((L0 - L) * s + (B0 - B) * s * s) / (1.0 + L * s + B * s * s)
+    (L0, B0, C0), (L, B, C) = applied, found
+    gain = s * (L0 - L + s * (B0 - B + s * (C0 - C))) / (1.0 + s * (L + s * (B + s * C)))
     return np.asarray(irfft(gain * rfft(whole), size)[margin : margin + signal.size])

@@ -18,18 +18,20 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
+from sysid_node.online.segment_solution import move_servos
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections, prior
+from sysid_node.online.systematic.servo_model import ServoModel
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 
 class Imperfection(NamedTuple):
-    """One number that is taken as known: the key of its tolerance, and of a servo which of its two parameters.
+    """One number that is taken as known: the key of its tolerance, and of a servo which of its three parameters.
 
-    ``role``: "source", "lateness" (s) or "curvature" (s^2). ``commanded``: whether a servo follows commands; what
-    comes after measured positions is something else.
+    ``role``: "source", "lateness" (s), "curvature" (s^2) or "third" (s^3). ``commanded``: whether a servo follows
+    commands; what comes after measured positions is something else.
     """
 
     key: str
@@ -81,13 +83,24 @@ def flight_posterior(
 ) -> FlightPosterior | None:
     """The posterior of all ``records`` together; None where the file states that all is exact, or none can be used."""
     online = OnlineSettings(actuators=settings.actuators, max_gap=min(settings.max_gap, 5.0), detect_changes=False)
-    told = [one for record in records if (one := _told(_passed(aircraft, record, online))) is not None]
-    return _combined(told) if told else None
+    found: FlightPosterior | None = None
+    # Two flights that tell the sum of two parameters alone would, linearised at different places, seem to tell both.
+    # The second pass linearises all of them where the first has found the servos.
+    for _ in range(2):
+        told = [one for record in records if (one := _told(_passed(aircraft, record, online, found))) is not None]
+        found = _combined(told) if told else None
+        if len(told) < 2:
+            break
+    return found
 
 
-def _passed(aircraft: Aircraft, record: FlightRecord, settings: OnlineSettings) -> EstimatorState:
-    """The online estimator after a flight."""
+def _passed(
+    aircraft: Aircraft, record: FlightRecord, settings: OnlineSettings, known: FlightPosterior | None
+) -> EstimatorState:
+    """The online estimator after a flight, whose servos are at first where they are ``known`` to be."""
     state = estimator.init(aircraft, settings, commanded=record.commanded)
+    if known is not None and state.model.imperfections is not None:
+        move_servos(state, _servos_of(known, state.model.imperfections, record.commanded))
     interval = record.air_interval or float(np.median(np.diff(record.time)))
     density = np.where(np.isfinite(record["rho"]), record["rho"], aircraft.reference.air_density)
     made = {"air_interval": np.full(len(record), interval), "rho": density}
@@ -96,6 +109,19 @@ def _passed(aircraft: Aircraft, record: FlightRecord, settings: OnlineSettings) 
     for time, sample in zip(record.time.tolist(), samples.tolist(), strict=True):
         estimator.update(state, time, sample)
     return state
+
+
+def _servos_of(known: FlightPosterior, imperfect: Imperfections, commanded: bool) -> ServoModel:
+    """Where a posterior has the servos."""
+    values = dict(zip(known.imperfections, known.mean.tolist(), strict=True))
+    applied, steps = imperfect.applied, np.zeros((2, imperfect.applied.lateness.size))
+    for name, place in zip(imperfect.controls, imperfect.timed.tolist(), strict=True):
+        for step, role, start in zip(
+            steps, ("lateness", "curvature"), (applied.lateness, applied.curvature), strict=True
+        ):
+            one = Imperfection(f"actuator_lag.{name}", role, commanded)
+            step[place] = values.get(one, float(start[place])) - start[place]
+    return applied.moved(*steps)
 
 
 def _told(state: EstimatorState) -> _OneFlight | None:
@@ -123,12 +149,13 @@ def _told(state: EstimatorState) -> _OneFlight | None:
 def _servos_of_lines(imperfect: Imperfections, found: SystematicErrors) -> Array:
     """(K,) from where the estimates count: where the estimator had the servos; zero for all else."""
     at = imperfect.timed
-    return np.concatenate([np.zeros(len(imperfect.sources)), found.lines.lateness[at], found.lines.curvature[at]])
+    lines, none = found.lines, np.zeros(len(imperfect.controls))
+    return np.concatenate([np.zeros(len(imperfect.sources)), lines.lateness[at], lines.curvature[at], none])
 
 
 def _named(imperfect: Imperfections, *, commanded: bool) -> tuple[Imperfection, ...]:
     count, keys = len(imperfect.controls), imperfect.keys
-    roles = ["source"] * len(imperfect.sources) + ["lateness"] * count + ["curvature"] * count
+    roles = ["source"] * len(imperfect.sources) + ["lateness"] * count + ["curvature"] * count + ["third"] * count
     return tuple(Imperfection(key, role, commanded and role != "source") for key, role in zip(keys, roles, strict=True))
 
 

@@ -90,6 +90,12 @@ class SignalLayout:
         """Columns of the controls' rates, in the same order."""
         return slice(self.deflections.stop, self.deflections.stop + len(self.timed))
 
+    @cached_property
+    def differentiated(self) -> tuple[int, ...]:
+        """Columns whose rates systematic errors need: coefficients, offset and state regressors."""
+        first = OFFSET + len(NUISANCES)
+        return (*range(OFFSET + 1), *range(first, first + len(self.regressors) - len(self.timed)))
+
     def column(self, name: str) -> int:
         """Index of a coefficient, nuisance or regressor."""
         return self.names.index(name)

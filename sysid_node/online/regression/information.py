@@ -19,7 +19,8 @@ band of lines: with the residual's density in each band it gives the covariance 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -66,11 +67,24 @@ class Information:
 
 def nothing(layout: SignalLayout, lines: int = 0) -> Information:
     """No information at all; ``lines``: how many have cross-spectra."""
-    width, T = layout.width, layout.transformed if lines else 0
+    width, T = layout.width, layout.transformed + len(layout.differentiated) if lines else 0
     zeros = np.zeros((BANDS, width, width))
     bias, none = np.zeros((width, width)), np.zeros(width)
     spectra = np.zeros((lines, T, T), dtype=complex)
     return Information(zeros, zeros.copy(), np.zeros(BANDS), 0.0, 0.0, bias, none, 0.0, spectra=spectra)
+
+
+def with_grams(info: Information, grams: Array) -> Information:
+    """The information with other Gram matrices (B, W, W).
+
+    The scores, whose noise is correlated between lines, are of the Gram matrices column by column as many times as
+    before.
+    """
+    energies = info.grams.diagonal(axis1=1, axis2=2)
+    scores = info.scores.diagonal(axis1=1, axis2=2)
+    per_energy = np.divide(np.maximum(scores, 0.0), energies, out=np.zeros_like(energies), where=energies > 0.0)
+    root = np.sqrt(per_energy)
+    return replace(info, grams=grams, scores=grams * root[:, :, None] * root[:, None, :])
 
 
 @dataclass(frozen=True)
@@ -212,6 +226,22 @@ def window_energy(duration: float, rate: float) -> float:
 def clean_lines(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) without offset, constant and drift, with their instruments."""
     return project(about_mean(transform.copy(), model, edges))
+
+
+def clean_lines_and_rates(
+    transform: Array, model: InstrumentModel | None, edges: Edges, omega: Array, columns: Sequence[int]
+) -> Array:
+    """(2F, W + R) clean lines of a transform (2F + 1, W), and of the rates of some ``columns`` (R).
+
+    A rate is j omega times the lines, but for impulses at the edges. It is taken before anything is projected out:
+    afterwards it would be that of another signal.
+    """
+    lines = about_mean(transform.copy(), model)
+    F, of = omega.size, lines[:, columns]
+    rates = np.concatenate([-omega[:, None] * of[F:], omega[:, None] * of[:F]])
+    both = np.concatenate([lines, rates], axis=1)
+    edges.take_out(both)
+    return project(both)
 
 
 def products(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:

@@ -19,10 +19,12 @@ from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout,
 from sysid_node.online.systematic.cross_spectra import ServoColumns
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 Terms = Mapping[str, tuple[float, float]]  # by signal: factors of it, and of its rate (s)
 
 AXES = "xyz"
 RATES = "pqr"
+MOMENTS = ("Cl", "Cm", "Cn")
 FORCES = ("X", "Y", "Z")
 
 
@@ -55,7 +57,8 @@ class ColumnChanges:
     columns: ServoColumns
     means: FlightMeans
     count: int
-    signals: Array = field(init=False)  # (K, N, 2N) of each signal: factors of all signals, then of their rates
+    signals: Array = field(init=False)  # (K, N, 2N) of each signal: factors of all signals, then j omega times them
+    rates: Index = field(init=False)  # (N,) where the rate of each signal stands among these
     shifts: Array = field(init=False)  # (K, N) of the means
     at: int = 0  # the imperfection that is being described
 
@@ -64,8 +67,9 @@ class ColumnChanges:
         self.signals, self.shifts = np.zeros((self.count, N, 2 * N)), np.zeros((self.count, N))
         self._place = {name: self.columns.place(i) for i, name in enumerate(self.layout.names)}
         self._place["0"] = OFFSET
+        self.rates = self.columns.rates_of(self.layout)
         ratio = momentum_matrix(self.aircraft)
-        self._momentum = {axis: dict(zip((*FORCES, "Cl", "Cm", "Cn"), ratio[i].tolist(), strict=True))
+        self._momentum = {axis: dict(zip((*FORCES, *MOMENTS), ratio[i].tolist(), strict=True))
                           for i, axis in enumerate(RATES)}  # fmt: skip
         alpha = self.means.of("alpha")
         self._cos, self._sin = math.cos(alpha), math.sin(alpha)
@@ -85,19 +89,17 @@ class ColumnChanges:
         row = self._place.get(target)
         if row is None:
             return
-        N = self.columns.width
         for name, (plain, rate) in terms.items():
             column = self._place.get(name)
             if column is not None:
                 self.signals[self.at, row, column] += plain
-                self.signals[self.at, row, N + column] += rate
+                self.signals[self.at, row, self.rates[column]] += rate
 
-    def servo(self, control: int, plain: float, rate: float) -> None:
-        """Change a control by its servo's column."""
-        N, place = self.columns.width, self.columns.servos.start + control
+    def servo(self, control: int, order: int) -> None:
+        """Change a control by its servo's column (0), by the column's rate (1), or by the rate's rate (2)."""
+        N, m, place = self.columns.width, len(self.layout.timed), self.columns.servos.start + control
         row = self._place[self.layout.timed[control]]
-        self.signals[self.at, row, place] += plain
-        self.signals[self.at, row, N + place] += rate
+        self.signals[self.at, row, (place, N + place, place + m)[order]] += 1.0
 
     def shift(self, target: str, by: float) -> None:
         """Change a signal's mean."""
@@ -194,6 +196,20 @@ class ColumnChanges:
             self.force(coefficient, terms)
         else:
             self.add(coefficient, terms)
+
+    def angular_accelerations(self) -> tuple[Index, Index, Array]:
+        """Places of the rates' columns and of the moments', and what moments (columns) make of the rates' rates (rows).
+
+        Of those axes whose rate and moment are both there.
+        """
+        axes = [
+            (rate, moment)
+            for rate, moment in zip(RATES, MOMENTS, strict=True)
+            if rate in self._place and math.isfinite(self._momentum[rate][moment])
+        ]
+        needed = [[self._momentum[rate][moment] * self.per_column(rate) for rate, _ in axes] for _, moment in axes]
+        rates, moments = (np.array([self._place[pair[i]] for pair in axes], np.intp) for i in range(2))
+        return rates, moments, np.linalg.inv(np.array(needed).reshape(len(axes), len(axes)))
 
     def finish(self) -> None:
         """Derive the changes of the lift's square, which goes with the lift."""

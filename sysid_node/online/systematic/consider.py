@@ -14,9 +14,15 @@ tell of: Bierman, "Factorization Methods for Discrete Sequential Estimation", 19
 
 V are the instruments of X. P projects on all that is exogenous: the controls, the instruments, and the rates of both
 (two-stage least squares), so that neither sensor noise nor gusts are taken for an imperfection. What the projection
-keeps of them nevertheless is taken out of both sums (``many_instruments``). Where X are their own instruments, they
-count as exogenous. w_c is one over the noise's energy per unit of the Gram matrix. All of it follows from the Gram
-matrix of the signals and their rates (``cross_spectra.moments``).
+keeps of them nevertheless is taken out of both sums (``many_instruments``). If the exogenous signals explain more of a
+residual than they would of noise (the J of Hansen, Econometrica 50, 1982), something moves with the controls that is
+not in the model. The noise then counts as so much larger (Birge, Phys. Rev. 40, 1932), here and in the statistical
+errors. Where X are their own instruments, they count as exogenous. w_c is one over the noise's energy per unit of the
+Gram matrix. All of it follows from the Gram matrix of the signals and their rates (``corrected_signals``).
+
+The signals are those that are corrected for the estimates so far, and kappa is estimated again with every look: this is
+the Gauss-Newton method. In Z_c, angular accelerations are those of the model's moments: as measured, they hold the
+moments' residuals, and a smaller moment of inertia would seem to explain noise.
 """
 
 from __future__ import annotations
@@ -30,10 +36,14 @@ from scipy.linalg import solve_triangular
 from sysid_node.online.regression.least_squares import RIDGE, TINY, Solution, misfits
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic.column_changes import ColumnChanges
+from sysid_node.online.systematic.corrected_signals import CorrectedSignals
 from sysid_node.online.systematic.many_instruments import Scores
 
 Array = NDArray[np.float64]
 
+#: Root mean square of a coefficient below which it is rounding, and tells nothing: that of real instruments' noise is
+#: above 1e-4.
+STILL = 1e-8
 #: Share of its energy by which an exogenous signal is set apart from the others.
 PROJECTION_RIDGE = 1e-8
 
@@ -43,13 +53,15 @@ class Considered:
     """K imperfections after the flight, and what they do to C coefficients' P slopes and, behind them, offsets."""
 
     estimate: Array  # (K,)
+    step: Array  # (K,) by which it is beyond what the signals were corrected for
     covariance: Array  # (K, K)
     jacobian: Array  # (K, C, P + 1)
+    misfit: Array  # (C,) how many times as much of the residuals as of noise the exogenous signals explain, at least 1
 
     @property
     def correction(self) -> Array:
-        """(C, P + 1) to be added to the estimates."""
-        return np.asarray(np.tensordot(self.estimate, self.jacobian, axes=1))
+        """(C, P + 1) what the ``step`` adds to the estimates."""
+        return np.asarray(np.tensordot(self.step, self.jacobian, axes=1))
 
     def slope_covariance(self) -> Array:
         """(C, P, P) systematic covariance of the slopes."""
@@ -67,60 +79,82 @@ def consider(
     equations: NormalEquations,
     solution: Solution,
     noise: Array,
-    gram: Array,
-    changes: ColumnChanges,
+    signals: CorrectedSignals,
+    place: NDArray[np.intp],
     sigmas: Array,
     centre: Array,
-    means: Array,
     freedom: Array,
 ) -> Considered:
-    """From the ``gram`` (2N, 2N) of all signals and their rates, ``noise`` (C,) per unit of the Gram matrix.
+    """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
-    ``sigmas`` (K,) are the tolerances of what ``changes`` describes, ``centre`` (K,) its expected values before the
-    flight, ``means`` (W,) the signals' means, and ``freedom`` (C,) the noise's degrees of freedom.
+    ``place`` (W,): where the columns of the regression stand among the signals. ``sigmas`` (K,) are the tolerances,
+    ``centre`` (K,) the expected values before the flight, and ``freedom`` (C,) the noise's degrees of freedom.
     """
-    columns, place = changes.columns, np.array([changes.columns.place(i) for i in range(equations.width)])
-    N, v = columns.width, np.zeros((columns.width, len(equations.coefficients)))
+    gram, changes, C = signals.gram, signals.changes, len(equations.coefficients)
+    v = np.zeros((changes.columns.width, C))
     v[place] = misfits(equations, solution.theta)
-    X, V = place[equations.columns], place[equations.instruments]
+    X, V = signals.matrix[place[equations.columns]], signals.matrix[place[equations.instruments]]
+    residuals = v.T @ signals.matrix  # (C, 2N)
     Z = np.tensordot(v.T, changes.signals, axes=(1, 1)) * sigmas[:, None]  # (C, K, 2N), per tolerance
-    _predict_outputs(Z, equations, solution, place)
-    normal = gram[V[:, None], X] * equations.same_block
+    _accelerations_by_moments(Z, changes)
+    _predict_outputs(Z, equations, solution, place, signals)
+    across = V @ gram
+    normal = (across @ X.T) * equations.same_block
     inverse = np.linalg.inv(normal + equations.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
-    J = inverse @ (gram[V] @ Z.swapaxes(1, 2) * equations.belongs.T[:, :, None])  # (C, P, K)
+    J = inverse @ (across @ Z.swapaxes(1, 2) * equations.belongs.T[:, :, None])  # (C, P, K)
     J *= equations.belongs.T[:, :, None]
     # what the instruments find in the residuals is the noise's part, or rounding
-    left = inverse @ ((gram[V, :N] @ v) * equations.belongs) * equations.belongs  # (P, C)
-    scores = Scores.none(sigmas.size)
+    left = inverse @ ((across @ residuals.T) * equations.belongs) * equations.belongs  # (P, C)
+    both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)  # (C, K + 1, 2N)
+    scores, misfit = Scores.none(sigmas.size), np.ones(C)
+    moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(equations.block.max()) + 1):
         project = _projection(equations, changes, place, gram, block)
-        for c in np.flatnonzero((equations.block == block) & (noise > 0.0)).tolist():
-            D, r = Z[c].copy(), np.zeros(2 * N)
-            np.add.at(D.T, X, -J[c])
-            r[:N] = v[:, c]
-            np.add.at(r, X, -left[:, c])
-            both = np.column_stack([D.T, r])
-            q = project @ both
+        for c in np.flatnonzero((equations.block == block) & (noise > 0.0) & moves).tolist():
+            q, D = project @ both[c].T, both[c, :-1]
             further = project.shape[0] - int(equations.belongs[:, c].sum())  # than the unknowns take
-            scores.add(q[:, :-1].T @ q, D @ (gram @ both), further / max(float(freedom[c]), 1.0), float(noise[c]))
-    estimate, covariance = _posterior(*scores.weighed(), centre / sigmas)
-    jacobian = _jacobian(equations, changes, v, J, sigmas, means)
-    return Considered(sigmas * estimate, sigmas[:, None] * covariance * sigmas, jacobian / sigmas[:, None, None])
+            misfit[c] = max(float(q[:, -1] @ q[:, -1]) / (float(noise[c]) * max(further, 1)), 1.0)
+            share = further / max(float(freedom[c]), 1.0)
+            scores.add(q[:, :-1].T @ q, D @ gram @ both[c].T, share, float(noise[c] * misfit[c]))
+    step, covariance = _posterior(*scores.weighed(), (centre - signals.estimate) / sigmas)
+    jacobian = _jacobian(equations, changes, v, J, sigmas, signals.corrected_means)
+    return Considered(
+        signals.estimate + sigmas * step,
+        sigmas * step,
+        sigmas[:, None] * covariance * sigmas,
+        jacobian / sigmas[:, None, None],
+        misfit,
+    )
 
 
-def _predict_outputs(Z: Array, equations: NormalEquations, solution: Solution, place: NDArray[np.intp]) -> None:
+def _accelerations_by_moments(Z: Array, changes: ColumnChanges) -> None:
+    """Put moments in the place of the angular accelerations in Z (C, K, 2N), which hold the moments' residuals."""
+    rates, moments, per_moment = changes.angular_accelerations()
+    accelerations = changes.rates[rates]
+    Z[..., moments] += Z[..., accelerations] @ per_moment
+    Z[..., accelerations] = 0.0
+
+
+def _predict_outputs(
+    Z: Array, equations: NormalEquations, solution: Solution, place: NDArray[np.intp], signals: CorrectedSignals
+) -> None:
     """Put the model's prediction in the place of the coefficients themselves in Z (C, K, 2N), and of their rates.
 
     A coefficient holds the noise of its own residual. Z would then correlate with the residuals, and an imperfection
-    that makes all coefficients smaller would seem to explain noise.
+    that makes all coefficients smaller would seem to explain noise. The model predicts the corrected coefficient by the
+    corrected regressors; the recorded one is less by what it was corrected by.
     """
-    N = Z.shape[-1] // 2
+    rates, matrix = signals.changes.rates, signals.matrix
     for c, output in enumerate(place[equations.outputs].tolist()):
         unknowns = np.flatnonzero(equations.belongs[:, c])
         columns, theta = place[equations.columns[unknowns]], solution.theta[unknowns, c]
-        for offset in (0, N):
-            Z[..., offset + columns] += Z[..., offset + output, None] * theta
-            Z[..., offset + output] = 0.0
+        share = Z[..., output].copy()
+        Z[..., output] = 0.0
+        predicted = theta @ matrix[columns] - matrix[output]
+        predicted[output] += 1.0
+        Z += share[..., None] * predicted
+        Z[..., rates[columns]] += Z[..., rates[output], None] * theta
+        Z[..., rates[output]] = 0.0
 
 
 def _projection(
@@ -130,7 +164,9 @@ def _projection(
     columns, of_block = changes.columns, equations.group == block
     N = columns.width
     chosen = np.zeros(2 * N, dtype=bool)
-    exogenous = [*place[changes.layout.deflections], *range(columns.servos.start, columns.instruments.stop)]
+    first, made = columns.servos.start, columns.instruments
+    exogenous = [*place[changes.layout.deflections], *range(first, first + len(changes.layout.timed))]
+    exogenous += range(made.start, made.stop)
     chosen[exogenous] = True
     chosen[N:] = chosen[:N]
     unknowns = of_block & (equations.columns == equations.instruments)

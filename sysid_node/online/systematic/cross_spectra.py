@@ -2,8 +2,9 @@
 
 Per line, S_ij = sum over segments of conj(X_i) X_j. It adds up over segments and fades like the Gram matrices, whose
 sum over the lines' real parts it is; but as it keeps the phases, the Gram matrix after any filtering of any signal
-follows from it: nothing is transformed again, and no samples are kept. T signals are transformed; behind them stand the
-m controls' changes with their servos' lateness, and the I instruments, which are made of the controls.
+follows from it: nothing is transformed again, and no samples are kept. T signals are transformed, some of which are
+rates of others; behind them stand the m controls' changes with their servos' lateness, and the I instruments, which are
+made of the controls.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ Complex = NDArray[np.complex128]
 NO_SPECTRA: Complex = np.zeros((0, 0, 0), dtype=complex)
 
 
-def cross_spectra(clean: Array, transformed: int) -> Complex:
-    """(F, T, T) of the clean lines (2F, W) of a segment, whose controls are where the servos have them."""
+def cross_spectra(clean: Array) -> Complex:
+    """(F, T, T) of the clean lines (2F, T) of a segment, whose controls are where the servos have them."""
     F = clean.shape[0] // 2
-    X = clean[:F, :transformed] + 1j * clean[F:, :transformed]
+    X = clean[:F] + 1j * clean[F:]
     return np.asarray(X.conj()[:, :, None] * X[:, None, :])
 
 
@@ -33,20 +34,31 @@ def cross_spectra(clean: Array, transformed: int) -> Complex:
 class ServoColumns:
     """Where things stand in the signals that ``with_servos`` makes."""
 
-    transformed: int  # T
-    servos: slice  # of the m controls' changes with lateness
+    transformed: int  # T, of which the last are rates of others
+    rates: slice  # of the rates
+    servos: slice  # of the m controls' changes with lateness, and behind them of these changes' second derivatives
     instruments: slice
     width: int
 
     @classmethod
     def of(cls, layout: SignalLayout) -> ServoColumns:
         """Those of a signal vector's ``layout``."""
-        T, m, made = layout.transformed, len(layout.timed), len(layout.instrumented)
-        return cls(T, slice(T, T + m), slice(T + m, T + m + made), T + m + made)
+        W, R, m, made = layout.transformed, len(layout.differentiated), len(layout.timed), len(layout.instrumented)
+        T = W + R
+        S = T + 2 * m
+        return cls(T, slice(W, T), slice(T, S), slice(S, S + made), S + made)
 
     def place(self, column: int) -> int:
         """Where a column of the signal vector stands."""
-        return column if column < self.transformed else column + self.servos.stop - self.servos.start
+        first = self.rates.start
+        return column if column < first else column - first + self.instruments.start
+
+    def rates_of(self, layout: SignalLayout) -> NDArray[np.intp]:
+        """(N,) where the rate of each signal stands among all signals and, behind them, their j omega times."""
+        found = self.width + np.arange(self.width)
+        found[list(layout.differentiated)] = np.arange(self.rates.start, self.rates.stop)
+        found[layout.deflections] = np.arange(layout.rates.start, layout.rates.stop)
+        return found
 
 
 def with_servos(
@@ -54,16 +66,16 @@ def with_servos(
 ) -> Complex:
     """(F, N, N) of ``columns``: controls as the ``model``'s servos move them, and its instruments.
 
-    ``rate_gain`` (F, m): see ``servo_model.rate_gain``; None leaves zeros.
+    ``rate_gain`` (F, 2m): see ``servo_model.rate_gain``; None leaves zeros.
     """
     F, T, N = spectra.shape[0], columns.transformed, columns.width
     found = np.zeros((F, N, N), dtype=complex)
     found[:, :T, :T] = spectra
     controls, rates = model.controls, model.rates
     _fill(found[:, :, :T], controls, rates, columns, model, omega, rate_gain)
-    across = found.transpose(0, 2, 1).conj()
+    across = np.conjugate(found.transpose(0, 2, 1), order="C")
     _fill(across, controls, rates, columns, model, omega, rate_gain)
-    return np.asarray(across.transpose(0, 2, 1).conj())
+    return np.asarray(across)  # which is Hermitian by now
 
 
 def _fill(
@@ -81,18 +93,22 @@ def _fill(
         rows[:, controls] += more
         rows[:, rates] += (-1j * omega)[:, None, None] * more
     if rate_gain is not None:
-        rows[:, columns.servos] = rate_gain.conj()[:, :, None] * rows[:, rates]
+        both = np.concatenate([rows[:, rates], rows[:, rates]], axis=1)
+        rows[:, columns.servos] = rate_gain.conj()[:, :, None] * both
     if model.gains.shape[1]:
         rows[:, columns.instruments] = model.gains.conj() @ rows[:, controls]
 
 
-def moments(spectra: Complex, omega: Array) -> Array:
-    """(2N, 2N) Gram matrix of N signals and, behind them, of their rates: j omega times their lines."""
+def band_moments(spectra: Complex, omega: Array, bands: tuple[slice, ...]) -> Array:
+    """(B, 2N, 2N) Gram matrices by bands of N signals and, behind them, of their rates: j omega times their lines."""
     F, N, _ = spectra.shape
-    flat = spectra.reshape(F, N * N)
-    plain, second = (np.stack([np.ones(F), omega**2]) @ flat.real).reshape(2, N, N)
-    first = (-omega @ flat.imag).reshape(N, N)
-    return np.block([[plain, first], [first.T, second]])
+    flat = np.ascontiguousarray(spectra).view(np.float64).reshape(F, 2 * N * N)
+    weights, found = np.stack([np.ones(F), -omega, omega**2]), np.empty((len(bands), 2 * N, 2 * N))
+    for moments, band in zip(found, bands, strict=True):
+        plain, first, second = (weights[:, band] @ flat[band]).reshape(3, N, N, 2)
+        moments[:N, :N], moments[N:, N:] = plain[..., 0], second[..., 0]
+        moments[:N, N:], moments[N:, :N] = first[..., 1], first[..., 1].T
+    return found
 
 
 def band_grams(spectra: Complex, bands: tuple[slice, ...], kept: NDArray[np.intp]) -> Array:

@@ -7,16 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.frequency.regression_signals import SignalLayout
-from sysid_node.online.regression.information import Information, Spectrum
-from sysid_node.online.regression.instruments import InstrumentModel
+from sysid_node.online.regression.information import Information
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
-from sysid_node.online.systematic import cross_spectra, servo_model
-from sysid_node.online.systematic.column_changes import ColumnChanges
 from sysid_node.online.systematic.consider import Considered, consider
-from sysid_node.online.systematic.imperfections import Imperfections, column_changes, prior
+from sysid_node.online.systematic.corrected_signals import CorrectedSignals, Known
+from sysid_node.online.systematic.imperfections import Imperfections, prior
 from sysid_node.online.systematic.servo_model import ServoModel
 
 Array = NDArray[np.float64]
@@ -27,9 +23,11 @@ LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to first order.
 NOTABLE_SHARE, NOTABLE = 0.5, 5e-4
+#: Tolerances by which an imperfection is taken out of the signals at most: signals change in proportion to small
+#: imperfections only.
+LARGEST_CORRECTION = 6.0
 EVERY = 4  # pieces between looks, once there are ``EARLY`` s of data
 EARLY = 10.0
-GROWTH = 1.3  # of the data, after which the flight's means are taken anew
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class SystematicErrors:
     lines: ServoModel  # as the lines had them
     pieces: int  # number of pieces finished when this was found
     energy: float  # s: data that it rests on
-    changes: tuple[float, ColumnChanges, Array]  # s: data that the column changes rest on; them; the signals' means
+    known: Known  # what one unit of each imperfection changes
 
     def ahead(self, imperfect: Imperfections) -> Flags:
         """(m,) the servos that would surely move their surfaces before the commands.
@@ -63,53 +61,50 @@ class SystematicErrors:
 
 def systematic_errors(
     imperfect: Imperfections,
-    aircraft: Aircraft,
-    layout: SignalLayout,
-    lines: Spectrum,
-    model: InstrumentModel | None,
     servos: ServoModel,
     equations: NormalEquations,
     solution: Solution,
     spread: Uncertainty,
-    total: Information,
+    signals: CorrectedSignals,
     inflation: Array,
+    correction: Array,
     pieces: int,
-    known: tuple[float, ColumnChanges, Array] | None,
 ) -> SystematicErrors:
-    """By the information ``total``, whose lines have the controls where these ``servos`` have them.
+    """By the corrected ``signals`` and their ``solution``, which differs by ``correction`` from that of recorded ones.
 
-    ``model`` is that of the instruments.
-
-    ``inflation`` (C,): factors of the statistical variances, which hold for what the flight tells of imperfections too.
-    ``known`` are the changes that were last used; they depend on the flight's means alone.
+    The lines have the controls where the ``servos`` have them. ``inflation`` (C,): factors of the statistical
+    variances, which hold for what the flight tells of imperfections too.
     """
-    model = model or InstrumentModel(np.zeros((lines.omega.size, 0, 0), complex), layout.deflections, layout.rates)
-    spectra = cross_spectra.with_servos(
-        total.spectra, imperfect.columns, model, lines.omega, servo_model.rate_gain(servos, lines.omega)
-    )
-    gram = cross_spectra.moments(spectra, lines.omega)
-    if known is None or not known[0] <= total.energy <= GROWTH * known[0]:
-        known = (total.energy, *column_changes(imperfect, aircraft, layout, total.integrals))
-    _, changes, means = known
     sigmas, centre = prior(imperfect, servos)
-    noise = inflation * noise_per_gram(equations, spread, total)
-    found = consider(equations, solution, noise, gram, changes, sigmas, centre, means, spread.freedom)
+    noise = inflation * noise_per_gram(equations, spread, signals.information)
+    found = consider(equations, solution, noise, signals, imperfect.places, sigmas, centre, spread.freedom)
     at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
     late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
-    late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m :]
+    late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m : S + 2 * m]
     errors = np.sqrt(found.covariance.diagonal()[S : S + m])
     return SystematicErrors(
         found,
-        found.correction,
+        correction + found.correction,
         found.variance(),
         found.slope_covariance(),
-        ServoModel(servos.lateness + late, servos.curvature + curved),
+        ServoModel(servos.lateness + late, servos.curvature + curved, servos.third),
         errors,
         servos,
         pieces,
-        total.energy,
-        known,
+        signals.information.energy,
+        signals.known,
     )
+
+
+def to_take_out(imperfect: Imperfections, servos: ServoModel, last: SystematicErrors | None) -> Array:
+    """(K,) the imperfections as last estimated, beyond where the lines have the ``servos`` by now."""
+    at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
+    if last is None:
+        return np.zeros(S + 3 * m)
+    late, curved = last.servos.lateness[at] - servos.lateness[at], last.servos.curvature[at] - servos.curvature[at]
+    most = LARGEST_CORRECTION * prior(imperfect, servos)[0][:S]
+    sources = np.clip(last.considered.estimate[:S], -most, most)
+    return np.concatenate([sources, late, curved, last.considered.estimate[S + 2 * m :]])
 
 
 def noise_per_gram(equations: NormalEquations, spread: Uncertainty, total: Information) -> Array:

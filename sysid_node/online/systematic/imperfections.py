@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.servos import servos_of
 from sysid_node.online.frequency.regression_signals import SignalLayout
-from sysid_node.online.regression.information import Information, Spectrum
+from sysid_node.online.regression.information import Information, Spectrum, with_grams
 from sysid_node.online.regression.instruments import InstrumentModel, with_servos
 from sysid_node.online.systematic import servo_model
 from sysid_node.online.systematic.column_changes import ColumnChanges, flight_means
@@ -26,12 +25,15 @@ Index = NDArray[np.intp]
 
 #: Share of L^2 that the curvature B of a servo of which nothing is known has: first order has 0, a delay 0.5.
 CURVATURE = 0.25
-SHORTEST = 0.02  # s: the lateness from which on the curvature's tolerance goes with its square
+#: Share of L^3 by which the third coefficient of a servo lies beside what L and B say of it: lags of first and second
+#: order with delays of up to all of L.
+THIRD = 0.05
+SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
 
 @dataclass(frozen=True)
 class Imperfections:
-    """K = S + 2 m imperfections: S sources, and the lateness and the curvature of m servos."""
+    """K = S + 3 m imperfections: S sources, and lateness, curvature and third coefficient of m servos."""
 
     sources: tuple[ErrorSource, ...]
     controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
@@ -44,9 +46,9 @@ class Imperfections:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Of each imperfection the key of its tolerance: lateness and curvature of a servo share theirs."""
+        """Of each imperfection the key of its tolerance: all of a servo share theirs."""
         servos = tuple(f"actuator_lag.{name}" for name in self.controls)
-        return (*(source.key for source in self.sources), *servos, *servos)
+        return (*(source.key for source in self.sources), *servos, *servos, *servos)
 
     @property
     def servos(self) -> slice:
@@ -78,12 +80,12 @@ def imperfections(
         return None
     columns = ServoColumns.of(layout)
     controls, timed, sigmas = zip(*rows, strict=True) if rows else ((), (), ())
-    applied = np.array(stated).reshape(-1, 2) if commanded else np.zeros((len(layout.timed), 2))
+    applied = np.array(stated).reshape(-1, 3) if commanded else np.zeros((len(layout.timed), 3))
     return Imperfections(
         found,
         controls,
         np.array(timed, np.intp),
-        ServoModel(applied[:, 0].copy(), applied[:, 1].copy()),
+        ServoModel(*applied.T.copy()),
         np.array(sigmas),
         columns,
         math.hypot(*(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
@@ -105,32 +107,34 @@ def line_model(
 
 def column_changes(
     imperfect: Imperfections, aircraft: Aircraft, layout: SignalLayout, integrals: Array
-) -> tuple[ColumnChanges, Array]:
-    """What one unit of each imperfection changes, and the means (W,) of the signals."""
+) -> ColumnChanges:
+    """What one unit of each imperfection changes, by the signals' ``integrals`` (W,)."""
     means = flight_means(layout, integrals)
-    count = len(imperfect.sources) + 2 * len(imperfect.controls)
+    count = len(imperfect.sources) + 3 * len(imperfect.controls)
     changes = ColumnChanges(aircraft, layout, imperfect.columns, means, count)
     for i, source in enumerate(imperfect.sources):
         changes.at = i
         describe(changes, source)
     for i, place in enumerate(imperfect.timed.tolist()):
-        changes.at = imperfect.servos.start + i
-        changes.servo(place, 1.0, 0.0)
-        changes.at = imperfect.servos.stop + i
-        changes.servo(place, 0.0, 1.0)
+        for order in range(3):
+            changes.at = imperfect.servos.start + i + order * len(imperfect.controls)
+            changes.servo(place, order)
     changes.finish()
-    return changes, np.array([means.of(name) for name in layout.names])
+    return changes
 
 
 def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     """(K,) 1 sigma of each, and (K,) its mean, both from where the servos are at present taken to be."""
     late, curved = model.lateness[imperfect.timed], model.curvature[imperfect.timed]
-    of_curvature = CURVATURE * np.maximum(late, SHORTEST) ** 2
-    sigmas = np.concatenate([[source.sigma for source in imperfect.sources], imperfect.sigmas, of_curvature])
+    of_curvature, of_third = CURVATURE * np.maximum(late, SHORTEST) ** 2, THIRD * np.maximum(late, SHORTEST) ** 3
+    of_sources = [source.sigma for source in imperfect.sources]
+    sigmas = np.concatenate([of_sources, imperfect.sigmas, of_curvature, of_third])
     stated, expected = imperfect.applied.lateness[imperfect.timed], imperfect.applied.curvature[imperfect.timed]
     # what is late beyond the file's servo may be a lag or a delay
     expected = expected + CURVATURE * (late - stated) ** 2
-    means = np.concatenate([np.zeros(len(imperfect.sources)), stated - late, expected - curved])
+    of_sources = [source.expected for source in imperfect.sources]
+    none = np.zeros(late.size)
+    means = np.concatenate([of_sources, stated - late, expected - curved, none])
     return sigmas, means
 
 
@@ -144,8 +148,7 @@ def remapped(
 ) -> Information:
     """The information with the controls where the second of the ``servos`` have them, not the first.
 
-    The Gram matrices follow from the cross-spectra. The scores, whose noise is correlated between lines, change as the
-    Gram matrices do: column by column, they are as many times as large.
+    The Gram matrices follow from the cross-spectra.
     """
     if not info.spectra.size or not info.samples:
         return info
@@ -153,15 +156,5 @@ def remapped(
     model = with_servos(exact, layout, lines.omega, servo_model.lateness(after, before, lines.omega))
     full = spectra_with_servos(info.spectra, imperfect.columns, model, lines.omega, None)
     grams = band_grams(full, lines.bands, imperfect.places)
-    energies = info.grams.diagonal(axis1=1, axis2=2)
-    scores = info.scores.diagonal(axis1=1, axis2=2)
-    per_energy = np.divide(np.maximum(scores, 0.0), energies, out=np.zeros_like(energies), where=energies > 0.0)
-    root = np.sqrt(per_energy)
-    more = (grams - info.grams) * root[:, :, None] * root[:, None, :]
     T = imperfect.columns.transformed
-    return _replaced(info, grams=grams, scores=info.scores + more, spectra=full[:, :T, :T].copy())
-
-
-def _replaced(info: Information, **changes: NDArray[Any]) -> Information:
-    values = {name: getattr(info, name) for name in info.__dataclass_fields__}
-    return Information(**(values | changes))
+    return replace(with_grams(info, grams), spectra=full[:, :T, :T].copy())

@@ -23,10 +23,11 @@ _COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 
 @dataclass(frozen=True)
 class ErrorSource:
-    """One imperfection: its key among the tolerances, and its 1 sigma."""
+    """One imperfection: its key among the tolerances, its 1 sigma, and the value about which it lies."""
 
     key: str
     sigma: float
+    expected: float = 0.0
 
     @property
     def kind(self) -> str:
@@ -41,11 +42,31 @@ def sources(aircraft: Aircraft, *, vanes: bool = True) -> tuple[ErrorSource, ...
         source = ErrorSource(key, float(sigma))
         change = _change_of(source)
         if sigma > 0.0 and math.isfinite(sigma) and change is not None and (vanes or source.kind not in _FLOW):
-            found.append(source)
+            found.append(_never_early(aircraft, source) if key in _LATE_ONLY else source)
     bias = aircraft.noise_bias.get("airspeed", 0.0)
     if bias > 0.0 and not (aircraft.ideal and "noise.bias.airspeed" not in aircraft.stated_tolerances):
         found.append(ErrorSource("airspeed_bias", bias))
     return tuple(found)
+
+
+def _never_early(aircraft: Aircraft, source: ErrorSource) -> ErrorSource:
+    """The same of what delays and never hastens."""
+    effect, _, parameter = source.key.rpartition(".")
+    applied = effect == "delays"  # what the file states of it has been taken out by the alignment
+    stated = aircraft.delays[parameter] if applied else aircraft.effects.get(effect, {}).get(parameter)
+    value = stated.value if stated else 0.0
+    mean, sigma = not_negative(value, source.sigma)
+    return ErrorSource(source.key, sigma, mean - value if applied else mean)
+
+
+def not_negative(mean: float, sigma: float) -> tuple[float, float]:
+    """Mean and standard deviation of a normal distribution that is cut off below zero.
+
+    Johnson, Kotz & Balakrishnan, "Continuous Univariate Distributions", vol. 1, 2nd ed., 1994, sec. 13.10.1.
+    """
+    cut = -mean / sigma
+    ratio = math.sqrt(2.0 / math.pi) * math.exp(-0.5 * cut * cut) / max(math.erfc(cut / math.sqrt(2.0)), 1e-300)
+    return mean + sigma * ratio, sigma * math.sqrt(max(1.0 + cut * ratio - ratio * ratio, 0.0))
 
 
 def describe(changes: ColumnChanges, source: ErrorSource) -> None:
@@ -321,4 +342,6 @@ CHANGES: Mapping[str, Change] = {
     "throttle.inclination": _inclination,
     "throttle.arm": _thrust_arm,
 }
+#: Lags and low-pass filters, which make a signal late.
+_LATE_ONLY = ("air_data_lag.time_constant", "delays.imu")
 _FLOW = ("vane_scale", "vane_bias", "sensors.air_data", "air_data_lag")

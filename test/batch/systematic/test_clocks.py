@@ -11,6 +11,7 @@ from sysid_node.aircraft.model import UncertainValue
 from sysid_node.batch.systematic.clocks import corrected
 from sysid_node.batch.systematic.flight_posterior import Imperfection
 from sysid_node.flight.record import FlightRecord
+from sysid_node.online.systematic.servo_model import CUBIC
 
 TIME = np.arange(0.0, 20.0, 0.01)
 SIGNAL = np.exp(-(((TIME - 10.0) / 5.0) ** 6)) * (0.1 * np.sin(2.0 * TIME) + 0.05 * np.sin(5.0 * TIME + 1.0))
@@ -29,7 +30,10 @@ def behind(lateness: float, curvature: float) -> np.ndarray:
 @pytest.mark.parametrize(("lateness", "curvature"), [(0.05, 0.0), (0.08, 0.0025)])
 def test_a_control_follows_its_servo(lateness, curvature):
     record = FlightRecord(TIME, {"de": SIGNAL}, commanded=True)
-    found = corrected(KESTREL, record, {servo("lateness"): lateness, servo("curvature"): curvature})
+    # a lag without a delay has no third coefficient
+    third = -CUBIC * lateness * curvature
+    values = {servo("lateness"): lateness, servo("curvature"): curvature, servo("third"): third}
+    found = corrected(KESTREL, record, values)
     np.testing.assert_allclose(found["de"][50:-50], behind(lateness, curvature)[50:-50], atol=1e-4)
 
 
