@@ -158,9 +158,11 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     renew_early(state)
     inputs.previous = (time, motion)
     if previous is None or time - previous[0] > model.settings.max_gap:
+        interrupt(state)  # before the servos move on
         if state.servo_states is not None:
             state.servo_states.follow(time, row[model.layout.deflections])
-        interrupt(state, time, row)
+        sampled_transform.begin_at(state.transform, time, row)
+        begin_segment(state)
         return
     inputs.step = time - previous[0]
     gain = model.momentum(previous[1], motion)
@@ -230,10 +232,8 @@ def leave_out(state: EstimatorState, column: int) -> None:
     state.inputs.incomplete[name] = state.inputs.incomplete.get(name, 0) + 1
 
 
-def interrupt(state: EstimatorState, time: float, row: Sequence[float]) -> None:
-    """Finish the segment at the last sample and begin one at this: nothing is known of the time in between."""
+def interrupt(state: EstimatorState) -> None:
+    """Finish the segment at the last sample: nothing is known of the time until the next."""
     if state.transform.last > state.segment.start:
         renew(state, last=True)
     state.changes.monitor.pieces.clear()
-    sampled_transform.begin_at(state.transform, time, row)
-    begin_segment(state)

@@ -1,12 +1,17 @@
 """What the flights tell of the imperfections that an aircraft may have within its tolerances.
 
-The online estimator passes along each flight and estimates the imperfections along with the derivatives
-(``online.systematic``). Its result is a normal distribution. Those of several flights of the same aircraft are
-multiplied, and the tolerances, which each of them holds, count once.
+The online estimator passes along the flights and estimates the imperfections along with the derivatives
+(``online.systematic``). Flights of the same aircraft share both, so it passes along one after another and solves for
+all together. Estimates of single flights cannot be combined afterwards: each is linear about its own solution. Where a
+flight tells the sum of two imperfections alone, a servo's lateness and the IMU's say, two flights linearised at
+different places seem to tell both (Huang, Mourikis & Roumeliotis, Int. J. Robotics Research 29, 2010, call it
+inconsistency by linearisation). Flights with commands and flights with measured positions have no servos in common:
+their results, normal distributions, are multiplied, and the tolerances, which both of them hold, count once.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,13 +23,13 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
-from sysid_node.online.segment_solution import move_servos
-from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.settings import LONGEST_GAP, OnlineSettings
 from sysid_node.online.state import EstimatorState
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections, prior
-from sysid_node.online.systematic.servo_model import ServoModel
 from sysid_node.online.types import SAMPLE_COLUMNS
+
+APART = 2.0 * LONGEST_GAP  # s between flights: the estimator begins a segment after such a gap
 
 
 class Imperfection(NamedTuple):
@@ -83,45 +88,28 @@ def flight_posterior(
 ) -> FlightPosterior | None:
     """The posterior of all ``records`` together; None where the file states that all is exact, or none can be used."""
     online = OnlineSettings(actuators=settings.actuators, max_gap=min(settings.max_gap, 5.0), detect_changes=False)
-    found: FlightPosterior | None = None
-    # Two flights that tell the sum of two parameters alone would, linearised at different places, seem to tell both.
-    # The second pass linearises all of them where the first has found the servos.
-    for _ in range(2):
-        told = [one for record in records if (one := _told(_passed(aircraft, record, online, found))) is not None]
-        found = _combined(told) if told else None
-        if len(told) < 2:
-            break
-    return found
+    alike = [[one for one in records if one.commanded == commanded] for commanded in (False, True)]
+    told = [one for some in alike if some and (one := _told(_passed(aircraft, some, online))) is not None]
+    return _combined(told) if told else None
 
 
-def _passed(
-    aircraft: Aircraft, record: FlightRecord, settings: OnlineSettings, known: FlightPosterior | None
-) -> EstimatorState:
-    """The online estimator after a flight, whose servos are at first where they are ``known`` to be."""
-    state = estimator.init(aircraft, settings, commanded=record.commanded)
-    if known is not None and state.model.imperfections is not None:
-        move_servos(state, _servos_of(known, state.model.imperfections, record.commanded))
-    interval = record.air_interval or float(np.median(np.diff(record.time)))
-    density = np.where(np.isfinite(record["rho"]), record["rho"], aircraft.reference.air_density)
-    made = {"air_interval": np.full(len(record), interval), "rho": density}
-    names = (*SAMPLE_COLUMNS, *aircraft.control_symbols)
-    samples = np.column_stack([made[name] if name in made else record[name] for name in names])
-    for time, sample in zip(record.time.tolist(), samples.tolist(), strict=True):
-        estimator.update(state, time, sample)
+def _passed(aircraft: Aircraft, records: Sequence[FlightRecord], settings: OnlineSettings) -> EstimatorState:
+    """The online estimator after flights that are alike in what was recorded of the controls, as if they were one."""
+    state, begin = estimator.init(aircraft, settings, commanded=records[0].commanded), 0.0
+    for record in records:
+        # each flight has its own beginning, and tells whether its thrust is known
+        state.inputs.begin, state.inputs.thrust_known = math.nan, None
+        interval = record.air_interval or float(np.median(np.diff(record.time)))
+        density = np.where(np.isfinite(record["rho"]), record["rho"], aircraft.reference.air_density)
+        made = {"air_interval": np.full(len(record), interval), "rho": density}
+        names = (*SAMPLE_COLUMNS, *aircraft.control_symbols)
+        samples = np.column_stack([made[name] if name in made else record[name] for name in names])
+        times = record.time - record.time[0] + begin
+        for time, sample in zip(times.tolist(), samples.tolist(), strict=True):
+            estimator.update(state, time, sample)
+        estimator.interrupt(state)
+        begin = float(times[-1]) + APART
     return state
-
-
-def _servos_of(known: FlightPosterior, imperfect: Imperfections, commanded: bool) -> ServoModel:
-    """Where a posterior has the servos."""
-    values = dict(zip(known.imperfections, known.mean.tolist(), strict=True))
-    applied, steps = imperfect.applied, np.zeros((2, imperfect.applied.lateness.size))
-    for name, place in zip(imperfect.controls, imperfect.timed.tolist(), strict=True):
-        for step, role, start in zip(
-            steps, ("lateness", "curvature"), (applied.lateness, applied.curvature), strict=True
-        ):
-            one = Imperfection(f"actuator_lag.{name}", role, commanded)
-            step[place] = values.get(one, float(start[place])) - start[place]
-    return applied.moved(*steps)
 
 
 def _told(state: EstimatorState) -> _OneFlight | None:
