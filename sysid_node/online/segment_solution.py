@@ -40,18 +40,47 @@ TIMING_EVERY = 4  # pieces at least between tests for actuator lag, which change
 def solve_with_servos(state: EstimatorState, lines: Array) -> None:
     """Renew the estimates from the transform's ``lines``, again if the estimated servo times have notably changed."""
     imperfect = state.model.imperfections
-    for _ in range(SERVO_STEPS):
-        _solve_all(state, measure_segment(state, lines))
-        latest, servos = state.latest, state.servos
-        if imperfect is None or servos is None or latest is None or latest.systematic is None:
+    for changes in range(SERVO_STEPS + 1):
+        found = _look(state, lines)
+        if imperfect is None or state.servos is None or found is None or changes == SERVO_STEPS:
             return
-        if latest.systematic.pieces != state.finished.pieces:
-            return
-        step = estimation.notable_step(imperfect, servos, latest.systematic)
+        step = estimation.notable_step(imperfect, state.servos, found)
         if step is None:
             return
         move_servos(state, step)
+
+
+def _look(state: EstimatorState, lines: Array) -> SystematicErrors | None:
+    """Renew the estimates; return the systematic errors if they are new.
+
+    Where the signals, as the last step corrects them, fit worse than before it, a shorter step is made from there.
+    """
+    before = _last(state)
     _solve_all(state, measure_segment(state, lines))
+    found = _last(state)
+    if found is None or found.pieces != state.finished.pieces:
+        return None
+    if before is None or not estimation.worse(found, before):
+        return found
+    again = _look_at(state, lines, before, 0.5 * before.share)
+    if again is not None and not estimation.worse(found, again):
+        return _look_at(state, lines, found, 1.0)
+    return again
+
+
+def _look_at(state: EstimatorState, lines: Array, place: SystematicErrors, share: float) -> SystematicErrors | None:
+    """Renew the estimates with the signals corrected as in ``place``, and a ``share`` of the step from there."""
+    if state.servos is not place.lines:
+        move_servos(state, place.lines)
+    else:
+        state.changes.monitor.references.pop()
+    _solve_all(state, measure_segment(state, lines), (place, share))
+    return _last(state)
+
+
+def _last(state: EstimatorState) -> SystematicErrors | None:
+    """The systematic errors as they were last found."""
+    return state.latest.systematic if state.latest is not None else None
 
 
 def move_servos(state: EstimatorState, servos: ServoModel) -> None:
@@ -80,11 +109,14 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> None:
     state.changes.monitor.references.clear()
 
 
-def _solve_all(state: EstimatorState, segment: Information) -> None:
-    """Renew the estimates and their covariances, from the finished segments and the present one."""
+def _solve_all(state: EstimatorState, segment: Information, at: tuple[SystematicErrors, float] | None = None) -> None:
+    """Renew the estimates and their covariances, from the finished segments and the present one.
+
+    ``at``: where the signals are to be corrected, and the share of the step that is then made; else by the last step.
+    """
     past = finished_information(state)
     recorded = past + segment
-    signals = _corrected_signals(state, recorded)
+    signals = _corrected_signals(state, recorded, at[0].taken_out if at else None)
     total = recorded if signals is None else signals.information
     gram = total.grams.sum(axis=0)
     strength, solution, compensation = _solve(state, total, gram)
@@ -103,7 +135,7 @@ def _solve_all(state: EstimatorState, segment: Information) -> None:
     before = ReferenceEstimates(now, equations, solution, spread)
     if signals is not None:
         before = _with_recorded_signals(equations, recorded, compensation, now)
-    systematic = _systematic(state, signals, solution, before.solution, spread, inflation)
+    systematic = _systematic(state, signals, solution, before.solution, spread, inflation, at[1] if at else None)
     if systematic is not None:
         variance = variance * systematic.considered.misfit[:, None]
     scale = before.solution.residual[:, None] * np.abs(before.solution.inverse.diagonal())
@@ -135,12 +167,16 @@ def _with_recorded_signals(
     return ReferenceEstimates(now, equations, solution, least_squares.uncertainty(equations, solution, recorded))
 
 
-def _corrected_signals(state: EstimatorState, recorded: Information) -> CorrectedSignals | None:
-    """The signals without what is so far estimated of the imperfections; None where there are none."""
+def _corrected_signals(
+    state: EstimatorState, recorded: Information, taken_out: Array | None
+) -> CorrectedSignals | None:
+    """The signals without what is so far estimated of the imperfections, or is to be taken out; None where none are."""
     model, servos = state.model, state.servos
     if model.imperfections is None or servos is None:
         return None
-    last = state.latest.systematic if state.latest is not None else None
+    last = _last(state)
+    if taken_out is None:
+        taken_out = estimation.to_take_out(model.imperfections, servos, last)
     return corrected_signals(
         model.imperfections,
         model.aircraft,
@@ -149,7 +185,7 @@ def _corrected_signals(state: EstimatorState, recorded: Information) -> Correcte
         model.instrument_model,
         servos,
         recorded,
-        estimation.to_take_out(model.imperfections, servos, last),
+        taken_out,
         last.known if last is not None else None,
     )
 
@@ -161,17 +197,30 @@ def _systematic(
     recorded: Solution,
     spread: Uncertainty,
     inflation: Array,
+    share: float | None,
 ) -> SystematicErrors | None:
-    """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for."""
+    """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for.
+
+    With a ``share`` of a step they are looked at anew, else when it is time.
+    """
     imperfect, servos, equations = state.model.imperfections, state.servos, state.equations
     if imperfect is None or servos is None or signals is None or not corrected.usable:
         return None
     correction = signals.correction(equations, corrected, recorded)
-    last = state.latest.systematic if state.latest is not None else None
-    if last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
+    last = _last(state)
+    if share is None and last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
         return replace(last, correction=correction)
     return estimation.systematic_errors(
-        imperfect, servos, equations, corrected, spread, signals, inflation, correction, state.finished.pieces
+        imperfect,
+        servos,
+        equations,
+        corrected,
+        spread,
+        signals,
+        inflation,
+        correction,
+        state.finished.pieces,
+        1.0 if share is None else share,
     )
 
 

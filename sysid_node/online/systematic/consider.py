@@ -27,7 +27,7 @@ moments' residuals, and a smaller moment of inertia would seem to explain noise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,20 @@ PROJECTION_RIDGE = 1e-8
 
 
 @dataclass(frozen=True)
+class Fit:
+    """How well C equations with the corrected signals fit."""
+
+    explained: Array  # (C,) energy of the residuals that the exogenous signals explain
+    noise: Array  # (C,) that energy per exogenous signal if the residuals were noise; misfit included
+    improbable: float  # sum of the imperfections' squares about their expectations, in tolerances
+
+    def cost(self, weights: Fit) -> float:
+        """What the estimates minimise, with the noise as in ``weights``."""
+        counted = weights.noise > 0.0
+        return float((self.explained[counted] / weights.noise[counted]).sum()) + self.improbable
+
+
+@dataclass(frozen=True)
 class Considered:
     """K imperfections after the flight, and what they do to C coefficients' P slopes and, behind them, offsets."""
 
@@ -57,6 +71,17 @@ class Considered:
     covariance: Array  # (K, K)
     jacobian: Array  # (K, C, P + 1)
     misfit: Array  # (C,) how many times as much of the residuals as of noise the exogenous signals explain, at least 1
+    fit: Fit  # before the ``step``
+
+    def shortened(self, share: float) -> Considered:
+        """With a ``share`` of the step. The rest is uncertain: the signals are not linear enough for it."""
+        rest = (1.0 - share) * self.step
+        return replace(
+            self,
+            estimate=self.estimate - rest,
+            step=share * self.step,
+            covariance=self.covariance + np.outer(rest, rest),
+        )
 
     @property
     def correction(self) -> Array:
@@ -106,17 +131,19 @@ def consider(
     # what the instruments find in the residuals is the noise's part, or rounding
     left = inverse @ ((across @ residuals.T) * equations.belongs) * equations.belongs  # (P, C)
     both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)  # (C, K + 1, 2N)
-    scores, misfit = Scores.none(sigmas.size), np.ones(C)
+    scores, misfit, explained = Scores.none(sigmas.size), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(equations.block.max()) + 1):
         project = _projection(equations, changes, place, gram, block)
         for c in np.flatnonzero((equations.block == block) & (noise > 0.0) & moves).tolist():
             q, D = project @ both[c].T, both[c, :-1]
             further = project.shape[0] - int(equations.belongs[:, c].sum())  # than the unknowns take
-            misfit[c] = max(float(q[:, -1] @ q[:, -1]) / (float(noise[c]) * max(further, 1)), 1.0)
+            explained[c] = float(q[:, -1] @ q[:, -1])
+            misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
             share = further / max(float(freedom[c]), 1.0)
             scores.add(q[:, :-1].T @ q, D @ gram @ both[c].T, share, float(noise[c] * misfit[c]))
-    step, covariance = _posterior(*scores.weighed(), (centre - signals.estimate) / sigmas)
+    off = (centre - signals.estimate) / sigmas
+    step, covariance = _posterior(*scores.weighed(), off)
     jacobian = _jacobian(equations, changes, v, J, sigmas, signals.corrected_means)
     return Considered(
         signals.estimate + sigmas * step,
@@ -124,6 +151,7 @@ def consider(
         sigmas[:, None] * covariance * sigmas,
         jacobian / sigmas[:, None, None],
         misfit,
+        Fit(explained, noise * misfit * moves, float(off @ off)),
     )
 
 

@@ -20,9 +20,11 @@ Flags = NDArray[np.bool_]
 
 SURE = 2.0  # standard errors, and tolerances of the stamps, by which a servo must be ahead of its command to be refused
 LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
+#: Sum of squares by which a step may worsen the fit: the estimates correct for noise, which that sum does not.
+WORSE, WORSE_SHARE = 4.0, 0.1
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
-#: smaller changes are exact enough to first order.
-NOTABLE_SHARE, NOTABLE = 0.5, 5e-4
+#: smaller changes are exact enough to second order. None is above ``NOTABLE_MOST`` s.
+NOTABLE_SHARE, NOTABLE, NOTABLE_MOST = 0.5, 5e-4, 0.02
 #: Tolerances by which an imperfection is taken out of the signals at most: signals change in proportion to small
 #: imperfections only.
 LARGEST_CORRECTION = 6.0
@@ -44,6 +46,8 @@ class SystematicErrors:
     pieces: int  # number of pieces finished when this was found
     energy: float  # s: data that it rests on
     known: Known  # what one unit of each imperfection changes
+    taken_out: Array  # (K,) of the imperfections, from the signals that it rests on
+    share: float = 1.0  # of the step that was made
 
     def ahead(self, imperfect: Imperfections) -> Flags:
         """(m,) the servos that would surely move their surfaces before the commands.
@@ -69,16 +73,19 @@ def systematic_errors(
     inflation: Array,
     correction: Array,
     pieces: int,
+    share: float,
 ) -> SystematicErrors:
     """By the corrected ``signals`` and their ``solution``, which differs by ``correction`` from that of recorded ones.
 
     The lines have the controls where the ``servos`` have them. ``inflation`` (C,): factors of the statistical
-    variances, which hold for what the flight tells of imperfections too.
+    variances, which hold for what the flight tells of imperfections too. At most a ``share`` of the step is made.
     """
     sigmas, centre = prior(imperfect, servos)
     noise = inflation * noise_per_gram(equations, spread, signals.information)
     found = consider(equations, solution, noise, signals, imperfect.places, sigmas, centre, spread.freedom)
     at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
+    share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))
+    found = found.shortened(share)
     late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
     late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m : S + 2 * m]
     errors = np.sqrt(found.covariance.diagonal()[S : S + m])
@@ -93,7 +100,16 @@ def systematic_errors(
         pieces,
         signals.information.energy,
         signals.known,
+        signals.estimate,
+        share,
     )
+
+
+def worse(found: SystematicErrors, before: SystematicErrors) -> bool:
+    """Whether the signals ``found`` rests on fit worse than those of ``before``, by whose noise both are weighed."""
+    weights = before.considered.fit
+    least = weights.cost(weights)
+    return found.considered.fit.cost(weights) > least + WORSE + WORSE_SHARE * least
 
 
 def to_take_out(imperfect: Imperfections, servos: ServoModel, last: SystematicErrors | None) -> Array:
@@ -120,7 +136,6 @@ def notable_step(imperfect: Imperfections, servos: ServoModel, found: Systematic
     """Where the lines should have the servos from now on; None where they are near enough there."""
     at = imperfect.timed
     step = found.servos.lateness - servos.lateness
-    if not (np.abs(step[at]) > NOTABLE_SHARE * found.errors + NOTABLE).any():
+    if not (np.abs(step[at]) > np.minimum(NOTABLE_SHARE * found.errors + NOTABLE, NOTABLE_MOST)).any():
         return None
-    share = min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), TINY))
-    return servos.moved(share * step, share * (found.servos.curvature - servos.curvature))
+    return servos.moved(step, found.servos.curvature - servos.curvature)
