@@ -22,6 +22,7 @@ SURE = 2.0  # standard errors, and tolerances of the stamps, by which a servo mu
 LARGEST_STEP = 0.05  # s by which a servo's lateness is changed at once
 #: Sum of squares by which a step may worsen the fit: the estimates correct for noise, which that sum does not.
 WORSE, WORSE_SHARE = 4.0, 0.1
+SHORT = 0.3  # standard errors: a step within which the signals are linear enough
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to second order. None is above ``NOTABLE_MOST`` s.
 NOTABLE_SHARE, NOTABLE, NOTABLE_MOST = 0.5, 5e-4, 0.02
@@ -106,7 +107,13 @@ def systematic_errors(
 
 
 def worse(found: SystematicErrors, before: SystematicErrors) -> bool:
-    """Whether the signals ``found`` rests on fit worse than those of ``before``, by whose noise both are weighed."""
+    """Whether the signals ``found`` rests on fit worse than those of ``before``, by whose noise both are weighed.
+
+    After a short step they do not: more of what is not in the model has come with new data.
+    """
+    step, variance = before.considered.step, before.considered.covariance.diagonal()
+    if (step * step <= SHORT**2 * variance).all():
+        return False
     weights = before.considered.fit
     least = weights.cost(weights)
     return found.considered.fit.cost(weights) > least + WORSE + WORSE_SHARE * least

@@ -26,15 +26,24 @@ def test_servos_are_found():
     assert (found.errors[late] < 0.01).all()
 
 
-def test_a_flight_told_more_often_counts_more_and_its_tolerances_once():
-    """Twice the information halves a variance at most, but for the place where the flights are linearised."""
-    twice, four = posterior(1, 1), posterior(1, 1, 1, 1)
-    ratio = four.errors / twice.errors
-    assert np.median(ratio) < 1.0
-    assert (ratio > 0.95 * np.sqrt(0.5)).all()
+def test_more_flights_tell_more_but_not_of_what_they_share():
+    """The stamps of controls and motion are off by the same time in all flights, and every servo's time with them."""
+    one, four = posterior(1), posterior(1, 1, 1, 1)
+    servos = [k for k, imperfection in enumerate(four.imperfections) if imperfection.role == "lateness"]
+    keys = [imperfection.key for imperfection in four.imperfections]
+    stamps, area = keys.index("delays.actuators"), keys.index("geometry.S")
+    assert (four.errors[servos] < one.errors[servos]).all()
+    assert (four.errors[servos] > 0.9 * four.errors[stamps]).all()
     # no flight tells of the area, whose tolerance counts once
-    area = [one.key for one in four.imperfections].index("geometry.S")
     assert four.errors[area] > 0.99 * UNCERTAIN.tolerances["geometry.S"]
+
+
+def test_servos_of_several_flights_are_those_of_each():
+    """The same flight again and again tells the same servos: not a linearisation that differs from flight to flight."""
+    one, four = posterior(1), posterior(1, 1, 1, 1)
+    late = [k for k, imperfection in enumerate(one.imperfections) if imperfection.role == "lateness"]
+    assert (np.abs(four.mean[late] - one.mean[late]) < one.errors[late]).all()
+    assert (np.abs(four.mean[late] - LATE) < 3.0 * four.errors[late]).all()
 
 
 def test_an_exact_aircraft_has_none():
