@@ -9,6 +9,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
+from sysid_node.online.segment_solution import move_servos
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState
 from test.online.plant import fly, made_aircraft, multisteps
@@ -43,3 +44,24 @@ def test_a_relative_error_of_the_area_is_that_of_every_slope():
     slopes = state.latest.solution.theta.T + found.correction[:, :-1]
     jacobian = found.considered.jacobian[0, :, :-1]
     np.testing.assert_allclose(jacobian[belongs], -slopes[belongs] / aircraft.geometry.S, rtol=1e-3)
+
+
+def test_where_servos_go_in_a_gap_is_not_of_the_segment_before_it():
+    """The segment ends at the last sample before the gap, whatever comes after it: a servo is still on its way then."""
+    aircraft = made_aircraft(stated_tolerances={"actuator_lag.elevator": 0.05})
+    time, samples = fly(aircraft, multisteps(SECONDS, RATE), RATE, seed=7)
+    count = int(np.flatnonzero(np.abs(np.diff(samples[0][:, -3])) > 0.0)[200])
+    ends = []
+    for gap in (None, 0.3, 2.0):
+        state = estimator.init(aircraft, OnlineSettings(), commanded=True)
+        assert state.servos is not None
+        move_servos(state, state.servos.moved(np.full(3, 0.05), np.zeros(3)))
+        for moment, sample in zip(time[:count].tolist(), samples[0][:count].tolist(), strict=True):
+            estimator.update(state, moment, sample)
+        if gap is None:
+            estimator.interrupt(state)
+        else:
+            estimator.update(state, float(time[count - 1]) + gap, (samples[0][count] + 0.0).tolist())
+        ends.append(state.finished.information.grams)
+    assert np.array_equal(ends[0], ends[1])
+    assert np.array_equal(ends[0], ends[2])
