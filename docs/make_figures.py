@@ -151,12 +151,13 @@ def instruments() -> str:
     least = run("identify", bag, "--aircraft", "cdrw", "--method", "equation_error")["derivatives"]
     instrumental = run("replay", bag, "--aircraft", "cdrw")["derivatives"]
     chart = Chart((60, 60, 700, 220), (0.4, len(names) + 0.6), (-40, 50))
-    chart.frame("error of the estimate and 95 % interval, % of the truth", "", (), (-40, -20, 0, 20, 40))
+    chart.frame("error of the estimate and 95 % interval of noise alone, % of the truth", "", (), (-40, -20, 0, 20, 40))
     for i, name in enumerate(names, 1):
         true = truth[name]["value"] if isinstance(truth[name], dict) else truth[name]
         for shift, found, colour in ((-0.12, least[name], ORANGE), (0.12, instrumental[name], BLUE)):
-            low, value, high = (100 * (found[key] / true - 1) for key in ("lower", "value", "upper"))
-            print(f"instruments: {name}: {value:+.1f} % ({min(low, high):+.1f} to {max(low, high):+.1f})")
+            value, half = 100 * (found["value"] / true - 1), 196 * found["statistical_error"] / abs(true)
+            low, high = value - half, value + half
+            print(f"instruments: {name}: {value:+.1f} % ({low:+.1f} to {high:+.1f})")
             chart.line((i + shift, i + shift), (low, high), colour, 3)
             chart.dot(i + shift, value, colour, 4.5)
         x, y = chart.at(i, -40)
