@@ -89,7 +89,8 @@ def main() -> None:
             recorder.get_logger().info(f"records into {options.bag}")
             with until_shutdown():  # the writer aborts on exceptions
                 serve(recorder)
-        get_logger("recorder").info(f"{recorder.words()}, into {options.bag}")
+        # not the node's own logger, which would try to publish it on /rosout
+        get_logger("sysid").info(f"{recorder.words()}, into {options.bag}")
 
     sys.exit(run_program(record))
 

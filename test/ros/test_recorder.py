@@ -59,3 +59,4 @@ def test_it_says_how_much_was_recorded_and_what_is_missing(tmp_path: Path, ros: 
     process.send_signal(signal.SIGINT)
     text, _ = process.communicate(timeout=20.0)
     assert "recorded 0 messages of 0 topics; nothing came on /imu/data, /air_data, /actuators" in text
+    assert len(text.splitlines()) == 1, text
