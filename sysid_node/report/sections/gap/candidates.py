@@ -35,7 +35,7 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
 
 def _doubted(cause: Mapping[str, Any]) -> str:
     """``actuator lag (probability 0.42; time constant 0.110 ± 0.006 s)``."""
-    details = [f"probability {likely(cause['probability'])}", *map(" ".join, _parameters(cause))]
+    details = [f"probability {likely(cause['probability'])}", *(" ".join(filter(None, p)) for p in _parameters(cause))]
     return f"{label_words(cause['label'])} ({'; '.join(details)})"
 
 
