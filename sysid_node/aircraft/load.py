@@ -87,7 +87,7 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
         ideal=ideal,
         delays=delays,
         effects=read_effects(fields.get("effects"), controls, throttle, derivatives, delays),
-        tables=read_tables(fields.get("tables"), controls),
+        tables=read_tables(fields.get("tables"), controls, throttle),
         stated_tolerances=quantities.stated,
         outputs=fields["outputs"].text('text, e.g. "elevator=out2:1500:0.001"') if "outputs" in fields else "",
     )

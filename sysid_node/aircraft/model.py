@@ -99,8 +99,9 @@ class LookupTable:
     """A lookup table that is added to a coefficient: linear between its points, held beyond its ends.
 
     ``over`` names one or two of alpha, beta (rad), V (true airspeed, m/s), Mach, p, q, r (non-dimensional, as in the
-    derivatives) and the controls' symbols (rad). ``points`` are the increasing points of each. ``values`` are as many
-    numbers as there are points, or for two variables a row for each point of the first.
+    derivatives), the controls' symbols (rad) and throttle (0..1, with the motor's lag). ``points`` are the increasing
+    points of each. ``values`` are as many numbers as there are points, or for two variables a row for each point of
+    the first.
     """
 
     coefficient: str

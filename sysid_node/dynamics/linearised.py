@@ -1,11 +1,14 @@
-"""The derivatives that the lookup tables amount to near a steady level flight, for linear models of the aircraft."""
+"""The derivatives that the lookup tables amount to near a steady level flight, for linear models of the aircraft.
+
+Tables over the throttle are left out, for a linear model has none: an imported file's are zero in this flight.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.dynamics import scalar
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.linear_model import level_flight
@@ -25,13 +28,14 @@ def linear_derivatives(aircraft: Aircraft) -> dict[str, float]:
     Without tables these are the file's derivatives.
     """
     values = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
-    return _sum(values, table_derivatives(aircraft)) if aircraft.tables else values
+    return _sum(values, table_derivatives(aircraft)) if _tables(aircraft) else values
 
 
 def table_derivatives(aircraft: Aircraft, pressure: float = 1.0) -> dict[str, float]:
     """What the tables add to the derivatives in level flight at ``pressure`` times the reference dynamic pressure."""
-    over = {name for table in aircraft.tables for name in table.over} - {"V", "Mach"}
-    return _tangent(aircraft, *trimmed(aircraft, pressure), pressure, sorted(over)) if aircraft.tables else {}
+    tables = _tables(aircraft)
+    over = {name for table in tables for name in table.over} - {"V", "Mach"}
+    return _tangent(aircraft, *trimmed(aircraft, pressure), pressure, sorted(over)) if tables else {}
 
 
 def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:
@@ -44,7 +48,7 @@ def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:
     load = dynamic_pressure(reference.air_density, reference.airspeed) * aircraft.geometry.S * pressure
     lift = aircraft.mass * GRAVITY / load
     now = level_flight(values, lift)
-    for _ in range(_ROUNDS if aircraft.tables else 0):
+    for _ in range(_ROUNDS if _tables(aircraft) else 0):
         before, now = now, level_flight(_sum(values, _tangent(aircraft, *now, pressure, ("alpha", "de"))), lift)
         now = min(max(now[0], -math.pi), math.pi), min(max(now[1], -math.pi), math.pi)
         if max(abs(now[0] - before[0]), abs(now[1] - before[1])) < _ARRIVED:
@@ -52,16 +56,21 @@ def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:
     return now
 
 
+def _tables(aircraft: Aircraft) -> list[LookupTable]:
+    return [table for table in aircraft.tables if "throttle" not in table.over]
+
+
 def _tangent(
     aircraft: Aircraft, alpha: float, elevator: float, pressure: float, over: Sequence[str]
 ) -> dict[str, float]:
     """The tables' slopes over some variables, and offsets, at an angle of attack and elevator (rad), else at rest."""
     reference, geometry = aircraft.reference, aircraft.geometry
-    density = reference.air_density if need_mach(aircraft.tables) else None
+    tables = _tables(aircraft)
+    density = reference.air_density if need_mach(tables) else None
     flow = (reference.airspeed * math.sqrt(pressure), alpha, 0.0)
     at = table_variables(flow, (0.0, 0.0, 0.0), geometry.b, geometry.cbar, density, scalar)
     at |= dict.fromkeys(aircraft.control_symbols, 0.0) | ({"de": elevator} if "de" in aircraft.control_symbols else {})
-    added = scalar_tables(aircraft.tables)
+    added = scalar_tables(tables)
     found = {f"{coefficient}_0": value for coefficient, value in added(at).items()}
     for name in (name for name in over if name in at):
         above, below = (added({**at, name: at[name] + step}) for step in (_STEP, -_STEP))

@@ -8,6 +8,7 @@ code.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import LookupTable
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.dynamics.atmosphere import speed_of_sound
 from sysid_node.dynamics.coefficients import rate_regressors
 from sysid_node.dynamics.vector import Namespace, Real, Triple
@@ -39,7 +40,7 @@ def array_tables(tables: Sequence[LookupTable]) -> TableSum:
 def table_variables(
     flow: Triple, rates: Triple, span: Real, chord: Real, density: Real | None, xp: Namespace
 ) -> dict[str, Real]:
-    """What tables may be over, by name, but for the controls.
+    """What tables may be over, by name, but for the controls and the throttle.
 
     ``flow`` airspeed (m/s), alpha and beta (rad); ``rates`` rad/s; ``span`` and ``chord`` m; ``density`` kg/m^3. The
     Mach number is that of the standard temperature at this density, and left out where it is None.
@@ -58,6 +59,12 @@ def mach_number(airspeed: Real, density: Real, xp: Namespace) -> Real:
 def need_mach(tables: Sequence[LookupTable]) -> bool:
     """Whether a table is over the Mach number."""
     return any("Mach" in table.over for table in tables)
+
+
+def full_thrust(aircraft: Aircraft) -> float:
+    """Thrust (N) at full throttle, by which a thrust is divided for tables over the throttle; inf without one."""
+    throttle = aircraft.throttle
+    return math.inf if throttle is None or throttle.max_thrust is None else throttle.max_thrust
 
 
 def _summed(tables: Sequence[LookupTable], form: Callable[[LookupTable], Lookup]) -> TableSum:

@@ -192,6 +192,11 @@ MISTAKES = [
     ("0.01, -0.2]", "0.01]", "tables[0].values: got 3 values, expected 4, one for each point of alpha"),
     ("0.01, -0.2]", "0.01, .nan]", "tables[0].values[3]: got .nan, expected a number"),
     ("[[0, 0, 0], [0.1", "[[0.1", "tables[1].values: got 1 rows, expected 2, one for each point of alpha"),
+    (
+        "over: [alpha], alpha",
+        "over: [throtle], alpha",
+        "over[0]: got 'throtle', expected one of alpha, beta, V, Mach, p, q, r, de, da, df, throttle; did you mean",
+    ),
     ("df: [-0.3, 0.0, 0.3], ", "", "tables[1]: key 'df' is missing; expected its points (rad)"),
     ("name: dart", "name: dart\nideal: perhaps", "f.yaml:2: ideal: got perhaps, expected true"),
 ]

@@ -32,6 +32,11 @@ def test_a_derivative_may_as_well_be_a_table() -> None:
         assert trimmed(aircraft, pressure) == pytest.approx(trimmed(AIRCRAFT, pressure), abs=1e-9)
 
 
+def test_tables_over_the_throttle_are_left_out() -> None:
+    table = LookupTable("Cm", ("alpha", "throttle"), ((-1.0, 1.0), (0.0, 1.0)), ((0.1, 0.2), (0.3, 0.5)))
+    assert linear_derivatives(replace(AIRCRAFT, tables=(table,))) == FILE
+
+
 def test_a_bent_table_counts_with_its_slope_in_level_flight() -> None:
     """Both equations of the trim hold on the table, and on the linear model at the trim's angle of attack."""
     bend = trimmed(AIRCRAFT)[0] - 0.02

@@ -91,6 +91,21 @@ def test_tables_over_airspeed_and_mach_agree(aircraft):
     assert sound == pytest.approx(340.3, rel=0.01)
 
 
+def test_a_table_over_the_throttle_has_the_motors_lag(aircraft):
+    """By NumPy's interpolation at the motor's thrust, not at the commanded one; the side force has no other part."""
+    table = LookupTable("CY", ("throttle",), ((0.0, 0.1, 1.0),), (-0.01, 0.0, 0.05))
+    one = {name: d for name, d in aircraft.derivatives.items() if not name.startswith("CY")}
+    simulator = Simulator(replace(aircraft, derivatives=one, tables=(table,)))
+    moved = moves(simulator)
+    moved[200:, -1] = 5.0
+    flight = fly_sortie(simulator, moved, SortieConditions(["motor_lag:time_constant=0.5"], noise=0.0)).flight
+    full = aircraft.throttle.max_thrust
+    expected, unlagged = (np.interp(x[:, -1] / full, *table.points, table.values)
+                          for x in (flight.surfaces, flight.commands))  # fmt: skip
+    np.testing.assert_allclose(flight.coefficients[:, 2], expected, atol=1e-12)
+    assert np.abs(expected - unlagged).max() > 0.003
+
+
 def test_the_files_effects_fly_as_those_of_the_command(aircraft):
     lag = dict.fromkeys(("elevator", "aileron", "rudder"), UncertainValue(0.06))
     filed = flown(replace(aircraft, effects={"actuator_lag": lag}))

@@ -21,6 +21,9 @@ from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
 RATE, LOOK = 400.0, 2  # Hz, and steps between two looks at the motion
 SECONDS, HEIGHT = 44.0, 300.0
+#: Of the autopilot's airspeed, s. A throttle that followed each reading's noise would keep an engine that gains speed
+#: more slowly than it loses it far below its steady thrust.
+SMOOTHING = 1.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ def flown(world: World, turbulence: str, manoeuvre: str, random: np.random.Gener
     planned["thrust"] = plan.deflections["throttle"] * full
 
     now = reality.start()
-    hands = Pilot(aircraft, reality.trim, now, 1.0, own, full)
+    hands = Pilot(aircraft, reality.trim, now, 1.0, own, full, SMOOTHING)
     gusts = np.zeros((plan.time.size, 6))
     if INTENSITIES[turbulence]:
         dryden = Dryden.at(HEIGHT, aircraft.geometry.b)

@@ -15,7 +15,10 @@ _THRUST = 0.35  # 1/s, per unit of mass, of airspeed
 
 
 class Pilot:
-    """Holds trim attitude and airspeed about the planned commands; ``bandwidth`` rad/s of its attitude loops."""
+    """Holds trim attitude and airspeed about the planned commands; ``bandwidth`` rad/s of its attitude loops.
+
+    ``smoothing`` is the time constant (s) of the low-pass filter of its airspeed.
+    """
 
     def __init__(
         self,
@@ -25,11 +28,13 @@ class Pilot:
         bandwidth: float,
         random: np.random.Generator,
         highest: float,
+        smoothing: float = 0.0,
     ) -> None:
         self._trim, self._random, self._mass, self._highest = trim, random, aircraft.mass, highest
         self._limits = {n: c.limit or 0.5 for n, c in aircraft.controls.items()}
         self._hold = (start.euler[0], start.euler[1], flow_angles(start.flow)[0])
         self._gains = _gains(aircraft, bandwidth)
+        self._speed, self._share = 0.0, 1.0 / (1.0 + smoothing * RATE)
         self._wound = {"elevator": 0.0, "aileron": 0.0}
 
     def command(self, planned: Mapping[str, float], seen: Instant) -> dict[str, float]:
@@ -50,7 +55,8 @@ class Pilot:
             limit = self._limits[name]
             total = self._trim[name] + planned[name] + min(max(wanted, -reach), reach)
             given[name] = min(max(total, -limit), limit)
-        thrust = self._trim["thrust"] + planned["thrust"] - _THRUST * self._mass * speed
+        self._speed += self._share * (speed - self._speed)
+        thrust = self._trim["thrust"] + planned["thrust"] - _THRUST * self._mass * self._speed
         given["thrust"] = min(max(thrust, 0.0), self._highest)
         return given
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from sysid_node.aircraft.document import DocumentEntry
-from sysid_node.aircraft.model import Control, LookupTable
+from sysid_node.aircraft.model import Control, LookupTable, Throttle
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.suggestion import did_you_mean
 
@@ -23,11 +23,15 @@ TABLE_VARIABLES = {
 }
 
 
-def read_tables(entry: DocumentEntry | None, controls: Mapping[str, Control]) -> tuple[LookupTable, ...]:
-    """The tables in the file's order. Raises InputError."""
+def read_tables(
+    entry: DocumentEntry | None, controls: Mapping[str, Control], throttle: Throttle | None
+) -> tuple[LookupTable, ...]:
+    """The tables in the file's order; over the throttle where it is a share of a largest thrust. Raises InputError."""
     if entry is None:
         return ()
     variables = {**TABLE_VARIABLES, **{control.symbol: "rad" for control in controls.values()}}
+    if throttle is not None and throttle.max_thrust is not None:
+        variables["throttle"] = "0..1"
     example = "a list of tables, e.g. - {coefficient: CL, over: [alpha], alpha: [0.0, 0.2], values: [0.0, -0.1]}"
     return tuple(_table(item, variables) for item in entry.items(example))
 

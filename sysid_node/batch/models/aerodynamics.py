@@ -11,7 +11,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.models.model import ModelParameter, Scalars
 from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
-from sysid_node.dynamics.tables import mach_number
+from sysid_node.dynamics.tables import full_thrust, mach_number
 
 Signals = Mapping[str, jax.Array]
 #: ``signals, theta -> coefficient -> value``.
@@ -32,7 +32,8 @@ def derivative_parameters(
 def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rates: bool) -> Coefficients:
     """Coefficients from signals V, alpha, beta, p, q, r and the controls (SI, rad) and theta in the order of ``names``.
 
-    Each holds what the aircraft file's tables add to it; those over the Mach number need ``rho`` (kg/m^3) too.
+    Each holds what the aircraft file's tables add to it; those over the Mach number need ``rho`` (kg/m^3) too,
+    those over the throttle ``thrust`` (N; else it is zero).
 
     Rates are made non-dimensional with the airspeed of the moment, or with the reference airspeed where
     ``reference_rates``. CD_k multiplies CL^2 (parabolic drag polar).
@@ -43,6 +44,7 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
     modelled = {coefficient for coefficient, _ in terms}
     tables = [table for table in aircraft.tables if table.coefficient in modelled]
     packed = pack([(table.points, table.values) for table in tables]) if tables else None
+    full = full_thrust(aircraft)
 
     def regressor(name: str, signals: Signals) -> jax.Array:
         if name == "0":
@@ -56,6 +58,8 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
     def variable(name: str, signals: Signals) -> jax.Array:
         if name == "Mach":
             return jnp.asarray(mach_number(signals["V"], signals["rho"], jnp))
+        if name == "throttle":
+            return signals.get("thrust", jnp.zeros_like(signals["V"])) / full
         return signals["V"] if name == "V" else regressor(name, signals)
 
     def evaluate(signals: Signals, theta: Scalars) -> dict[str, jax.Array]:

@@ -23,7 +23,7 @@ from sysid_node.dynamics.coefficients import regressors, with_polar
 from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
 from sysid_node.dynamics.lever_arm import centripetal, tangential, velocity_from
 from sysid_node.dynamics.rigid_body import known_moments
-from sysid_node.dynamics.tables import array_tables, mach_number, need_mach
+from sysid_node.dynamics.tables import array_tables, full_thrust, mach_number, need_mach
 from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -246,7 +246,8 @@ def _tabulated(aircraft: Aircraft, s: Mapping[str, Array], regressors: Mapping[s
     if not tables:
         return {}
     mach = {"Mach": mach_number(s["V"], s["rho"], np)} if need_mach(tables) else {}
-    return array_tables(tables)({**regressors, "V": s["V"], **mach})
+    throttle = s.get("thrust", np.zeros_like(s["V"])) / full_thrust(aircraft)
+    return array_tables(tables)({**regressors, "V": s["V"], "throttle": throttle, **mach})
 
 
 def _less(coefficients: Mapping[str, Array], tabulated: Mapping[str, Array]) -> dict[str, Array]:

@@ -7,13 +7,13 @@ effects of a file are left out, and ``left_out`` names them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Aircraft, Inertia
+from sysid_node.aircraft.model import Aircraft, Inertia, LookupTable
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.dynamics.airflow import flow_rates, velocity_of
 from sysid_node.dynamics.atmosphere import dynamic_pressure, speed_of_sound
@@ -22,9 +22,13 @@ from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, w
 from sysid_node.dynamics.forces import force_and_moment, thrust_axes, thrust_line
 from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
 from sysid_node.dynamics.rigid_body import angular_acceleration, velocity_rate
+from sysid_node.dynamics.tables import full_thrust
 from sysid_node.dynamics.vector import Real, Vector
 
 Array = NDArray[np.float64]
+
+#: The variables of each table, and the tables.
+PackedByVariables = tuple[tuple[tuple[str, ...], ...], PackedTables]
 
 #: States of ``Equations.rates``: m/s, rad, rad/s.
 STATES = ("V", "alpha", "q", "theta", "beta", "p", "r", "phi")
@@ -51,7 +55,10 @@ class Equations:
         return tuple(name for name in self.aircraft.effects if name not in _INCLUDED and not name.startswith(silent))
 
     def coefficients(self, **state: Real) -> Coefficients:
-        """All six coefficients. ``state``: V (m/s), alpha, beta, controls' symbols (rad), p, q, r non-dimensional."""
+        """All six coefficients. ``state``: V (m/s), alpha, beta, controls' symbols (rad), p, q, r non-dimensional.
+
+        Tables over the throttle (0..1) count where it is given.
+        """
         x: dict[str, Real] = dict.fromkeys(("alpha", "beta", "p", "q", "r", *self.aircraft.control_symbols), 0.0)
         x |= state
         speed = x.pop("V", self.aircraft.reference.airspeed)
@@ -76,8 +83,9 @@ class Equations:
         total = linear_coefficient(
             ((self.aircraft.derivatives[f"{coefficient}_{name}"].value, name) for name in names), x
         )
-        if coefficient in self._tables:
-            over, packed = self._tables[coefficient]
+        tables = self._tables["throttle" in looked]
+        if coefficient in tables:
+            over, packed = tables[coefficient]
             first = np.stack(np.broadcast_arrays(*(looked[names[0]] for names in over)), -1)
             other = [looked[names[1]] if len(names) > 1 else 0.0 for names in over]
             second = np.stack(np.broadcast_arrays(*other, np.zeros(first.shape[:-1]))[:-1], -1)
@@ -86,21 +94,20 @@ class Equations:
         return total
 
     @cached_property
-    def _tables(self) -> dict[str, tuple[tuple[tuple[str, ...], ...], PackedTables]]:
-        """By coefficient, the variables of each table and all tables in one."""
-        found = {}
-        for coefficient in COEFFICIENTS:
-            tables = [table for table in self.aircraft.tables if table.coefficient == coefficient]
-            if tables:
-                found[coefficient] = (tuple(t.over for t in tables), pack([(t.points, t.values) for t in tables]))
-        return found
+    def _tables(self) -> tuple[dict[str, PackedByVariables], dict[str, PackedByVariables]]:
+        """By coefficient, the variables of each table and all tables in one; without and with those over throttle."""
+        every = self.aircraft.tables
+        return _packed([table for table in every if "throttle" not in table.over]), _packed(every)
 
     def rates(self, state: Array, controls: Mapping[str, float], thrust: float) -> Array:
         """Rates (8,) of ``STATES`` with controls (rad, by symbol) and thrust (N) held."""
         V, alpha, q, theta, beta, p, r, phi = state
         geometry, turning = self.aircraft.geometry, Vector(p, q, r)
         span, chord = geometry.b / (2.0 * V), geometry.cbar / (2.0 * V)
-        c = self.coefficients(V=V, alpha=alpha, beta=beta, p=p * span, q=q * chord, r=r * span, **controls)
+        throttle = thrust / full_thrust(self.aircraft)
+        c = self.coefficients(
+            V=V, alpha=alpha, beta=beta, p=p * span, q=q * chord, r=r * span, throttle=throttle, **controls
+        )
         area = dynamic_pressure(self.density, V) * geometry.S
         force, moment = force_and_moment(c, (np.cos(alpha), np.sin(alpha)), area, geometry.b, geometry.cbar)
         inclination, arm = thrust_line(self.aircraft.throttle)
@@ -119,6 +126,15 @@ class Equations:
         spun = angular_acceleration(_known_or_one(self.aircraft.inertia), turning, moment)
         roll_rate, pitch_rate, _ = euler_rates(phi, theta, turning, np)
         return np.array([faster, alpha_rate, spun.y, pitch_rate, beta_rate, spun.x, spun.z, roll_rate])
+
+
+def _packed(tables: Sequence[LookupTable]) -> dict[str, PackedByVariables]:
+    found = {}
+    for coefficient in COEFFICIENTS:
+        own = [table for table in tables if table.coefficient == coefficient]
+        if own:
+            found[coefficient] = (tuple(t.over for t in own), pack([(t.points, t.values) for t in own]))
+    return found
 
 
 def _known_or_one(inertia: Inertia) -> Inertia:

@@ -15,6 +15,7 @@ from sysid_node.dynamics.handbook.modes import Mode, modes
 from sysid_node.dynamics.handbook.performance import Performance, TrimmedPolar, performance, polar
 from sysid_node.dynamics.handbook.trim import LevelTrim, level_trim
 from sysid_node.dynamics.handbook.unusual import Finding, findings
+from sysid_node.dynamics.tables import full_thrust
 from sysid_node.errors import InputError
 
 
@@ -77,7 +78,8 @@ def handbook(aircraft: Aircraft) -> Handbook:
 def slopes_at(equations: Equations, trim: LevelTrim) -> dict[str, float]:
     """Every derivative by name (``Cm_alpha``) at level flight, by central differences, tables and stall included."""
     symbols = equations.aircraft.control_symbols
-    at = {"V": trim.airspeed, "alpha": trim.alpha, **dict.fromkeys(("beta", "p", "q", "r", *symbols), 0.0)}
+    at = {"V": trim.airspeed, "alpha": trim.alpha, "throttle": trim.thrust / full_thrust(equations.aircraft)}
+    at |= dict.fromkeys(("beta", "p", "q", "r", *symbols), 0.0)
     elevator = equations.aircraft.controls.get("elevator")
     if elevator is not None and not math.isnan(trim.elevator):
         at[elevator.symbol] = trim.elevator

@@ -113,7 +113,9 @@ def _best_climb(equations: Equations, curve: TrimmedPolar, stall: int) -> tuple[
         return math.nan, math.nan
     weight = aircraft.mass * GRAVITY
     speed = np.sqrt(2.0 * weight / (equations.density * aircraft.geometry.S * curve.lift[usable]))
-    drag = dynamic_pressure(equations.density, speed) * aircraft.geometry.S * curve.drag[usable]
+    at = {"alpha": curve.alpha[usable], "V": speed}
+    full = equations.coefficients(**at, throttle=1.0).CD - equations.coefficients(**at).CD  # tables over the throttle
+    drag = dynamic_pressure(equations.density, speed) * aircraft.geometry.S * (curve.drag[usable] + full)
     near = speed <= 2.0 * aircraft.reference.airspeed
     climb = np.where(near, speed * np.clip((thrust - drag) / weight, -1.0, 1.0), -np.inf)
     best = int(np.argmax(climb))

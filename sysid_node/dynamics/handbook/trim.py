@@ -10,6 +10,7 @@ from scipy.optimize import root
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.forces import thrust_line
 from sysid_node.dynamics.handbook.equations import Array, Equations
+from sysid_node.dynamics.tables import full_thrust
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ def level_trim(equations: Equations, airspeed: float) -> LevelTrim | None:
 
     def unbalanced(x: Array) -> list[float]:
         alpha, elevator, thrust = x[0], x[1], x[2] * weight
-        c = equations.coefficients(V=airspeed, alpha=alpha, **({symbol: elevator} if symbol else {}))
+        throttle = thrust / full_thrust(aircraft)
+        c = equations.coefficients(V=airspeed, alpha=alpha, throttle=throttle, **({symbol: elevator} if symbol else {}))
         along = (thrust * np.cos(alpha + inclination) - area * c.CD) / weight
         up = (thrust * np.sin(alpha + inclination) + area * c.CL) / weight - 1.0
         pitch = c.Cm + thrust * arm / (area * aircraft.geometry.cbar) if symbol else elevator
@@ -43,7 +45,8 @@ def level_trim(equations: Equations, airspeed: float) -> LevelTrim | None:
     if not found.success or abs(found.x[0]) > 1.0 or np.abs(found.fun).max() > 1e-6:
         return None
     alpha, elevator, thrust = (float(value) for value in found.x)
-    c = equations.coefficients(V=airspeed, alpha=alpha, **({symbol: elevator} if symbol else {}))
+    throttle = thrust * weight / full_thrust(aircraft)
+    c = equations.coefficients(V=airspeed, alpha=alpha, throttle=throttle, **({symbol: elevator} if symbol else {}))
     trimmed = elevator if symbol else float("nan")
     return LevelTrim(airspeed, alpha, trimmed, thrust * weight, float(c.CL), float(c.CD))
 

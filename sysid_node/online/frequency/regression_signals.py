@@ -36,7 +36,7 @@ from sysid_node.dynamics.coefficients import rate_regressors
 from sysid_node.dynamics.forces import lift_and_drag, thrust_axes, thrust_line
 from sysid_node.dynamics.lever_arm import tangential, velocity_from, without_centripetal
 from sysid_node.dynamics.rigid_body import angular_momentum, gyroscopic_moment, known_moments
-from sysid_node.dynamics.tables import TableSum, array_tables, need_mach, scalar_tables, table_variables
+from sysid_node.dynamics.tables import TableSum, array_tables, full_thrust, need_mach, scalar_tables, table_variables
 from sysid_node.dynamics.vector import Vector
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -171,7 +171,7 @@ def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any, tables: TableSum 
         known += [k * control for control in sample[_CONTROLS:]]
         row = [lift, drag, mass * fy, L * roll, (M - arm * thrust) * pitch, N * roll, k, one(k)]
         if subtract_tables:
-            subtract_tables(row, k, (V, alpha, beta), rates, rho, sample[_CONTROLS:])
+            subtract_tables(row, k, (V, alpha, beta), rates, rho, thrust, sample[_CONTROLS:])
         row += [known[i] for i in chosen]
         row += [none(k)] * len(timed)  # rates come with the interval
         if with_thrust:
@@ -185,10 +185,11 @@ def _signals(aircraft: Aircraft, xp: Any, one: Any, none: Any, tables: TableSum 
 def _subtraction(aircraft: Aircraft, xp: Any, tables: TableSum) -> Any:
     """Function that subtracts k times the tables from the coefficients in a row of signals."""
     span, chord, symbols = aircraft.geometry.b, aircraft.geometry.cbar, aircraft.control_symbols
-    with_mach = need_mach(aircraft.tables)
+    with_mach, full = need_mach(aircraft.tables), full_thrust(aircraft)
 
-    def subtract(row: list[Any], k: Any, flow: Any, rates: Any, density: Any, controls: Any) -> None:
+    def subtract(row: list[Any], k: Any, flow: Any, rates: Any, density: Any, thrust: Any, controls: Any) -> None:
         variables = table_variables(flow, rates, span, chord, density if with_mach else None, xp)
+        variables["throttle"] = thrust / full
         variables.update(zip(symbols, controls, strict=False))  # a sample may hold the controls' excess behind them
         for coefficient, value in tables(variables).items():
             place = COEFFICIENTS.index(coefficient)

@@ -203,6 +203,7 @@ _VARIABLES = {
     "beta": ("aero/beta-rad", 1.0),
     "V": ("velocities/vt-fps", 1.0 / 0.3048),
     "Mach": ("velocities/mach", 1.0),
+    "throttle": ("fcs/throttle-cmd-norm", 1.0),
 }
 
 

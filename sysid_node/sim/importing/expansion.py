@@ -25,6 +25,12 @@ Array = NDArray[np.float64]
 Function = Callable[[Mapping[str, Array]], Array]
 
 
+#: Variables that have no derivative in an aircraft file.
+_NO_DERIVATIVE = ("V", "throttle")
+#: Variables at whose every value a program may take long to settle; the last is changed least often.
+_SLOW = ("throttle", "V")
+
+
 @dataclass(frozen=True)
 class TableAxis:
     """One variable: its nodes, ascending, its value in the steady flight (one of the nodes) and a small step."""
@@ -59,13 +65,13 @@ class Expansion:
 def expand(function: Function, axes: Mapping[str, TableAxis], tolerance: Array) -> Expansion:
     """The function about the centre of its axes.
 
-    ``tolerance`` (6,) is the change of each coefficient that is left out. The variable ``V`` (m/s) has no derivative,
-    for that would be per reference airspeed: what it does by itself is a table.
+    ``tolerance`` (6,) is the change of each coefficient that is left out. The variables ``V`` (m/s; its derivative
+    would be per reference airspeed) and ``throttle`` have none: what they do by themselves is a table.
     """
     centre = {name: axis.centre for name, axis in axes.items()}
     f0 = function({name: np.array([value]) for name, value in centre.items()})[0]
     alone = {name: _along(function, centre, {name: axis.nodes}) - f0 for name, axis in axes.items()}
-    slopes = {name: _slope(function, centre, name, axis) for name, axis in axes.items() if name != "V"}
+    slopes = {name: _slope(function, centre, name, axis) for name, axis in axes.items() if name not in _NO_DERIVATIVE}
     derivatives: dict[str, float] = {}
     tables: list[LookupTable] = []
     for k, coefficient in enumerate(COEFFICIENTS):
@@ -123,7 +129,6 @@ def largest_error(
         name: axis.centre + share * (random.uniform(axis.nodes[0], axis.nodes[-1], count) - axis.centre)
         for name, axis in axes.items()
     }
-    points = {name: points[name] for name in points}
     if "V" in points:  # the program that is asked may take long to settle at another airspeed
         points["V"] = np.sort(points["V"])
     found = function(points)
@@ -193,7 +198,8 @@ def _along(function: Function, centre: Mapping[str, float], moving: Mapping[str,
     shape = grids[0].shape
     points = {name: np.full(grids[0].size, value) for name, value in centre.items()}
     points |= {name: grid.ravel() for name, grid in zip(moving, grids, strict=True)}
-    order = np.argsort(points["V"], kind="stable") if "V" in points else np.arange(grids[0].size)
+    slow = [points[name] for name in _SLOW if name in points]
+    order = np.lexsort(slow) if slow else np.arange(grids[0].size)
     result = np.empty((grids[0].size, len(COEFFICIENTS)))
     result[order] = function({name: column[order] for name, column in points.items()})
     return result.reshape(*shape, len(COEFFICIENTS))

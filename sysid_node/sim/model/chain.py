@@ -55,6 +55,7 @@ class Drive(NamedTuple):
 
     surfaces: Scalar  # (controls,) effective deflections, rad
     thrust: Scalar  # N
+    throttle: Scalar  # 0..1, with the motor's lag; tables may be over it
     gusts: Scalar  # (6,) velocity of the air m/s, its rotation rad/s, body axes
 
 
@@ -106,7 +107,7 @@ def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb:
     layout, model, effects = chain.layout, chain.model, chain.effects
     surfaces = [drive.surfaces[..., i] for i in range(len(layout.controls))]
     bent = aerodynamics.deflections(layout, model, effects, surfaces, air, drive.thrust)
-    regressors = aerodynamics.regressors_of(layout, model, air, bent)
+    regressors = aerodynamics.regressors_of(layout, model, air, bent, drive.throttle)
     coefficients = aerodynamics.coefficients(layout, model, effects, regressors, separation, climb)
     force, moment = aerodynamics.load(model, air, coefficients)
     pull, pull_moment = propulsion.load(model, effects, drive.thrust, air.alpha)
@@ -147,4 +148,5 @@ def drive_of(chain: Chain, actuators: Scalar, motor: Scalar, gusts: Scalar, time
     surfaces = actuator.positions(chain.layout, chain.effects, actuators, time)
     effective = actuator.effective(chain.layout, chain.effects, surfaces, time)
     thrust = propulsion.thrust(chain.effects, motor)
-    return Drive(jnp.stack(effective, -1), thrust, gusts), jnp.stack([*surfaces, thrust], -1)
+    drive = Drive(jnp.stack(effective, -1), thrust, propulsion.throttle(chain.model, motor), gusts)
+    return drive, jnp.stack([*surfaces, thrust], -1)

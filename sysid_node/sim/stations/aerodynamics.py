@@ -42,11 +42,13 @@ def deflections(
 
 
 def regressors_of(
-    layout: ParameterLayout, model: AircraftNumbers, air: Air, deflections: list[Scalar]
+    layout: ParameterLayout, model: AircraftNumbers, air: Air, deflections: list[Scalar], throttle: Scalar
 ) -> dict[str, Scalar]:
     """Every regressor by name except CL^2; rates are non-dimensional."""
     flow, one = (air.speed, air.alpha, air.beta), jnp.ones_like(air.speed)
     state = regressors(flow, air.rates, model.span, model.chord, model.airspeed, one)
+    if any("throttle" in over for _, over in layout.tables):
+        state["throttle"] = throttle
     if any("Mach" in over for _, over in layout.tables):
         state["Mach"] = air.speed / speed_of_sound(air.density, jnp)
     return state | dict(zip(layout.symbols, deflections, strict=True))

@@ -15,6 +15,11 @@ def commanded(model: AircraftNumbers, thrust: Scalar) -> Scalar:
     return jnp.clip(thrust, 0.0, model.max_thrust)
 
 
+def throttle(model: AircraftNumbers, state: Scalar) -> Scalar:
+    """The throttle (0..1) that belongs to the motor's thrust (N); zero where the file states no largest thrust."""
+    return state / model.max_thrust
+
+
 def advance(effects: dict[str, Values], state: Scalar, command0: Scalar, command1: Scalar, step: Scalar) -> Scalar:
     """The motor's thrust (N) one sample (``step`` s) later."""
     return motor_lag.advance(effects["motor_lag"], state, command0, command1, step)

@@ -37,12 +37,16 @@ def test_tables_add_to_the_coefficients_and_to_the_lift_of_the_polar():
         LookupTable("CL", ("alpha",), ((0.0, 0.08, 0.2),), (0.0, 0.04, -0.2)),
         LookupTable("CL", ("V", "q"), ((10.0, 30.0), (-1.0, 1.0)), ((0.0, 0.0), (-0.2, 0.2))),
         LookupTable("CL", ("Mach",), ((0.0, 0.1),), (0.0, 0.5)),
+        LookupTable("CL", ("throttle",), ((0.0, 1.0),), (0.0, 0.3)),
         LookupTable("CY", ("alpha",), ((0.0, 1.0),), (0.0, 1.0)),
     )
     evaluate = coefficient_function(dataclasses.replace(KESTREL, tables=tables), ("CL_alpha", "CD_k"), False)
-    found = evaluate({**SIGNALS, "rho": jnp.array(1.225)}, (jnp.array(5.0), jnp.array(0.05)))
+    full = KESTREL.throttle.max_thrust
+    found = evaluate(
+        {**SIGNALS, "rho": jnp.array(1.225), "thrust": jnp.array(0.2 * full)}, (jnp.array(5.0), jnp.array(0.05))
+    )
     rate = 0.5 * KESTREL.geometry.cbar / (2.0 * 20.0)
-    lift = 0.5 + 0.04 - 0.24 * 0.02 / 0.12 + 0.5 * 0.2 * rate + 5.0 * 20.0 / 340.294
+    lift = 0.5 + 0.04 - 0.24 * 0.02 / 0.12 + 0.5 * 0.2 * rate + 5.0 * 20.0 / 340.294 + 0.3 * 0.2
     np.testing.assert_allclose(found["CL"], lift, rtol=1e-6)
     np.testing.assert_allclose(found["CD"], 0.05 * lift**2, rtol=1e-6)
     assert set(found) == {"CL", "CD"}

@@ -34,10 +34,12 @@ def test_what_tables_add_is_subtracted_and_the_polar_has_the_whole_lift():
         LookupTable("CL", ("alpha",), ((0.0, 0.05, 0.2),), (0.0, 0.02, -0.2)),
         LookupTable("Cm", ("V",), ((15.0, 25.0),), (0.0, 0.3)),
         LookupTable("Cl", ("p",), ((-0.1, 0.0, 0.1),), (0.01, 0.0, 0.01)),
+        LookupTable("Cn", ("throttle",), ((0.0, 1.0),), (0.0, 0.02)),
     )
     plain = measured_coefficients(KESTREL, clean())
     found = measured_coefficients(dataclasses.replace(KESTREL, tables=tables), clean())
     x = {**plain.regressors, "V": plain.regressors["V"] * KESTREL.reference.airspeed}
+    x["throttle"] = clean()["thrust"] / KESTREL.throttle.max_thrust
     added = {t.coefficient: np.interp(x[t.over[0]], *t.points, t.values) for t in tables}
     for name, value in found.coefficients.items():
         np.testing.assert_allclose(value, plain.coefficients[name] - added.get(name, 0.0), atol=1e-12)

@@ -81,6 +81,19 @@ def test_tables_count_as_derivatives_do():
     assert "tables over alpha" in mixed.performance.stall_from
 
 
+def test_thrust_beyond_the_throttles_share_counts_in_trim_and_climb():
+    """A table of CD over the throttle: the drag that it takes away, the throttle's own thrust need not overcome."""
+    plain = handbook(make_aircraft())
+    full, area = make_aircraft().throttle.max_thrust, 0.5 * 1.2 * make_aircraft().reference.airspeed ** 2 * 0.5
+    trim = plain.trim.thrust / full
+    points, values = (0.0, trim, 1.0), (0.01, 0.0, -0.04)
+    found = handbook(make_aircraft(tables=(LookupTable("CD", ("throttle",), (points,), values),)))
+    assert found.trim.thrust == pytest.approx(plain.trim.thrust)
+    speed, better = found.performance.climb_speed, found.performance.climb_rate - plain.performance.climb_rate
+    pressure = area * (speed / make_aircraft().reference.airspeed) ** 2
+    assert better == pytest.approx(0.04 * pressure * speed / (4.0 * GRAVITY), rel=0.02)
+
+
 def test_best_glide_of_a_parabolic_polar_is_the_closed_formula():
     """Largest lift over drag 1 / (2 sqrt(CD0 k)) at CL = sqrt(CD0 / k), without elevator."""
     values = {"CL_0": 0.2, "CL_alpha": 5.0, "CD_0": 0.03, "CD_k": 0.05, "Cm_alpha": -0.5}

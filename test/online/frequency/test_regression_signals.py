@@ -85,21 +85,24 @@ TABLES = (
     LookupTable("CD", ("V",), ((15.0, 18.0, 21.0),), (0.02, 0.0, 0.03)),
     LookupTable("CD", ("Mach",), ((0.04, 0.054, 0.06),), (0.0, 0.0, 0.05)),
     LookupTable("Cl", ("p",), ((-0.03, 0.0, 0.01, 0.03),), (-0.002, 0.0, 0.002, 0.0)),
+    LookupTable("Cn", ("throttle",), ((0.1, 0.17, 0.24),), (-0.004, 0.0, 0.002)),
 )
 
 
 def tabulated(samples: np.ndarray) -> dict[str, np.ndarray]:
     """What ``TABLES`` add to a flight of ``PLAIN``, by NumPy and SciPy; sound in the standard atmosphere, b / 2V."""
     p, V, alpha, beta, rho = (samples[:, SAMPLE_COLUMNS.index(n)] for n in ("p", "V", "alpha", "beta", "rho"))
+    throttle = samples[:, SAMPLE_COLUMNS.index("thrust")] / 30.0
     temperature = 288.15 * (rho / 1.225) ** (1.0 / (9.80665 / (287.05287 * 0.0065) - 1.0))
     mach = V / np.sqrt(1.4 * 287.05287 * temperature)
-    CL, Cm, over_V, over_mach, Cl = TABLES
+    CL, Cm, over_V, over_mach, Cl, Cn = TABLES
     held = np.column_stack([np.clip(alpha, 0.0, 0.16), np.clip(beta, -0.1, 0.1)])
     return {
         "CL": np.interp(alpha, *CL.points, CL.values),
         "Cm": RegularGridInterpolator(Cm.points, np.array(Cm.values, dtype=float))(held),
         "CD": np.interp(V, *over_V.points, over_V.values) + np.interp(mach, *over_mach.points, over_mach.values),
         "Cl": np.interp(p * PLAIN.geometry.b / (2.0 * V), *Cl.points, Cl.values),
+        "Cn": np.interp(throttle, *Cn.points, Cn.values),
     }
 
 

@@ -1,10 +1,13 @@
 """Exported models read in again. Truth: the aircraft that was exported."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from aircraft_loads import coefficients
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.sim.export.gazebo import gazebo_plugin
 from sysid_node.sim.export.jsbsim import jsbsim_model
 from sysid_node.sim.export.rosflight import rosflight_parameters
@@ -39,6 +42,20 @@ def test_jsbsim_holds_every_derivative(kestrel, tmp_path):
     assert found.mass == pytest.approx(kestrel.mass, rel=1e-6)
     assert found.inertia.Iyy == pytest.approx(kestrel.inertia.Iyy, rel=1e-3)  # JSBSim's slugs have four digits
     assert found.throttle.max_thrust == pytest.approx(kestrel.throttle.max_thrust, rel=1e-6)
+
+
+def test_jsbsim_holds_tables_over_the_throttle(kestrel, tmp_path):
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    table = LookupTable("CD", ("throttle",), ((0.0, 0.35, 1.0),), (0.02, 0.0, -0.06))
+    path = tmp_path / "kestrel.xml"
+    path.write_text(jsbsim_model(replace(kestrel, tables=(table,))))
+    found = read_jsbsim(str(path), 16.0, 0.0).aircraft
+    x = grid(alpha=np.full(41, 0.04)) | {"throttle": np.linspace(0.0, 1.0, 41)}
+    known, read = (
+        coefficients(a, x)[:, 1] - a.throttle.max_thrust * x["throttle"] / (0.5 * 1.225 * 16.0**2 * kestrel.geometry.S)
+        for a in (replace(kestrel, tables=(table,)), found)
+    )
+    np.testing.assert_allclose(read, known, atol=1e-6)
 
 
 #: Coefficients of which both formats hold all derivatives: CL, CY, Cl, Cm, Cn.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
 from sysid_node.sim.importing.expansion import TableAxis
-from sysid_node.sim.importing.jsbsim.program import Loads, Program
+from sysid_node.sim.importing.jsbsim.program import LEVER, Loads, Program
 from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
 from sysid_node.sim.importing.jsbsim.throttle import engine_of
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
@@ -24,6 +24,7 @@ _ALPHA = np.deg2rad(np.arange(-16.0, 26.1, 2.0))
 _BETA = np.deg2rad([-20.0, -15.0, -10.0, -5.0, -2.5, 0.0, 2.5, 5.0, 10.0, 15.0, 20.0])
 _RATES = {"p": 0.2, "q": 0.04, "r": 0.2}
 _SPEEDS = (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4)
+_THROTTLES = np.linspace(0.0, 1.0, 21)
 _LARGEST = {"alpha": (-0.35, 0.6), "beta": (-0.44, 0.44)}
 
 
@@ -41,12 +42,13 @@ class CoefficientModel:
         self._program, self._steady = program, steady
         self._surfaces = {CONTROL_SYMBOLS[s.name]: s for s in surfaces}
         self._area, self._span, self._chord = program.geometry
+        self.thrust = 0.0
         self._put({}, steady.state.phi)
         self.steady_loads: Loads = program.loads()
         self.mach_per_speed = program.mach / steady.state.airspeed
         engine = engine_of(program, steady.state, self.steady_loads.engine)
         self.thrust, self.inclination = engine.thrust, engine.inclination
-        self.arm, self.motor_lag = engine.arm, engine.lag
+        self.arm, self.throttle_delay, self.motor_lag = engine.arm, engine.delay, engine.lag
         self.unsteady = self._unsteady()
 
     @property
@@ -54,10 +56,11 @@ class CoefficientModel:
         """The steady flight's regressors."""
         state = self._steady.state
         angles = {"alpha": state.alpha, "beta": state.beta, "p": 0.0, "q": 0.0, "r": 0.0, "V": state.airspeed}
+        angles |= {"throttle": state.throttle} if self.thrust else {}
         return {**angles, **{symbol: self._steady.deflections[s.name] for symbol, s in self._surfaces.items()}}
 
     def __call__(self, points: Mapping[str, Array]) -> Array:
-        """Coefficients (N, 6): all loads but the steady flight's thrust, and without terms in the rate of alpha."""
+        """Coefficients (N, 6): all loads but a thrust in proportion to the throttle, and no terms in alpha's rate."""
         size = len(next(iter(points.values())))
         names = list(points)
         rows = np.column_stack([points[name] for name in names])
@@ -77,13 +80,22 @@ class CoefficientModel:
             driven |= surface.at(full[symbol])
         # theta is the steady flight's: gravity's direction does not matter for the loads, once dalpha/dt is known
         state = replace(
-            self._steady.state, airspeed=full["V"], alpha=full["alpha"], beta=full["beta"], rates=rates, phi=phi
+            self._steady.state,
+            airspeed=full["V"],
+            alpha=full["alpha"],
+            beta=full["beta"],
+            rates=rates,
+            phi=phi,
+            throttle=full.get("throttle", self._steady.state.throttle),
         )
         self._program.put(state, driven)
 
     def _reduced(self, loads: Loads, at: Mapping[str, float]) -> Array:
-        thrust = self.thrust * np.array(
-            [math.cos(self.inclination), 0.0, -math.sin(self.inclination), 0.0, self.arm, 0.0]
+        lever = at.get("throttle", self._steady.state.throttle) / (self._steady.state.throttle or 1.0)
+        thrust = (
+            self.thrust
+            * lever
+            * np.array([math.cos(self.inclination), 0.0, -math.sin(self.inclination), 0.0, self.arm, 0.0])
         )
         speed = at.get("V", self._steady.state.airspeed)
         alpha = at.get("alpha", self._steady.state.alpha)
@@ -124,6 +136,9 @@ class CoefficientModel:
             axes[name] = TableAxis.of([*regular, *points], centre[name], 0.004)
         for name, size in _RATES.items():
             axes[name] = TableAxis.of(size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), 0.0, 0.1 * size)
+        if "throttle" in centre:
+            levers = [x for x in points_of_tables.get("throttle", []) if 0.0 <= x <= 1.0]
+            axes["throttle"] = TableAxis.of([*_THROTTLES, *levers], centre["throttle"], 0.02)
         speeds = [x for x in points_of_tables.get("V", []) if 0.6 * speed <= x <= 1.4 * speed]
         axes["V"] = TableAxis.of([*(speed * np.array(_SPEEDS)), *speeds], speed, 0.01 * speed)
         for symbol, surface in self._surfaces.items():
@@ -145,6 +160,7 @@ class CoefficientModel:
             "aero/beta-rad": ("beta", 1.0),
             "aero/beta-deg": ("beta", degree),
             "velocities/mach": ("V", 1.0 / max(self.mach_per_speed, 1e-9)),
+            LEVER: ("throttle", 1.0),
             **{s.position: (symbol, s.sign * s.unit) for symbol, s in self._surfaces.items()},
         }
         points: dict[str, list[float]] = {}

@@ -24,7 +24,7 @@ _MOMENT, _INERTIA = POUND * FOOT, SLUG * FOOT * FOOT
 _FORCES, _MOMENTS = ("x", "y", "z"), ("l", "m", "n")
 
 #: The external force and the lever of a model whose thrust is no engine's (``sim.export.jsbsim`` writes such models).
-_THRUST, _LEVER = "external_reactions/thrust", "fcs/throttle-cmd-norm"
+_THRUST, LEVER = "external_reactions/thrust", "fcs/throttle-cmd-norm"
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Program:
     @property
     def powered(self) -> bool:
         """Whether a throttle gives thrust: of engines, or of an external force called thrust."""
-        return self.engines > 0 or (self.has(_LEVER) and self.has(f"{_THRUST}/magnitude"))
+        return self.engines > 0 or (self.has(LEVER) and self.has(f"{_THRUST}/magnitude"))
 
     @property
     def engines(self) -> int:
@@ -160,7 +160,7 @@ class Program:
     def levers(self, throttle: float) -> None:
         """Throttle of all engines (0..1), mixture and propeller forward."""
         if self.powered and not self.engines:
-            self.fdm[_LEVER] = throttle
+            self.fdm[LEVER] = throttle
         for i in range(self.engines):
             levers = {"throttle": throttle, "mixture": 1.0, "advance": 1.0}
             for lever, share in levers.items():

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 #: A table's smallest part, as a share of what each variable changes in an ordinary flight.
 _SHARE = 5e-4
-#: 1 sigma of the engine's lag, as a share: real engines lag more at one throttle than at another.
+#: 1 sigma of the engine's lag and delay, as a share: real engines lag more at one throttle than at another.
 _LAG_SHARE = 0.2
 _ORDINARY = {"alpha": 0.1, "beta": 0.1, "p": 0.05, "q": 0.005, "r": 0.05}
 
@@ -129,6 +129,9 @@ def _effects(
     for control, servo in servos.items():
         for effect, size in servo.effects().items():
             effects.setdefault(effect, {})[control] = UncertainValue(size)
+    if model.throttle_delay:
+        delay = UncertainValue(model.throttle_delay, _LAG_SHARE * model.throttle_delay)
+        effects.setdefault("command_delay", {})["throttle"] = delay
     if model.motor_lag:
         effects["motor_lag"] = {"time_constant": UncertainValue(model.motor_lag, _LAG_SHARE * model.motor_lag)}
     lift, moment = model.unsteady.slopes[[0, 4]]
@@ -169,9 +172,11 @@ def _notes(
     if program.powered:
         notes.append(
             f"Thrust is {model.thrust:.0f} N at throttle {steady.state.throttle:.2f} and {steady.state.airspeed:.1f} "
-            "m/s, and proportional to the throttle"
+            "m/s"
             + (f", with a lag of {model.motor_lag:.2f} s" if model.motor_lag else "")
-            + "; how it changes with airspeed is in the tables over V, at this throttle."
+            + (f" after a delay of {model.throttle_delay:.2f} s" if model.throttle_delay else "")
+            + "; how it changes with airspeed, and how it differs from one in proportion to the throttle, is in the "
+            "tables over V and throttle."
         )
     notes.append(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."

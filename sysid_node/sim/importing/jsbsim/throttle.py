@@ -19,17 +19,21 @@ _STEP = 0.02
 #: How long the engine runs before a step of the throttle and is watched after it, s, and how often, Hz.
 _RUNNING, _WATCHED, _RATE = 0.2, 6.0, 50.0
 
-#: Lags below this count as none, s.
+#: Shares of a step at which its answer is timed.
+_SHARES = (1.0 - math.exp(-1.0 / 3.0), 1.0 - math.exp(-1.0))
+
+#: Lags and delays below this count as none, s.
 _SHORTEST = 0.02
 
 
 @dataclass(frozen=True)
 class Engine:
-    """Thrust in the steady flight (N), its angle above the x axis (rad), its arm (m) and its lag (s)."""
+    """Thrust in the steady flight (N), its angle above the x axis (rad), its arm (m), its delay and its lag (s)."""
 
     thrust: float
     inclination: float = 0.0
     arm: float = 0.0
+    delay: float = 0.0
     lag: float = 0.0
 
 
@@ -39,17 +43,29 @@ def engine_of(program: Program, state: Flight, steady: Array) -> Engine:
     if thrust <= 0.0:
         return Engine(0.0)
     engine = Engine(thrust, math.atan2(-steady[2], steady[0]), float(steady[4]) / thrust)
-    return replace(engine, lag=_lag(program, state)) if program.engines else engine
+    if not program.engines:
+        return engine
+    delay, lag = _answer(program, state)
+    return replace(engine, delay=delay, lag=lag)
 
 
-def _lag(program: Program, state: Flight) -> float:
-    """Time (s) after which a step of the throttle has changed the thrust by 1 - 1/e of what it does in the end."""
+def _answer(program: Program, state: Flight) -> tuple[float, float]:
+    """Delay and time constant (s) with which the thrust follows a step of the throttle.
+
+    They are those of the first-order lag with delay that has done 28.3 and 63.2 % of what the step does in the end at
+    the same times: C. L. Smith (1972), "Digital Computer Process Control".
+    """
     low, high = max(state.throttle - _STEP, 0.0), min(state.throttle + _STEP, 1.0)
     flown = [_course(program, state, low, throttle) for throttle in (low, high)]
     change = flown[1] - flown[0]  # the airspeed falls in both flights alike
-    late = np.flatnonzero(change >= (1.0 - math.exp(-1.0)) * change[-1])
-    lag = float(late[0] / _RATE) if change[-1] > 0.0 and late.size else 0.0
-    return lag if lag > _SHORTEST else 0.0
+    if change[-1] <= 0.0:
+        return 0.0, 0.0
+    early, late = (float(np.argmax(change >= share * change[-1])) / _RATE for share in _SHARES)
+    lag = 1.5 * (late - early)
+    delay = late - lag
+    if delay <= _SHORTEST:
+        delay, lag = 0.0, late
+    return delay, lag if lag > _SHORTEST else 0.0
 
 
 def _course(program: Program, state: Flight, before: float, after: float) -> Array:
