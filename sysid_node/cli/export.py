@@ -113,6 +113,10 @@ def _summary(estimate: str) -> dict[str, Any] | None:
     raise InputError(f"{path}: not the summary.json of a run (it needs aircraft and derivatives)")
 
 
+def _over_throttle(aircraft: Aircraft) -> bool:
+    return any("throttle" in table.over for table in aircraft.tables)
+
+
 def _write(form: str, aircraft: Aircraft, specs: list[str]) -> tuple[str, list[str]]:
     """The model, and what of the aircraft file its format cannot hold. Raises InputError for an effect asked for."""
     from sysid_node.sim.export.gazebo import gazebo_plugin  # noqa: PLC0415  # JAX takes its time
@@ -129,6 +133,8 @@ def _write(form: str, aircraft: Aircraft, specs: list[str]) -> tuple[str, list[s
         left_out.append(f"{len(aircraft.tables)} table{'s' * (len(aircraft.tables) > 1)}")
     if form == "jsbsim" and effects.get("actuator_lag", {}).get("damping"):
         left_out.append("damping of actuator_lag (its actuators are of first order)")
+    if form == "jsbsim" and effects.get("command_delay", {}).get("throttle") and _over_throttle(aircraft):
+        left_out.append("the delay of the throttle, in tables over it (the thrust has it)")
     if form != "jsbsim" and any(name.startswith("CD_") and name not in _OF_PARABOLA for name in aircraft.derivatives):
         left_out.append("slopes of CD (its drag is a parabola of the lift, right at the reference)")
     write = {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form]

@@ -14,6 +14,7 @@ from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.short_flights.multiple_shooting import course_of, simulation_error
 from sysid_node.gap.validation.noise_floor import noise_floor_errors
+from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.sim import Simulator
 
 
@@ -72,6 +73,7 @@ def test_a_late_imu_cannot_be_told_from_late_commands(aircraft, make_flight) -> 
     assert (cause["effect"], cause["indistinguishable_from"]) == ("command_delay", ["imu_delay"])
     assert cause["parameters"]["elevator"][0] == pytest.approx(0.06, rel=0.1)
     assert cause["probability"] == pytest.approx(0.5, abs=0.05)
+    assert "a servo of second order that is as late)" in paragraph(found)
 
 
 def test_a_lag_is_named_without_vanes(aircraft, make_flight) -> None:

@@ -69,6 +69,7 @@ def test_loads_are_the_programs_in_states_of_flight(cessna, tmp_path):
         p, q, r = rates * half * np.array([g.b, g.cbar, g.b])
         rows.append([alpha, beta, p, q, r, speed, *(deflections[n] for n in ("elevator", "aileron", "rudder"))])
     x = dict(zip(("alpha", "beta", "p", "q", "r", "V", "de", "da", "dr"), np.array(rows).T, strict=True))
+    x["throttle"] = np.full(len(rows), steady.state.throttle)
     share = np.abs(coefficients(aircraft, x) - found).max(axis=0) / np.ptp(found, axis=0)
     assert (share < 0.01).all(), share
 

@@ -12,17 +12,18 @@ from sysid_node.sim.importing.jsbsim.files import copy_model
 from sysid_node.sim.importing.jsbsim.program import Program
 from sysid_node.sim.importing.jsbsim.read import read_model
 
-MODELS = [("T37", 77.0), ("c172p", 52.0)]
+
+@pytest.fixture(scope="module", params=[("T37", 77.0), ("c172p", 52.0)], ids=["T37", "c172p"])
+def model(request):
+    return read_model(*request.param, 900.0)
 
 
-@pytest.mark.parametrize(("name", "speed"), MODELS)
-def test_forces_follow_the_throttle_and_the_airspeed_as_in_jsbsim(name, speed, tmp_path):
+def test_forces_follow_the_throttle_and_the_airspeed_as_in_jsbsim(model, tmp_path):
     """Force along x at throttles between the tables' points: within 2 % of its range; 10 % and more without tables."""
-    model = read_model(name, speed, 900.0)
     aircraft, state = model.imported.aircraft, model.steady.state
     program = Program(copy_model(model.files, tmp_path, {p for s in model.surfaces for p in s.properties}))
     driven = {k: v for s in model.surfaces for k, v in s.at(model.steady.deflections[s.name]).items()}
-    throttles, speeds = np.meshgrid([0.25, 0.45, 0.65, 0.78, 0.95], speed * np.array([0.88, 1.0, 1.12]))
+    throttles, speeds = np.meshgrid([0.25, 0.45, 0.65, 0.78, 0.95], state.airspeed * np.array([0.88, 1.0, 1.12]))
     x = {n: np.zeros(throttles.size) for n in ("beta", "p", "q", "r")} | {"alpha": np.full(throttles.size, state.alpha)}
     x |= {"throttle": throttles.ravel(), "V": speeds.ravel()}
     x |= {c.symbol: np.full(throttles.size, model.steady.deflections[n]) for n, c in aircraft.controls.items()}
@@ -38,11 +39,10 @@ def test_forces_follow_the_throttle_and_the_airspeed_as_in_jsbsim(name, speed, t
     assert np.abs(without - there).max() > 0.1 * range_
 
 
-@pytest.mark.parametrize(("name", "speed"), MODELS)
-def test_thrust_lags_the_throttle_as_the_engine_does(name, speed, tmp_path):
-    """After one lag the engine has done 55 to 75 % (1 - 1/e: 63 %) of what a step of 0.04 does in six seconds."""
-    model = read_model(name, speed, 900.0)
-    lag = model.imported.aircraft.effects["motor_lag"]["time_constant"].value
+def test_thrust_lags_the_throttle_as_the_engine_does(model, tmp_path):
+    """After delay and lag the engine has done 55 to 75 % (1 - 1/e: 63 %) of what a step of 0.04 does in six seconds."""
+    effects = model.imported.aircraft.effect_values()
+    lag = effects["motor_lag"]["time_constant"] + effects.get("command_delay", {}).get("throttle", 0.0)
     program = Program(copy_model(model.files, tmp_path, {p for s in model.surfaces for p in s.properties}))
     flown = []
     for step in (0.0, 0.04):
