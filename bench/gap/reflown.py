@@ -211,8 +211,19 @@ def _page(cases: list[dict[str, Any]]) -> str:
              "sizes: true, found", "gap %", "JSBSim %", "of what the true effect closes")  # fmt: skip
     return (
         f"{len(flown)} of the 150 cases that are wanted were run ({counts}); in brackets 95 % intervals.\n\n{scores}"
+        f"\n\nBy aircraft and by what was withheld:\n\n{_counts(flown)}"
         f"\n\nCase by case:\n\n{table(heads, [_row(case) for case in cases])}"
     )
+
+
+def _counts(cases: list[dict[str, Any]]) -> str:
+    """Cases that are right, of how many, by aircraft and by effect; a case of two effects counts for both."""
+    groups: dict[str, list[bool]] = {f"`{name}`": [] for name in AIRCRAFT}
+    for case in cases:
+        withheld = [*case["true_sizes"], *case["unlisted"]] or ["nothing"]
+        for name in (f"`{case['aircraft']}`", *withheld):
+            groups.setdefault(name, []).append(scoring.named(case))
+    return table(("", "right"), [[name, f"{sum(flags)} of {len(flags)}"] for name, flags in groups.items() if flags])
 
 
 def _row(case: Mapping[str, Any]) -> list[str]:
