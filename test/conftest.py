@@ -124,7 +124,8 @@ def looked_at(tmp_path) -> Callable[..., list[dict]]:
         frames = (ROOT / "test" / "report" / "frames.html").read_text(encoding="utf-8")
         host.write_text(frames.replace("// given", given), encoding="utf-8")
         scheme = [f"--blink-settings=preferredColorScheme={0 if dark else 1}"]
-        command = [chromium, *_BROWSER_FLAGS, *scheme, "--window-size=1400,900", f"--user-data-dir={tmp_path / 'look'}"]
+        patient = ["--virtual-time-budget=120000", "--window-size=1400,900"]  # the time passes at once where it is idle
+        command = [chromium, *_BROWSER_FLAGS, *scheme, *patient, f"--user-data-dir={tmp_path / 'look'}"]
         done = subprocess.run(
             [*command, "--dump-dom", host.as_uri()], capture_output=True, text=True, timeout=300, check=True
         )
