@@ -51,6 +51,9 @@ class ManoeuvreWindow:
     share_of_changes: float = _threshold(0.95, "1", "share of the commands' sudden changes that a manoeuvre holds")
     share_of_flight: float = _threshold(0.4, "1", "share of the flight below which the flight is cut down to it")
     sudden: float = _threshold(8.0, "1", "multiple of a command's median change from which a change is sudden")
+    elsewhere: float = _threshold(
+        2.0, "1", "power of a control in what is cut off, over that in the manoeuvre, up to which this is done"
+    )
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,9 @@
 A single flight is validated on parts of itself. If it holds one short manoeuvre, most parts are quiet, and without the
 part that holds the manoeuvre nothing could be fitted. So the quiet parts are cut off, and the manoeuvre itself is
 divided.
+
+Steps show where a manoeuvre is. A smooth one has none, or only where it ends or the throttle is moved. So nothing is
+cut off in which some control moves far more than in what would be kept.
 """
 
 from __future__ import annotations
@@ -26,7 +29,8 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     """The part of the flight with its only manoeuvre, if that is a small part of it; else the flight itself."""
     record = resampled(flight)
     moved = [name for name in (*controls, *(["thrust"] if flight.metered else [])) if name in record.columns]
-    steps = step_changes(np.column_stack([record[name] for name in moved])) ** 2
+    commands = np.column_stack([record[name] for name in moved])
+    steps = step_changes(commands) ** 2
     power = (steps / np.maximum(steps.sum(axis=0), 1e-300)).sum(axis=1).cumsum()
     if not power[-1] > 0.0:
         return flight
@@ -35,7 +39,9 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     first, last = np.searchsorted(power / power[-1], [aside, 1.0 - aside]) / ANALYSIS_RATE
     begin = max(first - limits.before, 0.0)
     end = min(max(last + limits.after, first - limits.before + SHORTEST_FLIGHT), record.duration)
-    if end - begin > limits.share_of_flight * record.duration:
+    kept = (record.time >= begin) & (record.time <= end)
+    elsewhere = commands[~kept].var(axis=0) > limits.elsewhere * commands[kept].var(axis=0)
+    if end - begin > limits.share_of_flight * record.duration or elsewhere.any():
         return flight
     return replace(flight, record=_between(flight.record, begin, end), left_out=flight.record.duration - (end - begin))
 

@@ -31,6 +31,18 @@ def test_where_nothing_steps_all_is_kept(aircraft) -> None:
     assert cut_to_manoeuvre(flight, CONTROLS) is flight
 
 
+def test_a_smooth_manoeuvre_is_kept_though_the_throttle_steps_after_it(aircraft) -> None:
+    """The only step is where hardly anything else moves."""
+    flight = fly(aircraft, {}, manoeuvre=[], duration=50.0)
+    record, late = flight.record, flight.record.time > 40.0
+    smooth = {"de": record["de"] + 0.05 * np.sin(2.0 * np.pi * 0.7 * record.time) * ~late}
+    stepping = {"thrust": record["thrust"] + 3.0 * late}
+    for columns, left_out in (({**smooth, **stepping}, 0.0), (stepping, 30.0)):
+        changed = replace(flight, record=replace(record, columns={**record.columns, **columns}))
+        assert cut_to_manoeuvre(changed, CONTROLS).left_out >= left_out
+        assert (cut_to_manoeuvre(changed, CONTROLS) is changed) == (not left_out)
+
+
 def test_a_throttle_that_steps_later_belongs_to_the_manoeuvres(aircraft) -> None:
     flight = fly(aircraft, {}, manoeuvre=["3211:elevator:start=2:width=0.3"], duration=50.0)
     record = flight.record
