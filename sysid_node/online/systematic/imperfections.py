@@ -18,7 +18,7 @@ from sysid_node.online.systematic.column_changes import ColumnChanges, flight_me
 from sysid_node.online.systematic.cross_spectra import ServoColumns, band_grams
 from sysid_node.online.systematic.cross_spectra import with_servos as spectra_with_servos
 from sysid_node.online.systematic.servo_model import ServoModel
-from sysid_node.online.systematic.sources import ErrorSource, describe, not_negative, sources
+from sysid_node.online.systematic.sources import ErrorSource, describe, sources
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -39,8 +39,7 @@ class Imperfections:
     controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
     timed: Index  # (m,) places of these controls among those of the layout
     applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
-    expected: Array  # (m,) s: the lateness that is expected beyond the aircraft file's
-    sigmas: Array  # (m,) s: 1 sigma of the lateness about that
+    sigmas: Array  # (m,) s: 1 sigma of the lateness about the aircraft file's
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
     places: Index  # (W,) where the columns of the signal vector stand among them
@@ -76,29 +75,22 @@ def imperfections(
         if not commanded:
             sigma = math.hypot(sigma, stated[place][0])
         if sigma > 0.0 and not positions:
-            rows.append((name, place, *(_later(stated[place][0], sigma) if commanded else (0.0, sigma))))
+            rows.append((name, place, sigma))
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
-    controls, timed, expected, sigmas = zip(*rows, strict=True) if rows else ((), (), (), ())
+    controls, timed, sigmas = zip(*rows, strict=True) if rows else ((), (), ())
     applied = np.array(stated).reshape(-1, 3) if commanded else np.zeros((len(layout.timed), 3))
     return Imperfections(
         found,
         controls,
         np.array(timed, np.intp),
         ServoModel(*applied.T.copy()),
-        np.array(expected),
         np.array(sigmas),
         columns,
         math.hypot(*(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
     )
-
-
-def _later(stated: float, sigma: float) -> tuple[float, float]:
-    """What is expected of a servo's lateness beyond the ``stated`` one, and its 1 sigma: no servo is early."""
-    mean, spread = not_negative(stated, sigma)
-    return mean - stated, spread
 
 
 _SERVO_EFFECTS = ("actuator_lag", "command_delay")
@@ -142,7 +134,7 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     expected = expected + CURVATURE * (late - stated) ** 2
     of_sources = [source.expected for source in imperfect.sources]
     none = np.zeros(late.size)
-    means = np.concatenate([of_sources, stated + imperfect.expected - late, expected - curved, none])
+    means = np.concatenate([of_sources, stated - late, expected - curved, none])
     return sigmas, means
 
 
