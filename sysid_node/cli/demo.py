@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 
 PUBLISH_RATE = 10.0  # Hz
 AFTERWARDS = 0.2  # s to listen after the flight's end, before its estimates are called stale
+STALE = "stale input"  # status of estimates while nothing comes
 DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics sends its last totals
 #: A bag may be played faster than it was flown; no message may be lost on a busy computer.
 RELIABLE = ("reliability:=reliable", "depth:=5000")
@@ -162,7 +163,7 @@ def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Fol
         player = [str(flight.bag), "--rate", str(rate), "--wait", "20"]
         with node_process("identifier", identifier, out) as identifying, node_process("player", player, out) as playing:
             _watch(flight, follower, identifying, playing)
-            history = list(follower.history)
+            history = _in_flight(follower.history)
             follower.listen(DIAGNOSTICS_PERIOD)
     finally:
         follower.close()
@@ -170,6 +171,14 @@ def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Fol
     if not history:
         raise RuntimeError(f"no estimate came; {out / 'identifier.log'} may say why")
     return follower, history
+
+
+def _in_flight(history: Sequence[Estimates]) -> list[Estimates]:
+    """The estimates without the last ones that the identifier calls stale: after the flight nothing comes any more."""
+    end = len(history)
+    while end > 1 and all(found.status == STALE for found in history[end - 1].derivatives.values()):
+        end -= 1
+    return list(history[:end])
 
 
 def _watch(
@@ -188,13 +197,14 @@ def _watch(
 
 def _picture(flight: DemoFlight, follower: Follower, width: int, height: int | None = None) -> RenderableType:
     rates = [(topic, follower.word("input", f"{topic}: rate (Hz)")) for topic in INPUT_TOPICS]
+    history = follower.history if height else _in_flight(follower.history)  # without a height: at the end
     moment = LiveStatus(
         title=f"{flight.aircraft.name}, {flight.bag.name}",
-        seconds=follower.history[-1].time if follower.history else 0.0,
+        seconds=history[-1].time if history else 0.0,
         duration=float(flight.aligned.time[-1]),
         # At the end the rates, of the last second, are those of silence.
         remark=" · ".join(f"{topic} {float(rate):.0f} Hz" for topic, rate in rates if float(rate or 0) > 0.0),
-        estimates=follower.history[-1] if follower.history else None,
+        estimates=history[-1] if history else None,
     )
     return live_table(moment, tuple(flight.aircraft.derivatives), flight.reference, width, height)
 
