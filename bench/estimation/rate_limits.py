@@ -12,26 +12,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from bench.estimation.slow_servos import SET, SUITE
+from bench.estimation.servo_flights import flown
 from bench.pages import publish, table
-from bench.withheld.drawing import SETS, draw
-from bench.withheld.plants.flying import fly
-from bench.withheld.plants.instruments import SUITES, record
-from bench.withheld.plants.motion import Instant
-from bench.withheld.plants.pilot import Pilot
-from bench.withheld.plants.plant import RATE, Plant, handed_over
-from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.faults.recorded_flight import judge
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import RATE_LIMITED, Fault
-from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
-SECONDS = 80.0
 AMPLITUDES = {"small": (0.06, 0.06, 0.06), "large": (0.12, 0.15, 0.2)}  # rad, of elevator, aileron, rudder
 CONTROLS = ("elevator", "aileron", "rudder")
 #: Limit (rad/s), and size of the manoeuvres.
@@ -49,25 +39,9 @@ AIRS = ("none", "light")
 
 def named(limit: float | None, size: str, air: str, seed: int) -> list[Fault]:
     """The servos that the monitor says are at their limits in one flight."""
-    drawn = replace(draw(SET, seed), plant="cdrw", effects={}, turbulence=air, servo=8.0)
-    plant = Plant(drawn, SET)
-    random = np.random.default_rng([SETS[SET], seed, 77])
     moves = [f"3211:{CONTROLS[i % 3]}:amplitude={AMPLITUDES[size][i % 3]}:start={2 + 6 * i}" for i in range(12)]
-    airframe, plan = plant.airframe({}), parse_manoeuvre(moves, plant.truth, RATE, SECONDS)
-    planned = {name: plan.deflections[name] for name in airframe.controls} | {"thrust": np.zeros(plan.time.size)}
-    gusts = np.zeros((plan.time.size, 6))
-    if air != "none":
-        dryden = Dryden.at(100.0, plant.truth.geometry.b)
-        gusts = INTENSITIES[air] * dryden.realisation(len(gusts), RATE, plant.truth.reference.airspeed, random)
-
-    def pilot(start: Instant) -> Pilot:
-        return Pilot(plant.truth, airframe.trim, start, drawn.bandwidth, random, plant.truth.throttle.max_thrust)
-
-    limits = {name: control.limit or 0.5 for name, control in plant.truth.controls.items()}
     effects = {} if limit is None else {"actuator_rate_limit": {"rate": limit}}
-    log = fly(airframe, effects, pilot, planned, gusts, limits, RATE, drawn.servo)
-    file, own = handed_over(plant)
-    streams = record(log, plant.seen(log, {}), plant.truth, {}, SUITES[SUITE], 1.0, own)
+    file, streams = flown(moves, effects, air, seed)
     verdict = judge(file, FaultMonitorSettings(), streams)
     return [e.fault for e in verdict.episodes if e.fault.kind == RATE_LIMITED]
 

@@ -12,19 +12,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from bench.estimation.servo_flights import flown
 from bench.pages import publish, table
-from bench.withheld.drawing import SETS, draw
-from bench.withheld.plants.flying import fly
-from bench.withheld.plants.instruments import SUITES, record
-from bench.withheld.plants.motion import Effects, Instant
-from bench.withheld.plants.pilot import Pilot
-from bench.withheld.plants.plant import RATE, Plant, handed_over
-from sysid_node.excite.spec import parse_manoeuvre
+from bench.withheld.plants.motion import Effects
 from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.recorded_flight import Episode, RecordedEstimates, judge
 from sysid_node.faults.settings import FaultMonitorSettings
@@ -32,10 +27,8 @@ from sysid_node.faults.types import SLOWER
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
 
-SET, SUITE = "development", "autopilot"
-SECONDS, ONSET, PERIOD = 80.0, 40.0, 0.5  # s: the flight, the change, between estimates
+ONSET, PERIOD = 40.0, 0.5  # s: the change, between estimates
 MANOEUVRES = tuple(f"3211:{name}:start={2 + 6 * i}" for i, name in enumerate(("elevator", "aileron", "rudder") * 4))
 AIRS = ("none", "light")
 
@@ -66,23 +59,7 @@ CASES = (
 
 def watched(case: Case, air: str, seed: int) -> list[Episode]:
     """The faults that the replay of one flight reports."""
-    drawn = replace(draw(SET, seed), plant="cdrw", effects={}, turbulence=air, servo=8.0)
-    plant = Plant(drawn, SET)
-    random = np.random.default_rng([SETS[SET], seed, 77])
-    airframe, plan = plant.airframe({}), parse_manoeuvre(MANOEUVRES, plant.truth, RATE, SECONDS)
-    planned = {name: plan.deflections[name] for name in airframe.controls} | {"thrust": np.zeros(plan.time.size)}
-    gusts = np.zeros((plan.time.size, 6))
-    if air != "none":
-        dryden = Dryden.at(100.0, plant.truth.geometry.b)
-        gusts = INTENSITIES[air] * dryden.realisation(len(gusts), RATE, plant.truth.reference.airspeed, random)
-
-    def pilot(start: Instant) -> Pilot:
-        return Pilot(plant.truth, airframe.trim, start, drawn.bandwidth, random, plant.truth.throttle.max_thrust)
-
-    limits = {name: control.limit or 0.5 for name, control in plant.truth.controls.items()}
-    log = fly(airframe, case.effects, pilot, planned, gusts, limits, RATE, drawn.servo)
-    file, own = handed_over(plant)
-    streams = record(log, plant.seen(log, {}), plant.truth, {}, SUITES[SUITE], 1.0, own)
+    file, streams = flown(MANOEUVRES, case.effects, air, seed)
     settings = OnlineSettings(actuators="commands")
     aligned = align_streams(file, streams, settings.max_gap, settings.actuators)
     due = np.arange(PERIOD, aligned.time[-1] - PERIOD, PERIOD)
