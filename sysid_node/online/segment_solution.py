@@ -41,7 +41,7 @@ def solve_with_servos(state: EstimatorState, lines: Array) -> None:
     """Renew the estimates from the transform's ``lines``, again if the estimated servo times have notably changed."""
     imperfect = state.model.imperfections
     for changes in range(SERVO_STEPS + 1):
-        found = _look(state, lines)
+        found = look(state, lines)
         if imperfect is None or state.servos is None or found is None or changes == SERVO_STEPS:
             return
         step = estimation.notable_step(imperfect, state.servos, found)
@@ -50,14 +50,14 @@ def solve_with_servos(state: EstimatorState, lines: Array) -> None:
         move_servos(state, step)
 
 
-def _look(state: EstimatorState, lines: Array) -> SystematicErrors | None:
+def look(state: EstimatorState, lines: Array) -> SystematicErrors | None:
     """Renew the estimates; return the systematic errors if they are new.
 
     Where the signals, as the last step corrects them, fit worse than before it, a shorter step is made from there.
     """
-    before = _last(state)
-    _solve_all(state, measure_segment(state, lines))
-    found = _last(state)
+    before = last_errors(state)
+    solve_all(state, measure_segment(state, lines))
+    found = last_errors(state)
     if found is None or found.pieces != state.finished.pieces:
         return None
     if before is None or not estimation.worse(found, before):
@@ -74,11 +74,11 @@ def _look_at(state: EstimatorState, lines: Array, place: SystematicErrors, share
         move_servos(state, place.lines)
     else:
         state.changes.monitor.references.pop()
-    _solve_all(state, measure_segment(state, lines), (place, share))
-    return _last(state)
+    solve_all(state, measure_segment(state, lines), (place, share))
+    return last_errors(state)
 
 
-def _last(state: EstimatorState) -> SystematicErrors | None:
+def last_errors(state: EstimatorState) -> SystematicErrors | None:
     """The systematic errors as they were last found."""
     return state.latest.systematic if state.latest is not None else None
 
@@ -109,7 +109,7 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> None:
     state.changes.monitor.references.clear()
 
 
-def _solve_all(state: EstimatorState, segment: Information, at: tuple[SystematicErrors, float] | None = None) -> None:
+def solve_all(state: EstimatorState, segment: Information, at: tuple[SystematicErrors, float] | None = None) -> None:
     """Renew the estimates and their covariances, from the finished segments and the present one.
 
     ``at``: where the signals are to be corrected, and the share of the step that is then made; else by the last step.
@@ -174,7 +174,7 @@ def _corrected_signals(
     model, servos = state.model, state.servos
     if model.imperfections is None or servos is None:
         return None
-    last = _last(state)
+    last = last_errors(state)
     if taken_out is None:
         taken_out = estimation.to_take_out(model.imperfections, servos, last)
     return corrected_signals(
@@ -207,7 +207,7 @@ def _systematic(
     if imperfect is None or servos is None or signals is None or not corrected.usable:
         return None
     correction = signals.correction(equations, corrected, recorded)
-    last = _last(state)
+    last = last_errors(state)
     if share is None and last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
         return replace(last, correction=correction)
     return estimation.systematic_errors(
@@ -221,6 +221,7 @@ def _systematic(
         correction,
         state.finished.pieces,
         1.0 if share is None else share,
+        tuple(state.search.rivals.values()),
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.online import servo_search
 from sysid_node.online.change_response import look_for_changes, memory
 from sysid_node.online.changes import detection
 from sysid_node.online.changes.detection import PIECE
@@ -35,6 +36,7 @@ def renew(state: EstimatorState, last: bool = False) -> None:
     if last or _is_due(state):
         measure_noise_moments(state)
         solve_with_servos(state, lines)
+        servo_search.try_another_solution(state)
     if state.model.settings.detect_changes:
         look_for_changes(state, lines)
     if last:

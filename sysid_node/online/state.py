@@ -26,7 +26,7 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.weak_instruments import AndersonRubinBounds
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.status import Codes, Vocabulary
-from sysid_node.online.systematic.estimation import SystematicErrors
+from sysid_node.online.systematic.estimation import Rival, SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections
 from sysid_node.online.systematic.servo_model import ServoModel
 from sysid_node.online.systematic.servo_states import ServoStates
@@ -155,6 +155,15 @@ class ChangeWatch:
 
 
 @dataclass
+class ServoSearch:
+    """Other solutions for servos of which the aircraft file is silent (``servo_search``)."""
+
+    energy: float = 0.0  # s of data when the last one was tried
+    tried: int = 0  # how many have been
+    rivals: dict[int, Rival] = field(default_factory=dict)  # by the control's place among those not exactly known
+
+
+@dataclass
 class EstimatorInputs:
     """What the samples so far say of the instruments. Times in s."""
 
@@ -180,6 +189,7 @@ class EstimatorState:
     changes: ChangeWatch
     inputs: EstimatorInputs = field(default_factory=EstimatorInputs)
     segment: PresentSegment = field(default_factory=PresentSegment)
+    search: ServoSearch = field(default_factory=ServoSearch)
     latest: SegmentSolution | None = None
 
 

@@ -77,6 +77,7 @@ class _OneFlight(NamedTuple):
     expected: Array  # (K,)
     information: Array
     score: Array
+    precision: Array  # (K, K) the prior's
     names: tuple[str, ...]
     jacobian: Array  # (K, D) per unit
     seconds: float
@@ -125,8 +126,9 @@ def _told(state: EstimatorState) -> _OneFlight | None:
         _named(imperfect, commanded=state.model.commanded),
         sigmas,
         base + centre,
-        inverse - np.eye(sigmas.size),
+        inverse - imperfect.precision,
         inverse @ ((found.considered.estimate - centre) / sigmas),
+        imperfect.precision,
         table.names,
         jacobian.reshape(sigmas.size, -1)[:, table.place],
         latest.total.energy,
@@ -157,6 +159,7 @@ def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
         at = np.array([every.index(one) for one in flight.imperfections], np.intp)
         new = sigmas[at] == 0.0
         sigmas[at[new]], expected[at[new]] = flight.sigmas[new], flight.expected[new]
+        information[np.ix_(at[new], at[new])] = flight.precision[np.ix_(new, new)]
         ratio = sigmas[at] / flight.sigmas
         information[np.ix_(at, at)] += flight.information * ratio[:, None] * ratio
         # scores count from each flight's own expectation

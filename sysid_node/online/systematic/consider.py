@@ -8,7 +8,7 @@ tell of: Bierman, "Factorization Methods for Discrete Sequential Estimation", 19
 
     J_c   = (V'X)^-1 V'Z_c                                  what kappa moves theta_c by, per unit
     D_c   = Z_c - X_c J_c
-    A     = diag(tolerance)^-2 + sum_c w_c D_c'P D_c
+    A     = cov(kappa)^-1 before the flight + sum_c w_c D_c'P D_c
     kappa = - A^-1 sum_c w_c D_c'P r_c,  cov kappa = A^-1
     theta = theta(0) + J kappa,          cov theta = cov theta(0) + J A^-1 J'
 
@@ -83,6 +83,11 @@ class Considered:
             covariance=self.covariance + np.outer(rest, rest),
         )
 
+    def widened(self, other: Array, probability: float) -> Considered:
+        """With the variance about this estimate of a mixture in which an ``other`` (K,) has a ``probability``."""
+        off = other - self.estimate
+        return replace(self, covariance=self.covariance + probability * np.outer(off, off))
+
     @property
     def correction(self) -> Array:
         """(C, P + 1) what the ``step`` adds to the estimates."""
@@ -108,12 +113,14 @@ def consider(
     place: NDArray[np.intp],
     sigmas: Array,
     centre: Array,
+    precision: Array,
     freedom: Array,
 ) -> Considered:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``sigmas`` (K,) are the tolerances,
-    ``centre`` (K,) the expected values before the flight, and ``freedom`` (C,) the noise's degrees of freedom.
+    ``centre`` (K,) the expected values before the flight, ``precision`` (K, K) the inverse of their correlations then,
+    and ``freedom`` (C,) the noise's degrees of freedom.
     """
     gram, changes, C = signals.gram, signals.changes, len(equations.coefficients)
     v = np.zeros((changes.columns.width, C))
@@ -143,7 +150,7 @@ def consider(
             share = further / max(float(freedom[c]), 1.0)
             scores.add(q[:, :-1].T @ q, D @ gram @ both[c].T, share, float(noise[c] * misfit[c]))
     off = (centre - signals.estimate) / sigmas
-    step, covariance = _posterior(*scores.weighed(), off)
+    step, covariance = _posterior(*scores.weighed(), off, precision)
     jacobian = _jacobian(equations, changes, v, J, sigmas, signals.corrected_means)
     return Considered(
         signals.estimate + sigmas * step,
@@ -151,7 +158,7 @@ def consider(
         sigmas[:, None] * covariance * sigmas,
         jacobian / sigmas[:, None, None],
         misfit,
-        Fit(explained, noise * misfit * moves, float(off @ off)),
+        Fit(explained, noise * misfit * moves, float(off @ precision @ off)),
     )
 
 
@@ -206,11 +213,11 @@ def _projection(
     return np.asarray(solve_triangular(factor, scale[:, None] * gram[at], lower=True))
 
 
-def _posterior(information: Array, score: Array, centre: Array) -> tuple[Array, Array]:
-    """Estimates and their covariance, in tolerances: the prior's precision is one."""
-    values, vectors = np.linalg.eigh(information)
-    covariance = (vectors / (1.0 + np.maximum(values, 0.0))) @ vectors.T
-    return covariance @ (centre - score), covariance
+def _posterior(information: Array, score: Array, centre: Array, precision: Array) -> tuple[Array, Array]:
+    """Estimates and their covariance, in tolerances, of which the ``precision`` before the flight is."""
+    covariance = np.linalg.inv(information + precision)
+    covariance = 0.5 * (covariance + covariance.T)
+    return covariance @ (precision @ centre - score), covariance
 
 
 def _jacobian(

@@ -34,6 +34,19 @@ EARLY = 10.0
 
 
 @dataclass(frozen=True)
+class Rival:
+    """Another solution, which the data and what is believed hardly tell from the one that is taken."""
+
+    imperfections: Array  # (K,) with the servos' lateness and curvature themselves
+    probability: float  # of it, at most a half
+
+    @classmethod
+    def of(cls, imperfect: Imperfections, found: SystematicErrors, probability: float) -> Rival:
+        """What was ``found`` from there."""
+        return cls(found.considered.estimate + _base(imperfect, found.lines), probability)
+
+
+@dataclass(frozen=True)
 class SystematicErrors:
     """Of C coefficients' P slopes and, behind them, offsets."""
 
@@ -75,18 +88,24 @@ def systematic_errors(
     correction: Array,
     pieces: int,
     share: float,
+    rivals: tuple[Rival, ...],
 ) -> SystematicErrors:
     """By the corrected ``signals`` and their ``solution``, which differs by ``correction`` from that of recorded ones.
 
     The lines have the controls where the ``servos`` have them. ``inflation`` (C,): factors of the statistical
-    variances, which hold for what the flight tells of imperfections too. At most a ``share`` of the step is made.
+    variances, which hold for what the flight tells of imperfections too. At most a ``share`` of the step is made. The
+    intervals reach to the ``rivals``.
     """
     sigmas, centre = prior(imperfect, servos)
     noise = inflation * noise_per_gram(equations, spread, signals.information)
-    found = consider(equations, solution, noise, signals, imperfect.places, sigmas, centre, spread.freedom)
+    found = consider(
+        equations, solution, noise, signals, imperfect.places, sigmas, centre, imperfect.precision, spread.freedom
+    )
     at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
     share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))
     found = found.shortened(share)
+    for rival in rivals:
+        found = found.widened(rival.imperfections - _base(imperfect, servos), rival.probability)
     late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
     late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m : S + 2 * m]
     errors = np.sqrt(found.covariance.diagonal()[S : S + m])
@@ -104,6 +123,13 @@ def systematic_errors(
         signals.estimate,
         share,
     )
+
+
+def _base(imperfect: Imperfections, servos: ServoModel) -> Array:
+    """(K,) from where estimates of imperfections count: where the lines have the ``servos``, and zero."""
+    at = imperfect.timed
+    none = np.zeros(at.size)
+    return np.concatenate([np.zeros(len(imperfect.sources)), servos.lateness[at], servos.curvature[at], none])
 
 
 def worse(found: SystematicErrors, before: SystematicErrors) -> bool:

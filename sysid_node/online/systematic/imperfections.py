@@ -18,7 +18,7 @@ from sysid_node.online.systematic.column_changes import ColumnChanges, flight_me
 from sysid_node.online.systematic.cross_spectra import ServoColumns, band_grams
 from sysid_node.online.systematic.cross_spectra import with_servos as spectra_with_servos
 from sysid_node.online.systematic.servo_model import ServoModel
-from sysid_node.online.systematic.sources import ErrorSource, describe, sources
+from sysid_node.online.systematic.sources import ErrorSource, describe, not_negative, sources
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -28,6 +28,10 @@ CURVATURE = 0.25
 #: Share of L^3 by which the third coefficient of a servo lies beside what L and B say of it: lags of first and second
 #: order with delays of up to all of L.
 THIRD = 0.05
+#: Correlation of the lateness of two servos of which the file is silent: an aircraft has servos of one type, and what
+#: their linkages, loads and makes add to one of 50 ms is under half of it.
+OF_ONE_TYPE = 0.8
+KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
 SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
 
@@ -39,7 +43,10 @@ class Imperfections:
     controls: tuple[str, ...]  # names of the controls whose servos are not exactly known
     timed: Index  # (m,) places of these controls among those of the layout
     applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
-    sigmas: Array  # (m,) s: 1 sigma of the lateness about the aircraft file's
+    expected: Array  # (m,) s: the lateness that is expected beyond the aircraft file's
+    sigmas: Array  # (m,) s: 1 sigma of the lateness about that
+    unknown: Index  # places among the m of the servos of which the file is silent
+    precision: Array  # (K, K) inverse of the correlations before the flight
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
     places: Index  # (W,) where the columns of the signal vector stand among them
@@ -68,29 +75,49 @@ def imperfections(
     servos = dict(zip(aircraft.control_symbols, servos_of(aircraft)[1:], strict=True))
     names = {control.symbol: name for name, control in aircraft.controls.items()}
     stated = [servo_model.of_servo(servos[symbol]) for symbol in layout.timed]
-    rows = []
+    rows: list[tuple[str, int, float, float]] = []
+    unknown = []
     for place, symbol in enumerate(layout.timed):
         name = names[symbol]
         sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
         if not commanded:
             sigma = math.hypot(sigma, stated[place][0])
         if sigma > 0.0 and not positions:
-            rows.append((name, place, sigma))
+            if commanded and stated[place][0] == 0.0 and sigma > KNOWN:
+                unknown.append(len(rows))
+            rows.append((name, place, *(_later(stated[place][0], sigma) if commanded else (0.0, sigma))))
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
-    controls, timed, sigmas = zip(*rows, strict=True) if rows else ((), (), ())
+    controls, timed, expected, sigmas = zip(*rows, strict=True) if rows else ((), (), (), ())
     applied = np.array(stated).reshape(-1, 3) if commanded else np.zeros((len(layout.timed), 3))
     return Imperfections(
         found,
         controls,
         np.array(timed, np.intp),
         ServoModel(*applied.T.copy()),
+        np.array(expected),
         np.array(sigmas),
+        np.array(unknown, np.intp),
+        _precision(len(found), len(rows), unknown),
         columns,
         math.hypot(*(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
     )
+
+
+def _later(stated: float, sigma: float) -> tuple[float, float]:
+    """What is expected of a servo's lateness beyond the ``stated`` one, and its 1 sigma: no servo is early."""
+    mean, spread = not_negative(stated, sigma)
+    return mean - stated, spread
+
+
+def _precision(sources: int, servos: int, unknown: list[int]) -> Array:
+    """(K, K) where the lateness of the ``unknown`` of the servos has a part in common."""
+    correlation = np.eye(sources + 3 * servos)
+    places = sources + np.array(unknown, np.intp)
+    correlation[np.ix_(places, places)] += OF_ONE_TYPE * (1.0 - np.eye(places.size))
+    return np.asarray(np.linalg.inv(correlation))
 
 
 _SERVO_EFFECTS = ("actuator_lag", "command_delay")
@@ -134,7 +161,7 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     expected = expected + CURVATURE * (late - stated) ** 2
     of_sources = [source.expected for source in imperfect.sources]
     none = np.zeros(late.size)
-    means = np.concatenate([of_sources, stated - late, expected - curved, none])
+    means = np.concatenate([of_sources, stated + imperfect.expected - late, expected - curved, none])
     return sigmas, means
 
 

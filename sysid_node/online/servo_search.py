@@ -1,0 +1,130 @@
+"""Servos of which the aircraft file is silent: other solutions are tried, and the more probable one is taken.
+
+The fit has two minima where a motion is about as slow as a servo may be. A slow aileron of an aircraft that rolls at
+once answers as a fast aileron does of one that takes as long to roll: roll mode and servo exchange their time
+constants. Gauss-Newton steps end in the nearer minimum. So now and then, whenever the data have grown by a share, one
+of these servos is taken to be on the other side, late instead of on time or the reverse, and the steps are made from
+there, on a copy of the estimator (Nocedal & Wright, "Numerical Optimization", 2nd ed., 2006, sec. 2.2: starts from
+several points). Both solutions are then weighed by
+
+    -2 log p = explained energy / noise + imperfections' squares in tolerances + derivatives off the aircraft file's,
+
+with the same noise for both. Of the derivatives' errors Student's distribution with few degrees of freedom is believed,
+for a file is now and then far off. If the other solution is surely more probable, it is taken. If neither surely is,
+the intervals reach to both: the estimate is that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from sysid_node.online import segment_solution
+from sysid_node.online.segment_information import measure_segment
+from sysid_node.online.state import ChangeWatch, EstimatorState, current_lines
+from sysid_node.online.systematic import estimation
+from sysid_node.online.systematic.consider import Fit
+from sysid_node.online.systematic.estimation import Rival, SystematicErrors
+from sysid_node.online.systematic.imperfections import CURVATURE
+
+FIRST, GROWTH = 8.0, 1.3  # s of data with which the first other solution is tried, and by what they grow to the next
+LATE, BETWEEN = 0.12, 0.06  # s: where a servo is taken to be that is nearer to zero than the second
+STEPS = 4  # at most, from there
+SURELY = 2.0  # difference of -2 log p with which a solution is taken for another
+APART = 1.0  # standard errors by which a servo must differ between two solutions to make them two
+FREEDOM = 4.0  # degrees of freedom of Student's distribution of a derivative about the aircraft file's
+NEGLIGIBLE = 1e-3  # probability
+
+
+def try_another_solution(state: EstimatorState) -> None:
+    """Try one, if it is time, and take it if it is more probable."""
+    imperfect, found, search = state.model.imperfections, segment_solution.last_errors(state), state.search
+    if imperfect is None or found is None or not imperfect.unknown.size or found.pieces != state.finished.pieces:
+        return
+    energy = found.energy
+    if energy < FIRST or search.energy <= energy < GROWTH * search.energy:
+        return
+    control = int(imperfect.unknown[search.tried % imperfect.unknown.size])
+    search.energy, search.tried = energy, search.tried + 1
+    search.rivals.pop(control, None)
+    trial = _elsewhere(state, found, control)
+    other = segment_solution.last_errors(trial) if trial is not None else None
+    if trial is None or other is None or not _apart(other, found, int(imperfect.timed[control]), control):
+        return
+    less = _improbability(state, found, found.considered.fit, other.considered.fit) - _improbability(
+        trial, other, other.considered.fit, found.considered.fit
+    )
+    if less > SURELY:
+        _take(state, trial)
+        other, less = found, -less
+    probability = 1.0 / (1.0 + math.exp(min(-0.5 * min(less, 0.0), 100.0)))
+    if probability > NEGLIGIBLE:
+        search.rivals[control] = Rival.of(imperfect, other, probability)
+
+
+def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> EstimatorState | None:
+    """A copy that has gone on from where one servo is on the other side; None where nothing is found there."""
+    imperfect = state.model.imperfections
+    assert imperfect is not None and state.servos is not None
+    place, late = int(imperfect.timed[control]), state.servos.lateness
+    trial = replace(
+        state,
+        segment=replace(state.segment),
+        finished=replace(state.finished, in_window=deque()),
+        changes=ChangeWatch([]),
+    )
+    there = LATE if late[place] < BETWEEN else 0.0
+    by_lateness, by_curvature = np.zeros(late.size), np.zeros(late.size)
+    by_lateness[place] = there - late[place]
+    by_curvature[place] = CURVATURE * there**2 - state.servos.curvature[place]
+    servos = state.servos.moved(by_lateness, by_curvature)
+    taken_out = estimation.to_take_out(imperfect, servos, found)
+    for order in range(3):
+        taken_out[imperfect.servos.start + order * len(imperfect.controls) + control] = 0.0
+    for left in reversed(range(STEPS)):
+        segment_solution.move_servos(trial, servos)
+        lines = current_lines(trial)
+        if left == STEPS - 1:
+            segment_solution.solve_all(trial, measure_segment(trial, lines), (replace(found, taken_out=taken_out), 1.0))
+            there_found = segment_solution.last_errors(trial)
+        else:
+            there_found = segment_solution.look(trial, lines)
+        if there_found is None or trial.servos is None:
+            return None
+        step = estimation.notable_step(imperfect, trial.servos, there_found)
+        if step is None or not left:
+            break
+        servos = step
+    return trial
+
+
+def _apart(one: SystematicErrors, other: SystematicErrors, place: int, control: int) -> bool:
+    """Whether these are two solutions: a servo differs by more than its error."""
+    by = abs(float(one.servos.lateness[place] - other.servos.lateness[place]))
+    return by > APART * min(float(one.errors[control]), float(other.errors[control]))
+
+
+def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, other: Fit) -> float:
+    """-2 log p of a solution but for a constant, with the lesser noise of both fits."""
+    latest = state.latest
+    assert latest is not None
+    noise = np.where(other.noise > 0.0, np.minimum(own.noise, other.noise), 0.0)
+    expected, precision = state.model.prior  # (P, C)
+    told = (precision > 0.0) & (state.equations.belongs > 0.0)
+    variance = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2).T + found.variance[:, :-1].T
+    off = latest.solution.theta + found.correction[:, :-1].T - expected
+    squares = np.where(told, off * off / (1.0 / np.where(told, precision, 1.0) + np.maximum(variance, 0.0)), 0.0)
+    return own.cost(replace(own, noise=noise)) + float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
+
+
+def _take(state: EstimatorState, trial: EstimatorState) -> None:
+    """Go on with the solution of a ``trial``."""
+    assert trial.servos is not None
+    if trial.servos is not state.servos:
+        segment_solution.move_servos(state, trial.servos)
+    state.equations, state.latest = trial.equations, trial.latest
+    state.segment.information = trial.segment.information
+    state.changes.monitor.references.append(trial.changes.monitor.references[-1])
