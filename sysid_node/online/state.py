@@ -70,6 +70,7 @@ class ValidityBasis:
     systematic: Array  # (D,) squared systematic errors
     floor: Array  # (P,) energy under which a regressor is buried in noise
     fits: Array  # (C, 3) what ``FitQuality`` says besides R squared
+    servos: Codes  # (m,) what is said against every derivative of a control whose servo is estimated, 0 = not of every
 
 
 @dataclass

@@ -55,9 +55,12 @@ def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, Derivat
     assert imperfect is not None
     assert found is not None
     late, ahead, rows = found.servos.lateness[imperfect.timed].tolist(), found.ahead(imperfect).tolist(), {}
-    for name, value, error, early in zip(imperfect.controls, late, found.errors.tolist(), ahead, strict=True):
-        half, valid = NORMAL_95 * error, error <= SERVO_KNOWN and not early
-        words = "ok" if valid else AHEAD if early else "converging"
+    objections = state.model.vocabulary.texts(validity_basis(state, latest).servos)
+    parts = zip(imperfect.controls, late, found.errors.tolist(), ahead, objections, strict=True)
+    for name, value, error, early, objection in parts:
+        known = "ok" if error <= SERVO_KNOWN else "converging"
+        half, words = NORMAL_95 * error, AHEAD if early else objection if objection != "ok" else known
+        valid = words == "ok"
         rows[name] = DerivativeEstimate(name, value, error, value - half, value + half, valid, words, error, 0.0)
     return rows
 

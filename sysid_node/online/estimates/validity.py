@@ -60,7 +60,24 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
         systematic=systematic,
         floor=np.maximum(BURIED * latest.total.bias.take(equations.energy), least_squares.TINY),
         fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
+        servos=_of_servos(state, objections),
     )
+
+
+def _of_servos(state: EstimatorState, objections: Codes) -> Codes:
+    """(m,) the ``objections`` (D,) to the derivatives of a control where none is without: they hold for its servo too.
+
+    A servo's time is told by the equations that the control is in.
+    """
+    imperfect, table, layout = state.model.imperfections, state.model.table, state.model.layout
+    if imperfect is None:
+        return np.zeros(0, np.uint8)
+    regressors, found = np.array(state.equations.regressors), np.zeros(imperfect.timed.size, np.uint8)
+    for i, place in enumerate(imperfect.timed.tolist()):
+        of_it = objections[(regressors[table.unknown] == layout.timed[place]) & ~table.offset]
+        if of_it.size and (of_it != status.OK).all():
+            found[i] = of_it[-1]
+    return found
 
 
 def _systematic(state: EstimatorState, latest: SegmentSolution) -> Array:
