@@ -234,6 +234,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1, help="number of the first flight (default: 1)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     parser.add_argument("--before", type=Path, help="results of another version, to be held against these")
+    parser.add_argument("--seen", action="store_true", help="with --before: flights that the development has seen")
     args = parser.parse_args()
     lines = _read(args.results)
     aircraft = load_aircraft("cdrw")
@@ -244,7 +245,8 @@ def main() -> None:
             with args.results.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(lines[-1]) + "\n")
     if args.before:
-        publish("bench/estimation/all_imperfections.py before", compared(_read(args.before), lines), args.page)
+        section = f"bench/estimation/all_imperfections.py {'seen' if args.seen else 'before'}"
+        publish(section, compared(_read(args.before), lines), args.page)
         return
     publish("bench/estimation/all_imperfections.py", tables(lines), args.page)
 
