@@ -1,6 +1,7 @@
 """The fleet's page, tables and aircraft files, from a small fleet whose worn tail and shared cause are known."""
 
 import csv
+import re
 from dataclasses import replace
 
 import pytest
@@ -54,7 +55,9 @@ def test_the_page_says_what_changed_and_whose_the_gap_is(written):
     assert "t3: aileron power" in page
     assert "the others are unchanged" in page
     assert "new servo" in page
-    assert "The simulator lacks it: all tails share it" in page
+    assert "motor lag (cdrw): The simulator lacks it: all tails share it" in page
+    assert re.search(r"time constant 0\.\d+ \(0\.\d+ to 0\.\d+\) s<", page)
+    assert "motor_lag" not in page
     assert "no &lt;air&gt; data" in page
     assert 'href="flights/t3-20/report.html"' in page
 

@@ -11,6 +11,7 @@ from sysid_node.fleet.statistics.causes import PooledCause
 from sysid_node.fleet.statistics.drift import Drift
 from sysid_node.fleet.statistics.series import DAY
 from sysid_node.report.results.fleet_report import FleetReport
+from sysid_node.report.wording.causes import label_words
 from sysid_node.report.wording.names import short_meaning
 from sysid_node.report.wording.numbers import MINUS, likely, listing, number
 
@@ -75,8 +76,13 @@ def findings(report: FleetReport) -> list[str]:
         tail_sentence(report.tail_name(*key), list(found), report.maintenance(*key))
         for key, found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
     ]
-    causes = [f"{c.label} ({c.aircraft}): {account_words(c)}" for c in report.summary.causes if c.account != "flight"]
-    return [*drifting, *causes]
+    return [*drifting, *cause_sentences(report)]
+
+
+def cause_sentences(report: FleetReport) -> list[str]:
+    """Whose each cause is that the type or a tail has: a sentence each."""
+    causes = [cause for cause in report.summary.causes if cause.account != "flight"]
+    return [f"{label_words(cause.label)} ({cause.aircraft}): {account_words(cause)}" for cause in causes]
 
 
 def _signed(value: float, digits: int) -> str:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sysid_node.aircraft.effect_names import EFFECT_NAMES
-from sysid_node.report.sections.gap.names import in_pilots_units, label_words, parameter_words
+from sysid_node.report.wording.causes import in_pilots_units, label_words, parameter_words
 
 CONTROLS, DERIVATIVES = ("elevator", "aileron", "rudder"), ("Cm_q", "CL_0", "Cl_p")
 

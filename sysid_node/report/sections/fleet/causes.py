@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from sysid_node.fleet.statistics.causes import PooledCause, Size, TailCause
 from sysid_node.report.results.fleet_report import FleetReport
+from sysid_node.report.wording.causes import in_pilots_units, label_words, parameter_words, units_of
 from sysid_node.report.wording.fleet import account_words, date_words
+from sysid_node.report.wording.names import unit
 from sysid_node.report.wording.numbers import NONE, likely, number, plural
 
 
@@ -25,18 +28,18 @@ def context(report: FleetReport) -> dict[str, Any]:
 
 def _row(cause: PooledCause) -> dict[str, Any]:
     return {
-        "label": cause.label,
+        "label": label_words(cause.label),
         "shared": likely(cause.shared),
         "account": account_words(cause),
-        "sizes": [f"{name} {_size(size)}" for name, size in cause.sizes.items()],
-        "confused": [f"{name} ({likely(p)})" for name, p in cause.confused_with.items() if p >= 0.005],
+        "sizes": _sizes(cause.label, cause.sizes),
+        "confused": [f"{label_words(name)} ({likely(p)})" for name, p in cause.confused_with.items() if p >= 0.005],
     }
 
 
 def _of_flights(causes: list[PooledCause]) -> list[str]:
     """Causes that belong to neither the type nor a tail, with the number of flights that named them."""
     counts = [(c.label, sum(tail.found for tail in c.tails)) for c in causes if c.account == "flight"]
-    return [f"{label} ({plural(count, 'flight')})" for label, count in counts if count]
+    return [f"{label_words(label)} ({plural(count, 'flight')})" for label, count in counts if count]
 
 
 def _by_tail(causes: list[PooledCause]) -> list[dict[str, Any]]:
@@ -48,21 +51,25 @@ def _by_tail(causes: list[PooledCause]) -> list[dict[str, Any]]:
 def _tail_row(cause: PooledCause, tail: TailCause) -> dict[str, Any]:
     return {
         "tail": tail.tail,
-        "label": cause.label,
+        "label": label_words(cause.label),
         "alone": tail.own >= 0.5,
         "probability": likely(tail.probability),
         "found": f"{tail.found} of {tail.flights}",
         "since": "" if tail.since is None else date_words(tail.since),
-        "total": _sizes(tail.sizes),
-        "shared": _sizes(tail.shared_sizes) if cause.shared >= 0.5 else NONE,
-        "own": _sizes(tail.own_sizes),
+        "total": _sizes(cause.label, tail.sizes),
+        "shared": _sizes(cause.label, tail.shared_sizes) if cause.shared >= 0.5 else NONE,
+        "own": _sizes(cause.label, tail.own_sizes),
     }
 
 
-def _sizes(sizes: dict[str, Size]) -> str:
-    return "; ".join(f"{name} {_size(size)}" for name, size in sizes.items()) or NONE
+def _sizes(label: str, sizes: Mapping[str, Size]) -> str:
+    """``angle of attack 1.2 (0.8 to 1.6) deg``, for each parameter of the cause."""
+    units = units_of(label.partition(" of ")[0])
+    return "; ".join(_size(name, size, units.get(name, unit(name))) for name, size in sizes.items()) or NONE
 
 
-def _size(size: Size) -> str:
-    """``0.10 (0.08 to 0.12)``."""
-    return f"{number(size.value, 2)} ({number(size.lower, 2)} to {number(size.upper, 2)})"
+def _size(name: str, size: Size, si_unit: str) -> str:
+    factor, _, shown = in_pilots_units(1.0, 0.0, si_unit)
+    value, lower, upper = (number(factor * v, 2) for v in (size.value, size.lower, size.upper))
+    between = f" ({lower} to {upper})" if size.lower <= size.upper else ""  # NaN where there is no interval
+    return f"{parameter_words(name)} {value}{between} {shown}".rstrip()

@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import Any
 
 from sysid_node.report.results.fleet_report import FleetReport
-from sysid_node.report.wording.fleet import account_words, tail_sentence
+from sysid_node.report.wording.fleet import cause_sentences, tail_sentence
 from sysid_node.report.wording.names import short_meaning
 from sysid_node.report.wording.numbers import number, plural
 
@@ -22,7 +22,7 @@ def opening(report: FleetReport) -> dict[str, Any]:
         tail_sentence(report.tail_name(*key), list(found), report.maintenance(*key))
         for key, found in groupby(report.drifts, key=lambda d: (d.aircraft, d.tail))
     ]
-    causes = [f"{c.label} ({c.aircraft}): {account_words(c)}" for c in summary.causes if c.account != "flight"]
+    causes = cause_sentences(report)
     facts = [
         ("Flights", str(summary.flights)),
         ("Tails", str(tails)),

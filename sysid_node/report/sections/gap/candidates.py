@@ -7,7 +7,7 @@ from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
-from sysid_node.report.sections.gap.names import alike, label_words, parameter_words, units_of
+from sysid_node.report.wording.causes import alike, label_words, parameter_words, units_of
 from sysid_node.report.wording.numbers import NONE, likely, number, with_interval
 
 

@@ -16,7 +16,7 @@ from sysid_node.gap.validation.simulation_error import SideBySide, side_by_side
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, PALE, VERMILION, Figure
 from sysid_node.report.drawing.thinning import thin_curve
-from sysid_node.report.sections.gap.names import WORDS
+from sysid_node.report.wording.causes import WORDS
 from sysid_node.report.wording.names import symbol
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.prediction.coefficients import COEFFICIENTS

@@ -8,8 +8,8 @@ from typing import Any
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.short_flights.readings import WINDOW
 from sysid_node.gap.validation.spectral_error import STAGES
-from sysid_node.report.sections.gap.names import WORDS, percent
 from sysid_node.report.sections.gap.paragraph import paragraph
+from sysid_node.report.wording.causes import WORDS, percent
 from sysid_node.report.wording.names import words_of
 from sysid_node.report.wording.numbers import number
 

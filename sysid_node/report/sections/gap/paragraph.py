@@ -12,7 +12,7 @@ from sysid_node.gap.document import document
 from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.short_flights.readings import WINDOW
 from sysid_node.gap.validation.spectral_error import Gap
-from sysid_node.report.sections.gap.names import (
+from sysid_node.report.wording.causes import (
     WORDS,
     alike,
     in_pilots_units,

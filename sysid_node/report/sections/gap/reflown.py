@@ -9,7 +9,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.reflying import InSimulator
 from sysid_node.gap.short_flights.readings import WINDOW
 from sysid_node.report.sections.gap.flight import short_flight_panels
-from sysid_node.report.sections.gap.names import WORDS, label_words, percent
+from sysid_node.report.wording.causes import WORDS, label_words, percent
 from sysid_node.report.wording.numbers import number
 
 _STAGES = ("before", "after", "noise_floor")

@@ -9,7 +9,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.verdict.decision import structured_channels
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import Figure
-from sysid_node.report.sections.gap.names import WORDS, signal_words
+from sysid_node.report.wording.causes import WORDS, signal_words
 from sysid_node.report.wording.numbers import number
 
 

@@ -9,7 +9,7 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.verdict.localisation import REGIMES
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, GREEN, INK, MUTED, PURPLE, VERMILION, Figure
-from sysid_node.report.sections.gap.names import WORDS, percent, signal_words
+from sysid_node.report.wording.causes import WORDS, percent, signal_words
 from sysid_node.report.wording.numbers import number
 
 #: Steps of the waterfall before the rest.

@@ -1,4 +1,4 @@
-"""Words for what a gap's report compares: channels, units of an effect's parameters, percentages."""
+"""Words for the causes of a gap and what its report compares: channels, parameters with their units, percentages."""
 
 from __future__ import annotations
 
