@@ -2,7 +2,8 @@
 
 A time is that of the processor, from when Python begins to import to what the whole command has taken before, so that
 a busy computer meets the same places in the program. A command that is done before the signal arrives counts as such.
-What is left behind is anything beside ``--out`` or in it but finished results and finished steps of a diagnosis.
+What is left behind is anything beside ``--out`` or in it but finished results, finished steps of a diagnosis and the
+state of a fleet.
 
     python -m bench.robustness.signals [--times 20] [--seed 1] [--only replay,gap] [--page docs/results/signals.md]
 """
@@ -150,7 +151,7 @@ def _left(folder: Path, inputs: Path, before: Mapping[str, bytes]) -> str:
     beside, out = {path.name for path in folder.iterdir()}, folder / "out"
     within = {path.name for path in out.iterdir()} if out.is_dir() else set()
     logs = {name for name in within if name.endswith(".log")}  # of the nodes of demo and loop
-    if beside - {"out"} or within - logs - {"unfinished"} or (beside and not out.is_dir()):
+    if beside - {"out"} or within - logs - {"unfinished", "fleet.sqlite"} or (beside and not out.is_dir()):
         return f"left {sorted(beside | within)}"
     return "as it should" if _content(inputs) == before else "changed its input"
 

@@ -93,8 +93,14 @@ class Predictor:
     def predict(self, manoeuvre: Manoeuvre) -> Prediction:
         """The prediction for a manoeuvre from trim. Raises InputError where a control saturates or it diverges."""
         flight = self._fly(self.commands(manoeuvre))
-        matrix = fisher(self._slopes(np.asarray(flight.commands)), self._sigma)
-        information = FisherInformation(self.names, self.values, eliminate(matrix, len(self.names)))
+        with np.errstate(over="ignore", invalid="ignore"):  # said below
+            matrix = eliminate(fisher(self._slopes(np.asarray(flight.commands)), self._sigma), len(self.names))
+        if not np.isfinite(matrix).all():
+            raise InputError(
+                f"a manoeuvre of {manoeuvre.time[-1]:.0f} s: the aircraft has an unstable mode, along which the "
+                "sensitivities to the derivatives grow beyond any number; give a shorter duration"
+            )
+        information = FisherInformation(self.names, self.values, matrix)
         return Prediction(manoeuvre, self._record(manoeuvre, flight), information)
 
     def _record(self, manoeuvre: Manoeuvre, flight: SimulatedFlight) -> FlightRecord:

@@ -153,3 +153,10 @@ def test_the_autopilot_is_part_of_the_input(prediction):
 def test_an_airspeed_that_cannot_be_trimmed_is_an_error():
     with pytest.raises(InputError, match="no steady flight at 3 m/s"):
         Predictor(CDRW, RATE, airspeed=3.0)
+
+
+def test_a_flight_too_long_for_an_unstable_aircraft_is_an_error():
+    """The sensitivities grow as exp(t / T) along the unstable mode; their squares leave the range of numbers."""
+    with pytest.raises(InputError, match=r"has an unstable mode, .*; give a shorter duration"):
+        predictor = Predictor(CDRW, 20.0)
+        predictor.predict(parse_manoeuvre("doublet:elevator", CDRW, 20.0, 1000.0))

@@ -67,7 +67,15 @@ def settle(whitening: WhiteningFilter) -> None:
     whitening.unmix = np.zeros((6, 6))
     for group in GROUPS:
         block = np.ix_(group, group)
-        whitening.unmix[block] = np.linalg.inv(np.linalg.cholesky(covariance[block]))
+        whitening.unmix[block] = np.linalg.inv(_cholesky(covariance[block]))
+
+
+def _cholesky(covariance: Array) -> Array:
+    """The Cholesky factor; of the variances alone where rounding leaves no positive definite matrix."""
+    try:
+        return np.asarray(np.linalg.cholesky(covariance))
+    except np.linalg.LinAlgError:
+        return np.diag(np.sqrt(np.diag(covariance)))
 
 
 def scale(whitening: WhiteningFilter) -> Array:

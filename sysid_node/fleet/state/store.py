@@ -19,6 +19,7 @@ import numpy as np
 
 from sysid_node.errors import InputError
 from sysid_node.fleet.outcome import FlightOutcome
+from sysid_node.interruption import indivisible
 
 STATE = "fleet.sqlite"
 #: The state file and what SQLite keeps beside it while it writes.
@@ -85,6 +86,7 @@ class FleetState:
 
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
         self.path, self._read_only = path, read_only
+        self._hashes: dict[tuple[str, str], str] = {}  # of inputs, by path and stamp; not written yet
         with self._errors():
             self._connection = _opened_to_read(path) if read_only else sqlite3.connect(path)
             self._connection.execute("PRAGMA synchronous = FULL")
@@ -93,14 +95,16 @@ class FleetState:
                 raise InputError(f"{path}: of another version of the program; give another folder as --out")
             if read_only:
                 return
-            with self._connection:
+            with self._transaction():
                 self._connection.executescript(_SCHEMA)
                 self._connection.execute(f"PRAGMA user_version = {_VERSION}")
 
     def close(self) -> None:
         """Close the file."""
         with self._errors():
-            self._connection.commit()
+            if self._hashes:
+                with self._transaction():
+                    self._write_hashes()
             self._connection.close()
 
     def fingerprints(self) -> dict[str, str]:
@@ -111,6 +115,8 @@ class FleetState:
 
     def known_hash(self, path: str, stamp: str) -> str | None:
         """The hash of an input that has had this stamp; None where it is not known."""
+        if (path, stamp) in self._hashes:
+            return self._hashes[path, stamp]
         with self._errors():
             row = self._connection.execute("SELECT hash FROM inputs WHERE path = ? AND stamp = ?", (path, stamp))
             found = row.fetchone()
@@ -118,10 +124,8 @@ class FleetState:
 
     def remember_hash(self, path: str, stamp: str, digest: str) -> None:
         """Keep the hash of an input for as long as its stamp stays; it is written with what is next kept."""
-        if self._read_only:
-            return
-        with self._errors():
-            self._connection.execute("REPLACE INTO inputs VALUES (?, ?, ?)", (path, stamp, digest))
+        if not self._read_only:
+            self._hashes[path, stamp] = digest
 
     def keep(
         self,
@@ -151,8 +155,20 @@ class FleetState:
         self._replace((*row, *(None,) * 9, "[]", took, _now()))
 
     def _replace(self, row: tuple[object, ...]) -> None:
-        with self._errors(), self._connection:
+        with self._errors(), self._transaction():
+            self._write_hashes()
             self._connection.execute(f"REPLACE INTO flights VALUES ({', '.join('?' * len(row))})", row)
+
+    def _write_hashes(self) -> None:
+        rows = [(path, stamp, digest) for (path, stamp), digest in self._hashes.items()]
+        self._connection.executemany("REPLACE INTO inputs VALUES (?, ?, ?)", rows)
+        self._hashes.clear()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """A transaction that a signal does not interrupt, so that no journal is left beside the file."""
+        with indivisible(), self._connection:
+            yield
 
     def entries(self) -> Iterator[FlightEntry]:
         """Every flight in the file, one at a time."""

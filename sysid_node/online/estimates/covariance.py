@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.frequency.regression_signals import OFFSET
+from sysid_node.online.regression.mixed_estimation import gained
 from sysid_node.online.state import EstimatorState, SegmentSolution
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def _with_prior(state: EstimatorState, covariance: Array) -> Array:
     """(C, P, P) the covariance after the aircraft file's values are counted in: see ``mixed_estimation``."""
     _, precisions = state.model.prior
     gain = state.equations.unit + covariance * precisions.T[:, None]
-    return np.asarray(np.linalg.solve(gain, covariance))
+    return gained(gain, covariance)
 
 
 def _systematic(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:

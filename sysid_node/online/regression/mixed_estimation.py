@@ -34,5 +34,12 @@ def weighed(
     prior = covariance @ (precisions * values).T[:, :, None]
     # gain form: needs no inverse of a covariance that may be near singular
     gain = equations.unit + covariance * precisions.T[:, None]
-    found = np.linalg.solve(gain, theta.T[..., None] + prior)
-    return np.asarray(found[..., 0].T), np.asarray(np.linalg.solve(gain, covariance))
+    return gained(gain, theta.T[..., None] + prior)[..., 0].T, gained(gain, covariance)
+
+
+def gained(gain: Array, right: Array) -> Array:
+    """``right`` (C, P, K) divided by the gain (C, P, P); by least squares where rounding has made the gain singular."""
+    try:
+        return np.asarray(np.linalg.solve(gain, right))
+    except np.linalg.LinAlgError:  # a covariance 1e16 times the tolerances squared
+        return np.asarray(np.linalg.pinv(gain) @ right)

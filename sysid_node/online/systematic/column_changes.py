@@ -200,12 +200,12 @@ class ColumnChanges:
     def angular_accelerations(self) -> tuple[Index, Index, Array]:
         """Places of the rates' columns and of the moments', and what moments (columns) make of the rates' rates (rows).
 
-        Of those axes whose rate and moment are both there.
+        Of those axes whose rate and moment are both there, and whose moment of inertia is known.
         """
         axes = [
             (rate, moment)
             for rate, moment in zip(RATES, MOMENTS, strict=True)
-            if rate in self._place and math.isfinite(self._momentum[rate][moment])
+            if rate in self._place and 0.0 < self._momentum[rate][moment] < math.inf
         ]
         needed = [[self._momentum[rate][moment] * self.per_column(rate) for rate, _ in axes] for _, moment in axes]
         rates, moments = (np.array([self._place[pair[i]] for pair in axes], np.intp) for i in range(2))

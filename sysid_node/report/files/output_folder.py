@@ -21,6 +21,8 @@ from sysid_node.interruption import indivisible, on_interrupt
 from sysid_node.version import VERSION
 
 STAGE, EARLIER = ".sysid-unfinished", ".sysid-earlier"
+#: After a signal the command may still write into the folder that is being removed, which then remains.
+_ATTEMPTS = 20
 #: The files of which one lists all files of a run, and the key under which it does.
 CONTENTS, WRITTEN = ("summary.json", "gap.json", "aircraft.json", "fleet.json"), "written"
 #: Names of results that earlier versions wrote without a list; ``--force`` removes them.
@@ -181,7 +183,10 @@ def _lock(path: Path) -> int:
 
 def _tidy(path: Path, made: list[Path]) -> None:
     """Remove what is unfinished, and folders that were made and hold nothing."""
-    shutil.rmtree(path / STAGE, ignore_errors=True)
+    for _ in range(_ATTEMPTS):
+        shutil.rmtree(path / STAGE, ignore_errors=True)
+        if not (path / STAGE).exists():
+            break
     _remove_empty(made)
 
 

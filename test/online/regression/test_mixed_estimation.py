@@ -9,7 +9,7 @@ from plant import TRUTH, exact_flight, made_aircraft
 from sysid_node.aircraft.model import Derivative
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import normal_equations
-from sysid_node.online.regression.mixed_estimation import believed_derivatives, weighed
+from sysid_node.online.regression.mixed_estimation import believed_derivatives, gained, weighed
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 
@@ -71,3 +71,11 @@ def test_a_flight_that_shows_little_leaves_the_beliefs() -> None:
         assert belief.tolerance is not None
         assert informed[name].standard_error <= min(plain[name].standard_error * 1.5, belief.tolerance) + 1e-12, name
         assert abs(informed[name].value - belief.value) < 4.0 * belief.tolerance
+
+
+def test_a_gain_that_rounding_made_singular_leaves_finite_numbers() -> None:
+    """Two unknowns of which a flight tells the sum alone: (I + covariance / tolerance^2) loses its identity."""
+    covariance = 1e20 * np.array([[[1.0, -1.0], [-1.0, 1.0]]])
+    gain = covariance + np.eye(2)
+    assert np.linalg.matrix_rank(gain[0]) == 1
+    assert np.abs(gained(gain, covariance)).max() < 2.0

@@ -3,6 +3,7 @@
 The samples of a flight are changed as the imperfection changes them, and identified once more.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -13,7 +14,7 @@ from plant import fly, made_aircraft, multisteps
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from sysid_node.aircraft.model import Aircraft, Sensors
+from sysid_node.aircraft.model import Aircraft, Inertia, Sensors
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
@@ -87,6 +88,18 @@ def test_sensitivities_are_those_of_the_estimator(key):
     difference = (ends[1] - ends[0]) / (2.0 * step)
     size = np.abs(ends[0]) / step * 1e-3 + 0.02 * np.abs(difference).max()
     assert np.all(np.abs(jacobian - difference) < 0.05 * np.abs(difference) + size)
+
+
+def test_moments_of_inertia_may_be_unknown():
+    """The force derivatives of an aircraft file without moments of inertia are those of one with them."""
+    key = "airspeed_scale.error"
+    states = [
+        identified(replace(EXACT, inertia=inertia, stated_tolerances={key: 1e-3}), flown()[1])
+        for inertia in (EXACT.inertia, Inertia(math.nan, math.nan, math.nan))
+    ]
+    known, unknown = (estimate(state).derivatives for state in states)
+    assert unknown["CL_alpha"].value == pytest.approx(known["CL_alpha"].value, rel=1e-2)
+    assert unknown["CL_alpha"].systematic_error == pytest.approx(known["CL_alpha"].systematic_error, rel=0.1)
 
 
 def with_bias(key: str, step: float) -> Aircraft:

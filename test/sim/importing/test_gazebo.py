@@ -260,6 +260,11 @@ def test_masses_servos_and_signs(tmp_path):
             "<sdf><model name='m'><link name='l'/><plugin name='x::LiftDrag'><cla>1 2</cla></plugin></model></sdf>",
             "<cla>: got '1 2', expected 1 numbers",
         ),
+        (
+            "<sdf><model name='m'><link name='l'/><plugin name='x::AdvancedLiftDrag'><AR>0</AR><eff>1</eff></plugin>"
+            "</model></sdf>",
+            "AR of an AdvancedLiftDrag plugin is 0; it must be above zero",
+        ),
         ("<sdf", "not XML"),
         ("<!DOCTYPE a [<!ENTITY b SYSTEM 'file:///etc/passwd'>]><a>&b;</a>", "declares XML entities"),
         ("<!DOCTYPE a [<!ENTITY b 'x'><!ENTITY c '&b;&b;'>]><a>&c;</a>", "declares XML entities"),

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.errors import InputError
 from sysid_node.sim.importing.gazebo.sdf import number_in, vector_in
 
 Array = NDArray[np.float64]
@@ -41,6 +42,11 @@ class AdvancedLiftDrag:
         }
         defaults = {"area": 1.0, "air_density": 1.2041, "alpha_stall": np.pi / 2.0, "Cema_stall": 0.0}
         values |= {name: number_in(plugin, name, value, file) for name, value in defaults.items()}
+        for name in ("AR", "eff", "area"):
+            if not values[name] > 0.0:
+                raise InputError(
+                    f"{file}: {name} of an AdvancedLiftDrag plugin is {values[name]:g}; it must be above zero"
+                )
         joints: dict[str, Array] = {}
         for surface in plugin.findall("control_surface"):
             name = (surface.findtext("name") or "").strip()

@@ -1,0 +1,34 @@
+"""Whitening of the residuals. Truth: the covariance of the innovations that come out, from their own definition."""
+
+import numpy as np
+
+from sysid_node.faults.model import residual_whitening
+from sysid_node.faults.model.residual_whitening import WhiteningFilter
+
+
+def learnt(size: float) -> WhiteningFilter:
+    """A filter that has seen 400 residuals of which the first's are by far the largest."""
+    rng = np.random.default_rng(3)
+    mixed = rng.standard_normal((400, 6)) @ (np.eye(6) + 0.3) * np.array([size, 1.0, 1.0, 1.0, 1.0, 1.0])
+    whitening = WhiteningFilter(keep=1.0)
+    for residual in mixed:
+        residual_whitening.learn(whitening, residual, follows=True)
+    residual_whitening.settle(whitening)
+    return whitening
+
+
+def test_innovations_become_uncorrelated_and_of_unit_variance():
+    whitening = learnt(1.0)
+    covariance = whitening.innovations / whitening.weight
+    for group in residual_whitening.GROUPS:
+        block = np.ix_(group, group)
+        whitened = whitening.unmix[block] @ covariance[block] @ whitening.unmix[block].T
+        assert np.allclose(whitened, np.eye(3), atol=1e-9)
+
+
+def test_where_rounding_leaves_no_positive_definite_matrix_the_variances_remain():
+    whitening = WhiteningFilter(keep=1.0, weight=1.0)
+    whitening.innovations = 1e36 * np.ones((6, 6))  # three residuals that are one
+    residual_whitening.settle(whitening)
+    assert np.isfinite(whitening.unmix).all()
+    assert np.allclose(np.diag(whitening.unmix), 1e-18)
