@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.cli.live.processes import ended_at_last
+from sysid_node.cli.live.processes import started
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.interruption import on_interrupt
@@ -95,10 +94,9 @@ def viewer_beside(aircraft: str, wanted: Path | None, folder: Path) -> Iterator[
     require_rerun()
     command = [sys.executable, "-m", "sysid_node.cli", "view", "--live", "--aircraft", aircraft]
     command += [] if wanted == WINDOW else ["--save", str(wanted)]
-    with (folder / LOG).open("wb") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
-        with ended_at_last(process, signal.SIGTERM):  # SIGINT is ignored by what a shell starts in the background
-            yield
+    # SIGINT is ignored by what a shell starts in the background
+    with (folder / LOG).open("wb") as log, started(command, log, signal.SIGTERM):
+        yield
 
 
 def main() -> None:

@@ -49,7 +49,8 @@ class OutputFolder:
         """
         stage = self.path / STAGE
         try:
-            _empty(stage)
+            with indivisible():  # after a signal nothing is begun any more
+                _empty(stage)
             write(stage)
             _list_contents(stage, self.command)
             with indivisible():
