@@ -40,6 +40,8 @@ SHOWN = {
 }
 #: Name of each picture of the viewer: the run that it shows. Needs requirements/view.txt and Xvfb.
 VIEWED = {"view_run": "failed", "view_gap": "gap"}
+#: The bag that is flown live, over DDS, before the live view; what the view shows is written and then drawn.
+LIVE = "bags/cdrw_multistep"
 FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
@@ -59,12 +61,21 @@ def main() -> None:
         photograph(WORK / run / "report.html", sections, size, PICTURES / f"{name}.png")
     for name, run in VIEWED.items():
         view(WORK / run, PICTURES / f"{name}.png")
+    recording = WORK / "live.rrd"
+    command = [sys.executable, "-m", "sysid_node.cli", "demo", LIVE, "--view", recording, "--out", WORK / "live"]
+    subprocess.run(command, cwd=ROOT, check=True)
+    draw(recording, PICTURES / "view_live.png")
 
 
 def view(run: Path, out: Path) -> None:
-    """A picture of a run in the viewer, as it opens, drawn without a screen."""
+    """A picture of a run in the viewer, as it opens."""
     recording = WORK / f"{run.name}.rrd"
     subprocess.run([sys.executable, "-m", "sysid_node.cli", "view", run, "--save", recording], cwd=ROOT, check=True)
+    draw(recording, out)
+
+
+def draw(recording: Path, out: Path) -> None:
+    """A picture of a recording in the viewer, drawn without a screen."""
     viewer = ["rerun", str(recording), "--screenshot-to", str(out), "--window-size", "1440x810"]
     subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1440x810x24", *viewer], check=True)
     with Image.open(out) as picture:  # the viewer draws two pixels for one
