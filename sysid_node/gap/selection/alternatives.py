@@ -12,12 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, TIME_EFFECTS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor_of_alternatives
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
 from sysid_node.gap.selection.fitted_set import FittedSet
-from sysid_node.gap.selection.replacement import next_step
+from sysid_node.gap.selection.replacement import are_alike, are_as_stated, next_step
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.model.parameters import stated_parameters
 
@@ -80,7 +80,8 @@ def _alternatives(
 ) -> CauseAlternatives:
     """A cause with the likeliest alternatives; where the cause delays the response, with all that delay it.
 
-    What delays the response of one control is compared with what delays that control's, or all controls'.
+    What delays the response of one control is compared with what delays that control's, or all controls'. An effect
+    with a size for each control is compared with the same effect of each control alone: one slow servo is no more.
     Alternatives to a single cause were fitted in the first stage of the forward selection.
     """
     others = [candidate for candidate in chosen.fit.candidates if candidate is not cause]
@@ -94,16 +95,18 @@ def _alternatives(
     screened = fitter.screen_upon([without], rest, lambda share, text: None)
     likely = screened[: THRESHOLDS.search.alternatives] if others else []
     rest_screened = screened[len(likely) :]
-    delays = [
-        pair
-        for pair in rest_screened
-        if {pair.screened.candidate.effect, cause.effect} <= RESPONSE_DELAYS
-        and pair.screened.candidate.scope in ("", cause.scope)
-    ]
-    fitted = fitter.fit_screened([*likely, *delays], lambda share, text: None)
+    close = [pair for pair in rest_screened if _is_close(pair.screened.candidate, cause)]
+    fitted = fitter.fit_screened([*likely, *close], lambda share, text: None)
     by_label = {} if others else {each.added.label: each for each in first if each.added}
     by_label |= {each.added.label: each for _, each in fitted if each.added}
     return CauseAlternatives(cause, without, tuple(by_label.values()))
+
+
+def _is_close(candidate: Candidate, cause: Candidate) -> bool:
+    """Whether a candidate is always fitted in a cause's place."""
+    if candidate.effect == cause.effect:
+        return cause.effect in SHARED and len(candidate.indices) < len(cause.indices)
+    return {candidate.effect, cause.effect} <= RESPONSE_DELAYS and candidate.scope in ("", cause.scope)
 
 
 @dataclass(frozen=True)
@@ -150,10 +153,12 @@ class _Alternative:
         return len(cause.indices) - len(added.indices)
 
     @property
-    def alike(self) -> bool:
-        larger = self.position.chosen if self.fewer > 0 else self.fitted
-        candidate = self.position.measured.candidate if self.fewer > 0 else self.fitted.added
-        return bool(self.fewer) and candidate is not None and _are_alike(larger, candidate)
+    def enough(self) -> bool:
+        pair = (self.position.measured.candidate, self.fitted.added)
+        more, less = pair if self.fewer > 0 else pair[::-1]
+        if not self.fewer or more is None or less is None:
+            return False
+        return _suffices(self.position.chosen if self.fewer > 0 else self.fitted, more, less)
 
     @cached_property
     def lead(self) -> float:
@@ -162,10 +167,22 @@ class _Alternative:
         return predictive + log_bayes_factor_of_alternatives(self.fitted.fit, chosen.fit)
 
 
-def _are_alike(fitted: FittedSet, candidate: Candidate) -> bool:
-    """Whether a candidate's sizes of several controls are the same within 1.96 sigma of the simulator's own errors."""
-    point = fitted.fit.flights[0].point
-    every = stated_parameters(fitted.fit.simulator.layout, candidate.effect).values()
-    sizes = np.array([each.value(point) for each in every if not set(each.entries).isdisjoint(candidate.indices)])
-    spread = 1.96 * THRESHOLDS.validation.discrepancy * np.abs(sizes.mean())
-    return len(sizes) > 1 and bool(np.abs(sizes - sizes.mean()).max() < spread)
+def _suffices(fitted: FittedSet, more: Candidate, less: Candidate) -> bool:
+    """Whether sizes fitted with the variant ``more`` of an effect are those that the simpler variant ``less`` can have.
+
+    One size for all controls suffices where all are the same, one control's where those of the others are the file's.
+    """
+    fit, point = fitted.fit, fitted.fit.flights[0].point
+    every = [
+        each
+        for each in stated_parameters(fit.simulator.layout, more.effect).values()
+        if not set(each.entries).isdisjoint(more.indices)
+    ]
+    if not less.scope:
+        return are_alike([each.value(point) for each in every])
+    rest = [[*each.entries] for each in every if set(each.entries).isdisjoint(less.indices)]
+    sizes, stated = (np.array([at[entries].sum() for entries in rest]) for at in (point, fit.simulator.neutral()))
+    chance = dict(zip(fit.indices, np.sqrt(np.diag(fit.covariance)), strict=False))
+    errors = np.array([max(chance.get(i, 0.0) for i in entries) for entries in rest])
+    period = max(1.0 / flight.model.flight.actuator_rate for flight in fit.flights)
+    return are_as_stated(sizes, stated, errors, period if more.effect in TIME_EFFECTS else 0.0)

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from math import copysign, inf
 from typing import Protocol
 
+import numpy as np
+
+from sysid_node.flight.record import Array
 from sysid_node.gap.selection.acceptance import ComparisonScores, is_accepted
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 
@@ -36,8 +39,8 @@ class AlternativeScores(Protocol):
         """Parameters that it has fewer than the cause, where both are variants of one effect; else 0."""
 
     @property
-    def alike(self) -> bool:
-        """Whether the sizes of the variant with more parameters are the same within what sizes are known to."""
+    def enough(self) -> bool:
+        """Whether the variant with fewer parameters can have the other's sizes, within what sizes are known to."""
 
 
 class PositionScores(Protocol):
@@ -64,7 +67,7 @@ class AlternativeTable:
     comparison: ComparisonScores
     lead: float
     fewer: int = 0
-    alike: bool = False
+    enough: bool = False
 
 
 @dataclass(frozen=True)
@@ -94,12 +97,13 @@ def next_step(
     Of several causes that are not needed, that one is dropped without which flight not fitted is best predicted; a
     single cause is not dropped here. Alternatives whose label is ``barred`` are left out. Of the variants of one effect
     (all controls alike, one, each by itself) the one with fewer parameters takes the place unless the other leads by
-    the penalty of its parameters, and in any case where the sizes of the other are alike: predictions are so precise
-    that a difference of a hundredth, which is the simulator's own error, would decide otherwise.
+    the penalty of its parameters, and in any case where it can have the other's sizes within what these are known to:
+    predictions are so precise that a difference of a hundredth, which is the simulator's own error, would decide
+    otherwise.
     """
 
     def lead(alternative: AlternativeScores) -> float:
-        if alternative.fewer and alternative.alike:
+        if alternative.fewer and alternative.enough:
             return copysign(inf, alternative.fewer)
         return alternative.lead + 0.5 * thresholds.search.penalty * alternative.fewer
 
@@ -116,3 +120,22 @@ def next_step(
     ]
     best = max(accepted, key=lambda pair: lead(pair[0]), default=None)
     return best[1] if best is not None and lead(best[0]) > thresholds.search.lead else None
+
+
+def are_alike(sizes: Sequence[float], thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether sizes of several controls are the same within 1.96 sigma of the simulator's own errors."""
+    mean = float(np.mean(sizes))
+    spread = 1.96 * thresholds.validation.discrepancy * abs(mean)
+    return len(sizes) > 1 and bool(np.abs(np.asarray(sizes) - mean).max() < spread)
+
+
+def are_as_stated(
+    sizes: Array, stated: Array, errors: Array, period: float = 0.0, thresholds: Thresholds = THRESHOLDS
+) -> bool:
+    """Whether sizes (K,) of controls are those that the file states (K,), within 1.96 sigma.
+
+    Sigma is the standard error (K,) and the simulator's own errors together; a time's also that of a stamp, which may
+    be anywhere in the ``period`` (s) between two messages.
+    """
+    own = thresholds.validation.discrepancy * sizes
+    return bool((np.abs(sizes - stated) < 1.96 * np.sqrt(errors**2 + own**2 + period**2 / 12.0)).all())

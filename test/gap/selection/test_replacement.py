@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
-from sysid_node.gap.selection.replacement import AlternativeTable, PositionTable, Step, next_step
+from sysid_node.gap.selection.replacement import (
+    AlternativeTable,
+    PositionTable,
+    Step,
+    are_alike,
+    are_as_stated,
+    next_step,
+)
 from sysid_node.gap.thresholds import THRESHOLDS
 
 NOTHING = RemainingPower(np.zeros(12), np.zeros(12))
@@ -100,3 +107,27 @@ def test_a_variant_whose_sizes_are_alike_gives_way_to_the_simpler_one_and_does_n
     assert next_step([cause(AlternativeTable("all alike", ACCEPTED, -15.0, 2, True))]) == Step(0, 0)
     assert next_step([cause(AlternativeTable("each by itself", ACCEPTED, 15.0, -2, True))]) is None
     assert next_step([cause(AlternativeTable("another effect", ACCEPTED, -15.0, 0, True))]) is None
+
+
+def test_one_slow_servo_is_enough_where_the_others_are_as_the_file_states_them():
+    """By 1.96 sigma of the standard error, of a stamp's (the period over the root of 12) and of 3 % of the size."""
+    errors = np.array([0.001, 0.001])
+    assert are_as_stated(np.array([0.0019, -0.0019]), np.zeros(2), errors)
+    assert not are_as_stated(np.array([0.0, 0.0021]), np.zeros(2), errors)
+    assert are_as_stated(np.array([-0.005, 0.005]), np.zeros(2), errors, period=0.01)
+    assert not are_as_stated(np.array([0.0, 0.0065]), np.zeros(2), errors, period=0.01)
+    assert are_as_stated(np.array([1.05]), np.array([1.0]), np.zeros(1))
+    assert not are_as_stated(np.array([1.07]), np.array([1.0]), np.zeros(1))
+
+
+def test_where_all_servos_are_slow_no_single_one_is_enough():
+    """All alike take the place of each by itself, although one alone is accepted, too."""
+    slow, unlike = np.array([0.08, 0.081, 0.079]), np.array([0.08, 0.12, 0.05])
+    errors = np.full(2, 0.001)
+
+    def variant(label: str, fewer: int, enough: bool) -> AlternativeTable:
+        return AlternativeTable(label, ACCEPTED, -50.0, fewer, enough)
+
+    for sizes, step in ((slow, Step(0, 0)), (unlike, None)):
+        one = are_as_stated(sizes[1:], np.zeros(2), errors, period=0.01)
+        assert next_step([cause(variant("all", 2, are_alike(sizes)), variant("of one", 2, one))]) == step
