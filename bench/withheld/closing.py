@@ -80,8 +80,10 @@ def beside_servos(effects: Effects, servo_lag: float) -> Effects:
     """
     for name, key, sign in _LATE:
         if name in effects:
-            late = max(effects[name][key] + sign * servo_lag, 0.0)
-            return {**effects, name: {**effects[name], key: late}}
+            sizes = effects[name]
+            times = [key] if key in sizes else [control for control in sizes if control != "onset"]
+            late = {time: max(sizes[time] + sign * servo_lag, 0.0) for time in times}
+            return {**effects, name: {**sizes, **late}}
     return effects
 
 

@@ -154,6 +154,8 @@ def test_times_found_hold_the_servos_own() -> None:
     assert beside_servos(both, 0.008) == {**lag, "command_delay": {"delay": 0.0}}
     early = {"actuator_stamp_delay": {"delay": 0.05}, "imu_bias": {"ax": 0.1}}
     assert beside_servos(early, 0.008) == {**early, "actuator_stamp_delay": {"delay": pytest.approx(0.058)}}
+    apart = {"actuator_lag": {"elevator": 0.108, "rudder": 0.005}}
+    assert beside_servos(apart, 0.008) == {"actuator_lag": {"elevator": pytest.approx(0.1), "rudder": 0.0}}
     assert beside_servos({"imu_bias": {"ax": 0.1}}, 0.008) == {"imu_bias": {"ax": 0.1}}
 
 
