@@ -119,8 +119,9 @@ def estimated(aircraft: Aircraft, streams: Streams) -> Estimates:
     """The estimates at the end of a flight."""
     settings = OnlineSettings()
     aligned = align_streams(aircraft, streams, settings.max_gap, "commands")
-    time = aligned.time
-    return run(aircraft, settings, time, aligned.samples, time[-1:], commands_from=aligned.commands_from)[-1]
+    time, interval = aligned.time, streams.actuators.interval
+    samples, begin = aligned.samples, aligned.commands_from
+    return run(aircraft, settings, time, samples, time[-1:], commands_from=begin, command_interval=interval)[-1]
 
 
 class Outcome(NamedTuple):

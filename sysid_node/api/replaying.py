@@ -185,6 +185,8 @@ class _Run:
         if self.alignment is None:
             carried = carried_by(streams, self.settings.actuators)
             self.alignment = PieceAlignment(self.aircraft, self.settings.max_gap, carried)
+            interval = streams.actuators.interval
+            self.state = estimator.init(self.aircraft, self.settings, command_interval=interval)
         self.joints, self.frame_id = streams.actuators.names, streams.imu.frame_id or self.frame_id
         self.spans = joined_spans(self.spans, stamp_spans(streams))
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())

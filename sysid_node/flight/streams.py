@@ -66,12 +66,14 @@ class JointStream(Stream):
     """Joint state messages; NaN where a message lacks a joint that others have.
 
     ``content`` is the ``frame_id`` of the messages in a bag: ``COMMANDS`` or ``COMMAND_FRACTIONS`` where a log of an
-    autopilot was converted, otherwise empty.
+    autopilot was converted, otherwise empty. ``interval`` (s) is that between the commands of a log where lines stand
+    between them; 0 = every message is there as it was recorded.
     """
 
     names: tuple[str, ...]
     positions: Array  # (N, J) rad; throttle 0..1 or N
     content: str = ""
+    interval: float = 0.0
 
 
 @dataclass(frozen=True)

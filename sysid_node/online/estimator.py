@@ -46,13 +46,16 @@ SERVOS_SETTLE = 0.4  # s after which it no longer matters where a servo was at f
 SHORTEST = 1e-4  # s between samples: no sensor is faster, and noise over shorter steps would pass for acceleration
 
 
-def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = False) -> EstimatorState:
+def init(
+    aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = False, command_interval: float = 0.0
+) -> EstimatorState:
     """An estimator that has seen nothing. Raises InputError where the aircraft's model has nothing to estimate.
 
-    ``commanded``: whether the samples' deflections follow from commands (``flight.commanded``).
+    ``commanded``: whether the samples' deflections follow from commands (``flight.commanded``), which a log holds every
+    ``command_interval`` (s; ``JointStream.interval``).
     """
     grid = fourier_transform.lines(*settings.frequencies)
-    model = _model(aircraft, settings, grid.omega, commanded)
+    model = _model(aircraft, settings, grid.omega, commanded, command_interval)
     layout, equations, imperfect = model.layout, model.equations, model.imperfections
     transform = fourier_transform.start(grid, layout.transformed, model.memory, len(layout.instrumented))
     return EstimatorState(
@@ -68,7 +71,9 @@ def init(aircraft: Aircraft, settings: OnlineSettings, *, commanded: bool = Fals
     )
 
 
-def _model(aircraft: Aircraft, settings: OnlineSettings, omega: Array, commanded: bool) -> EstimatorModel:
+def _model(
+    aircraft: Aircraft, settings: OnlineSettings, omega: Array, commanded: bool, command_interval: float
+) -> EstimatorModel:
     """What does not change in flight; ``omega`` are the lines (rad/s). Raises InputError, see ``init``."""
     layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
     unformed = regression_signals.unformed(aircraft)
@@ -92,10 +97,17 @@ def _model(aircraft: Aircraft, settings: OnlineSettings, omega: Array, commanded
         momentum=regression_signals.momentum_gain(aircraft),
         prior=believed_derivatives(aircraft, equations),
         instrument_model=instrument_model(aircraft, layout, omega),
-        imperfections=imperfections(aircraft, layout, commanded=commanded, positions=settings.actuators == "positions"),
+        imperfections=imperfections(
+            aircraft,
+            layout,
+            commanded=commanded,
+            positions=settings.actuators == "positions",
+            command_interval=command_interval,
+        ),
         segment_time=max(segment_time, 4.0 * PIECE),
         memory=memory,
         commanded=commanded,
+        command_interval=command_interval,
         timed=tuple(aircraft.control_symbols.index(symbol) for symbol in layout.timed),
     )
 
@@ -105,7 +117,8 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
 
     What the samples said of the aircraft's instruments remains known.
     """
-    fresh = init(state.model.aircraft, state.model.settings, commanded=True)
+    model = state.model
+    fresh = init(model.aircraft, model.settings, commanded=True, command_interval=model.command_interval)
     fresh.transform.transform.last = time
     fresh.flow, fresh.inputs.begin = state.flow, state.inputs.begin
     if fresh.servo_states is not None:

@@ -30,14 +30,16 @@ def run(
     publish_times: Array,
     progress: Callable[[float], None] | None = None,
     commands_from: int | None = None,
+    command_interval: float = 0.0,
 ) -> list[Estimates]:
     """Estimates as they stand after the first sample at or past each of ``publish_times`` (K,) s, at most one a sample.
 
     ``time`` (N,) s, increasing; ``samples`` (N, M) as ``estimator.update`` takes them. ``progress`` is called with the
     time (s) of the last sample, every ``REPORT_EVERY`` samples and at the end. ``commands_from``: the place of the
-    first sample whose deflections follow from commands; the estimator begins anew there.
+    first sample whose deflections follow from commands; the estimator begins anew there. ``command_interval`` (s) as of
+    ``estimator.init``.
     """
-    return run_to_end(aircraft, settings, time, samples, publish_times, progress, commands_from)[0]
+    return run_to_end(aircraft, settings, time, samples, publish_times, progress, commands_from, command_interval)[0]
 
 
 def run_to_end(
@@ -48,9 +50,10 @@ def run_to_end(
     publish_times: Array,
     progress: Callable[[float], None] | None = None,
     commands_from: int | None = None,
+    command_interval: float = 0.0,
 ) -> tuple[list[Estimates], EstimatorState]:
     """The estimates of ``run``, and the estimator as it stands after the last sample."""
-    state = estimator.init(aircraft, settings)
+    state = estimator.init(aircraft, settings, command_interval=command_interval)
     due = set(np.searchsorted(time, publish_times, side="left").tolist())
     estimates = []
     for i, moment in enumerate(time.tolist()):

@@ -54,6 +54,7 @@ class EstimatorModel:
     segment_time: float  # s
     memory: float  # s, inf = nothing is forgotten
     commanded: bool = False  # whether deflections follow from commands by the aircraft file's servos
+    command_interval: float = 0.0  # s between a log's commands where lines stand between them
     timed: tuple[int, ...] = ()  # places among the aircraft's controls of those in the layout's order
 
 

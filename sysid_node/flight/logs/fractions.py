@@ -58,11 +58,15 @@ def between_commands(joints: JointStream) -> JointStream:
     """Commands at 200 Hz on the lines between a log's samples, where these are fewer.
 
     An autopilot computes commands at 100 to 400 Hz, of which a log holds some. To hold a sample until the next would
-    delay them by half of the log's period on average.
+    delay them by half of the log's period on average. The log's period is kept as the ``interval``: the time of a step
+    is not known within it.
     """
     stamps = joints.arrival.stamp_ns
     steps = np.diff(stamps)
-    if stamps.size < 2 or int(steps.min()) <= 0 or float(np.median(steps)) <= 1e9 / _FINE * 1.5:
+    if stamps.size < 2 or int(steps.min()) <= 0:
+        return joints
+    interval = float(np.median(steps)) / 1e9
+    if interval <= 1.5 / _FINE:
         return joints
     parts = np.minimum(np.ceil(steps * _FINE / 1e9), 1e3).astype(np.int64)
     parts[steps > _LONGEST_BRIDGE_NS] = 1
@@ -72,4 +76,4 @@ def between_commands(joints: JointStream) -> JointStream:
     moved = share[:, np.newaxis] * np.diff(joints.positions, axis=0)[place]
     positions = np.vstack([joints.positions[place] + moved, joints.positions[-1:]])
     arrival = Arrival(fine, fine, np.arange(fine.size, dtype=np.int64))
-    return replace(joints, arrival=arrival, positions=positions)
+    return replace(joints, arrival=arrival, positions=positions, interval=interval)

@@ -15,6 +15,7 @@ from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import weak_instruments
 from sysid_node.online.state import EstimatorState, SegmentSolution
 from sysid_node.online.systematic.budget import Budget
+from sysid_node.online.systematic.estimation import with_steps
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
@@ -56,7 +57,9 @@ def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, Derivat
     assert found is not None
     late, ahead, rows = found.servos.lateness[imperfect.timed].tolist(), found.ahead(imperfect).tolist(), {}
     objections = state.model.vocabulary.texts(validity_basis(state, latest).servos)
-    parts = zip(imperfect.controls, late, found.errors.tolist(), ahead, objections, strict=True)
+    # what is late of the log's steps counts for the derivatives, and is none of the servo's
+    errors = np.hypot(found.errors, imperfect.step_time).tolist() if imperfect.step_time else found.errors.tolist()
+    parts = zip(imperfect.controls, late, errors, ahead, objections, strict=True)
     for name, value, error, early, objection in parts:
         known = "ok" if error <= SERVO_KNOWN else "converging"
         half, words = NORMAL_95 * error, AHEAD if early else objection if objection != "ok" else known
@@ -72,7 +75,8 @@ def _budget(state: EstimatorState, latest: SegmentSolution, current: CurrentSolu
     assert found is not None
     jacobian = found.considered.jacobian
     per_derivative = jacobian.reshape(jacobian.shape[0], -1)[:, table.place]
-    return Budget(table.names, imperfect.keys, per_derivative, found.considered.covariance, current.variances)
+    covariance = with_steps(imperfect, found.considered).covariance
+    return Budget(table.names, imperfect.keys, per_derivative, covariance, current.variances)
 
 
 def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:

@@ -83,6 +83,12 @@ class Considered:
             covariance=self.covariance + np.outer(rest, rest),
         )
 
+    def with_error(self, places: slice, sigma: float) -> Considered:
+        """With an error of 1 ``sigma`` in each of some, independent of all others, that no flight tells."""
+        covariance = self.covariance.copy()
+        covariance[places, places] += sigma**2 * np.eye(len(covariance))[places, places]
+        return replace(self, covariance=covariance)
+
     def widened(self, other: Array, probability: float) -> Considered:
         """With the variance about this estimate of a mixture in which an ``other`` (K,) has a ``probability``."""
         off = other - self.estimate

@@ -109,11 +109,12 @@ def systematic_errors(
     late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
     late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m : S + 2 * m]
     errors = np.sqrt(found.covariance.diagonal()[S : S + m])
+    published = with_steps(imperfect, found)
     return SystematicErrors(
         found,
         correction + found.correction,
-        found.variance(),
-        found.slope_covariance(),
+        published.variance(),
+        published.slope_covariance(),
         ServoModel(servos.lateness + late, servos.curvature + curved, servos.third),
         errors,
         servos,
@@ -123,6 +124,11 @@ def systematic_errors(
         signals.estimate,
         share,
     )
+
+
+def with_steps(imperfect: Imperfections, found: Considered) -> Considered:
+    """With the time of steps: a flight shows the lateness of all of them, and a derivative may rest on a single one."""
+    return found.with_error(imperfect.servos, imperfect.step_time) if imperfect.step_time else found
 
 
 def _base(imperfect: Imperfections, servos: ServoModel) -> Array:

@@ -31,6 +31,8 @@ THIRD = 0.05
 #: Correlation of the lateness of two servos of which the file is silent: an aircraft has servos of one type, and what
 #: their linkages, loads and makes add to one of 50 ms is under half of it.
 OF_ONE_TYPE = 0.8
+#: The longest interval (s) between a log's commands of which nothing more is unknown: 50 Hz, whose stamps scatter.
+COMPLETE = 0.02 / 0.93
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
 SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
@@ -49,6 +51,7 @@ class Imperfections:
     precision: Array  # (K, K) inverse of the correlations before the flight
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
+    step_time: float  # s: 1 sigma of the time of steps in a log's commands
     places: Index  # (W,) where the columns of the signal vector stand among them
 
     @property
@@ -64,14 +67,16 @@ class Imperfections:
 
 
 def imperfections(
-    aircraft: Aircraft, layout: SignalLayout, *, commanded: bool, positions: bool
+    aircraft: Aircraft, layout: SignalLayout, *, commanded: bool, positions: bool, command_interval: float = 0.0
 ) -> Imperfections | None:
     """Those of an aircraft file; None where it states that all is exact.
 
     ``commanded``: the deflections follow from commands by the file's servos. ``positions``: they are known to be
-    measured, so that no servo comes after them. Where neither is known, they may be either.
+    measured, so that no servo comes after them. Where neither is known, they may be either. ``command_interval`` (s) is
+    that between a log's commands where lines stand between them (``JointStream``).
     """
     found = sources(aircraft)
+    unseen = _time_of_steps(command_interval) if commanded else 0.0
     servos = dict(zip(aircraft.control_symbols, servos_of(aircraft)[1:], strict=True))
     names = {control.symbol: name for name, control in aircraft.controls.items()}
     stated = [servo_model.of_servo(servos[symbol]) for symbol in layout.timed]
@@ -82,10 +87,11 @@ def imperfections(
         sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
         if not commanded:
             sigma = math.hypot(sigma, stated[place][0])
-        if sigma > 0.0 and not positions:
+        if math.hypot(sigma, unseen) > 0.0 and not positions:
             if commanded and stated[place][0] == 0.0 and sigma > KNOWN:
                 unknown.append(len(rows))
-            rows.append((name, place, *(_later(stated[place][0], sigma) if commanded else (0.0, sigma))))
+            mean, spread = _later(stated[place][0], sigma) if commanded else (0.0, sigma)
+            rows.append((name, place, mean, math.hypot(spread, unseen)))
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
@@ -101,15 +107,26 @@ def imperfections(
         np.array(unknown, np.intp),
         _precision(len(found), len(rows), unknown),
         columns,
-        math.hypot(*(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
+        math.hypot(unseen, *(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
+        unseen,
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
     )
 
 
 def _later(stated: float, sigma: float) -> tuple[float, float]:
     """What is expected of a servo's lateness beyond the ``stated`` one, and its 1 sigma: no servo is early."""
+    if sigma == 0.0:
+        return 0.0, 0.0
     mean, spread = not_negative(stated, sigma)
     return mean - stated, spread
+
+
+def _time_of_steps(interval: float) -> float:
+    """1 sigma (s) of the time of a step in a log's commands: uniform over the ``interval`` (s) between them.
+
+    Manoeuvres are often made of steps at whole multiples of it, which are then all off by the same time.
+    """
+    return interval / math.sqrt(12.0) if interval > COMPLETE else 0.0
 
 
 def _precision(sources: int, servos: int, unknown: list[int]) -> Array:
@@ -153,7 +170,8 @@ def column_changes(
 def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
     """(K,) 1 sigma of each, and (K,) its mean, both from where the servos are at present taken to be."""
     late, curved = model.lateness[imperfect.timed], model.curvature[imperfect.timed]
-    of_curvature, of_third = CURVATURE * np.maximum(late, SHORTEST) ** 2, THIRD * np.maximum(late, SHORTEST) ** 3
+    size = np.maximum(late, max(SHORTEST, math.sqrt(3.0) * imperfect.step_time))  # a step is off by half an interval
+    of_curvature, of_third = CURVATURE * size**2, THIRD * size**3
     of_sources = [source.sigma for source in imperfect.sources]
     sigmas = np.concatenate([of_sources, imperfect.sigmas, of_curvature, of_third])
     stated, expected = imperfect.applied.lateness[imperfect.timed], imperfect.applied.curvature[imperfect.timed]
