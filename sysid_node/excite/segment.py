@@ -93,7 +93,7 @@ def _time_base(spec: str, segments: Sequence[ManoeuvreSegment], rate: float, dur
     total = end + TAIL if duration is None else duration
     if total < end - 1e-9:
         raise InputError(f"manoeuvre {spec!r}: lasts until {end:g} s, but the flight {total:g} s; fly longer")
-    if not 1.0 <= rate <= 10_000.0 or total * rate > _MOST_SAMPLES:
+    if not 1.0 <= rate <= 10_000.0 or not total * rate <= _MOST_SAMPLES:
         raise InputError(
             f"manoeuvre {spec!r}: {total:g} s at {rate:g} Hz; expected 1 to 10000 Hz, at most {_MOST_SAMPLES} samples"
         )

@@ -118,6 +118,7 @@ MISTAKES = [
     (["--envelope", "alfa=1"], "did you mean 'alpha'?"),
     (["--envelope", "alpha=-1"], "expected alpha=VALUE, above zero"),
     (["--rate", "0.1"], "expected 1 to 10000 Hz"),
+    (["--duration", "nan"], "nan s at"),
     (["--duration", "1"], "but the flight 1 s"),
 ]
 

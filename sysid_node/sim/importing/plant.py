@@ -210,7 +210,8 @@ def _balance(plant: Plant, speed: float) -> LevelFlight | None:
     lower = np.array([-0.25, -0.3, 0.0 if powered else -0.6, *(-x for x in limits)])
     upper = np.array([0.35, 0.3, 1.0 if powered else 0.5, *limits])
     start = np.array([0.06, 0.0, 0.4 if powered else 0.0, *(0.0 for _ in used)])
-    if not np.abs(residual(start)).max() < _LARGEST:  # nor where one is not finite
+    moved = start + 0.01 * (upper - start)
+    if not all(np.abs(residual(point)).max() < _LARGEST for point in (start, moved)):  # nor where one is not finite
         raise InputError(
             f"model {plant.name!r}: at {speed:.1f} m/s its forces are over {_LARGEST:g} weights; correct it"
         )

@@ -60,9 +60,18 @@ def small(folder):
     return path
 
 
-def test_numbers_that_no_aircraft_has_are_one_line(tmp_path):
+@pytest.mark.parametrize(
+    ("was", "is_now"),
+    [
+        ("<cp>-0.6 0 0.02</cp>", "<cp>0 0 1e300</cp>"),
+        (">-0.4</control_joint_rad_to_cl>", ">1e300</control_joint_rad_to_cl>"),
+    ],
+)
+def test_numbers_that_no_aircraft_has_are_one_line(tmp_path, was, is_now):
     path = small(tmp_path)
-    path.write_text(path.read_text().replace("<cp>-0.6 0 0.02</cp>", "<cp>0 0 1e300</cp>"))
+    text = path.read_text()
+    assert was in text
+    path.write_text(text.replace(was, is_now))
     with pytest.raises(InputError, match="its forces are over"):
         read_gazebo(path, None)
 
