@@ -93,7 +93,7 @@ class Predictor:
     def predict(self, manoeuvre: Manoeuvre) -> Prediction:
         """The prediction for a manoeuvre from trim. Raises InputError where a control saturates or it diverges."""
         flight = self._fly(self.commands(manoeuvre))
-        with np.errstate(over="ignore", invalid="ignore"):  # said below
+        with np.errstate(over="ignore", invalid="ignore"):  # a matrix that is not finite is refused below
             matrix = eliminate(fisher(self._slopes(np.asarray(flight.commands)), self._sigma), len(self.names))
         if not np.isfinite(matrix).all():
             raise InputError(

@@ -1,4 +1,4 @@
-"""Words for the causes of a gap and what its report compares: channels, parameters with their units, percentages."""
+"""Words for causes and for what the pages of gaps and fleets compare: channels, parameters with units, percentages."""
 
 from __future__ import annotations
 
