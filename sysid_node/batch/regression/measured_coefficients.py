@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -131,8 +132,20 @@ def at_cg(aircraft: Aircraft, record: FlightRecord) -> dict[str, Array]:
 
 def _accelerated(record: FlightRecord) -> dict[str, Array]:
     """The record's signals and angular accelerations ``pdot`` ..."""
-    rates = {f"{name}dot": differentiate(record.time, record[name]) for name in "pqr"}
+    time = record.time.tobytes()
+    rates = {f"{name}dot": _derivative(time, record[name].tobytes()) for name in "pqr"}
     return {name: values.copy() for name, values in record.columns.items()} | rates
+
+
+@lru_cache(maxsize=6)
+def _derivative(time: bytes, signal: bytes) -> Array:
+    """The derivative (N,) of a signal, read-only; both as bytes of float64.
+
+    The last ones are kept: systematic errors are found from dozens of variants of a flight, and few change its rates.
+    """
+    slope = differentiate(np.frombuffer(time), np.frombuffer(signal))
+    slope.flags.writeable = False
+    return slope
 
 
 def _moved_to_cg(aircraft: Aircraft, signals: Mapping[str, Array]) -> dict[str, Array]:
