@@ -5,6 +5,8 @@ monitor finds can be compared with what was put in.
 """
 
 from collections.abc import Callable
+from copy import deepcopy
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ NOISE = np.array([0.008, 0.002, 0.002, 0.0015, 0.0015, 0.0008])  # of the coeffi
 MEMORY = 0.6  # share of the noise that the next block keeps
 SIZES = {"alpha": 0.03, "beta": 0.03, "p": 0.03, "q": 0.004, "r": 0.01, "de": 0.03, "da": 0.03, "dr": 0.05}
 TRIM = {"alpha": 0.07, "de": 0.01}
+ONSET = 32.0  # s of sound flight before a fault
 Truth = Callable[[dict[str, float], dict[str, float]], tuple[dict[str, float], dict[str, float]]]
 
 
@@ -77,3 +80,15 @@ def fly(state: MonitorState, maker: Maker, seconds: float, truth: Truth = sound,
     for _ in range(round(seconds / PERIOD)):
         monitor.take(state, maker.block(truth, rough))
     return state.fault
+
+
+@cache
+def _flown(seed: int) -> tuple[MonitorState, Maker]:
+    state, maker = monitored(seed)
+    fly(state, maker, ONSET)
+    return state, maker
+
+
+def flown(seed: int) -> tuple[MonitorState, Maker]:
+    """``monitored`` after ``ONSET`` seconds of sound flight, which are flown once for each seed."""
+    return deepcopy(_flown(seed), {id(AIRCRAFT): AIRCRAFT})  # the aircraft is not copied: it never changes
