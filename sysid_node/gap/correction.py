@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from sysid_node.aircraft.model import DELAY_EFFECTS, Aircraft, UncertainValue
-from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import parameters, stated_by
-from sysid_node.sim.model.parameters import stated_parameters
 
 
 def corrected_aircraft(found: Diagnosis) -> Aircraft:
-    """The aircraft file as the flights have it: derivatives and stated effects within their tolerances, and the causes.
+    """The aircraft file with the derivatives as the flights have them within their tolerances, and with the causes.
 
     The causes are among its ``effects`` (a late topic among its ``delays``), each with its standard error as tolerance.
+    All other effects of the file stay as it states them: what was fitted of them within their tolerances is no finding.
     """
     fit = found.attribution.corrected
-    names, point = fit.simulator.names, fit.flights[0].point
-    file = fit.simulator.neutral()
+    change = dict(zip(fit.simulator.names, (fit.flights[0].point - fit.simulator.neutral()).tolist(), strict=True))
     derivatives = {
-        n: replace(d, value=float(d.value + _change(names, point, file, f"derivative_error.{n}")))
-        for n, d in found.aircraft.derivatives.items()
+        n: replace(d, value=d.value + change[f"derivative_error.{n}"]) for n, d in found.aircraft.derivatives.items()
     }
-    effects = _believed_effects(found)
+    effects = dict(found.aircraft.effects)
     delays = dict(found.aircraft.delays)
     for effect, values in cause_values(found).items():
         topic = next((t for t, name in DELAY_EFFECTS.items() if name == effect), None)
@@ -33,26 +29,6 @@ def corrected_aircraft(found: Diagnosis) -> Aircraft:
         else:
             effects[effect] = {**effects.get(effect, {}), **values}
     return replace(found.aircraft, derivatives=derivatives, effects=effects, delays=delays)
-
-
-def _change(names: Sequence[str], point: Array, file: Array, name: str) -> float:
-    """How far the fit moved a parameter from the aircraft file's value."""
-    index = names.index(name)
-    return float(point[index] - file[index])
-
-
-def _believed_effects(found: Diagnosis) -> dict[str, dict[str, UncertainValue]]:
-    """The file's effects, with the values that the fit gives those that are nuisance parameters."""
-    fit = found.attribution.corrected
-    moved, point = set(fit.nuisances.indices), fit.flights[0].point
-    effects: dict[str, dict[str, UncertainValue]] = {}
-    for effect, values in found.aircraft.effects.items():
-        stated = stated_parameters(fit.simulator.layout, effect)
-        effects[effect] = {
-            name: replace(item, value=stated[name].value(point)) if moved & set(stated[name].entries) else item
-            for name, item in values.items()
-        }
-    return effects
 
 
 def cause_values(found: Diagnosis) -> dict[str, dict[str, UncertainValue]]:

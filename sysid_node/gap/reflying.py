@@ -11,7 +11,7 @@ from typing import Any
 from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import gap_content
-from sysid_node.gap.estimation.predictive_density import transferred_parameters
+from sysid_node.gap.validation.handed_on import corrected_parameters
 from sysid_node.gap.validation.reflown import Reflown, reflown
 from sysid_node.sim.correcting.user_simulator import UserSimulator
 
@@ -34,7 +34,7 @@ def fly_in(simulator: UserSimulator, found: Diagnosis) -> InSimulator:
     with tempfile.TemporaryDirectory(prefix="sysid-") as place:
         model = simulator.corrected(corrected_aircraft(found), Path(place))
         before, after = simulator.flyers(model, found.models[0].simulator.rate)
-    thetas = [transferred_parameters(found.attribution.corrected, each) for each in found.models]
+    thetas = [corrected_parameters(found.attribution.corrected, each) for each in found.models]
     return InSimulator(simulator, reflown(found.models, thetas, before, after), model.left_out)
 
 

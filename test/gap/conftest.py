@@ -2,14 +2,18 @@
 
 import fcntl
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from gap_flights import fly
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, UncertainValue
 from sysid_node.gap.diagnose import Diagnosis, diagnose
+from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.nuisances import nuisances_of
+from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -57,6 +61,22 @@ def lagging(aircraft: Aircraft, plain_model: ResidualModel) -> Diagnosis:
     """
     effects = {"actuator_lag": {"time_constant": 0.08}, "derivative_error": WRONG_DERIVATIVES}
     return diagnose(aircraft, [fly(aircraft, effects, seed=5)], [fly(aircraft, effects, seed=6)])
+
+
+@pytest.fixture(scope="session")
+def servos_fitted(aircraft: Aircraft, lagging: Diagnosis) -> Diagnosis:
+    """A diagnosis without causes whose fit is where a flight has the file's servos and Cm_alpha, within tolerances."""
+    filed = replace(aircraft, effects={"actuator_lag": {"elevator": UncertainValue(0.03, 0.01)}})
+    flown = {"actuator_lag": {"elevator": 0.04}, "derivative_error": {"Cm_alpha": 0.015}}
+    model = residual_model_of(Simulator(filed, 50.0), fly(filed, flown, seed=7))
+    fit = unfitted([model], nuisances_of(filed, model)).at([model.simulator.vector(flown)])
+    attribution = replace(lagging.attribution, corrected=fit, causes=())
+    file, fitted = (
+        Evidence(np.zeros(1), (FlightEvidence.throughout(model, point),))
+        for point in (model.simulator.neutral(), fit.flights[0].point)
+    )
+    check = replace(lagging.check, base=file, final=fitted, explanation=attribution)
+    return replace(lagging, aircraft=filed, attribution=attribution, check=check)
 
 
 @pytest.fixture

@@ -15,10 +15,10 @@ import numpy as np
 from sysid_node.gap.estimation.nuisances import HeldOutFlight
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, held_out_evidence
 from sysid_node.gap.instruments.liml import liml_estimate
-from sysid_node.gap.instruments.overidentification import OveridentificationTest
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation import spectral_error
+from sysid_node.gap.validation.handed_on import of_corrected_file
 from sysid_node.gap.validation.kfold import kfold_evidence
 from sysid_node.gap.validation.simulation_error import simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
@@ -41,6 +41,7 @@ class Check:
     base: Evidence
     final: Evidence
     gap: Gap  # of forces, moments and kinematics by frequency
+    explanation: Attribution
     weather_suffices: bool = False  # whether weather and the sensors' noise account for the whole gap
     fitted: Check | None = None  # with fitted derivatives, where the explanation keeps the file's
 
@@ -59,14 +60,23 @@ class Check:
         """The gap by each measure: by frequency, then of short simulated flights where there are any."""
         return [self.gap, *([self.simulation_gap] if self.simulation_gap else [])]
 
-    @property
-    def stated(self) -> tuple[Gap, Gap | None]:
-        """The gap by frequency and that of short flights, as they are reported.
+    @cached_property
+    def corrected(self) -> Evidence:
+        """The evidence of the whole explanation as the corrected file holds it."""
+        return of_corrected_file(self.final, self.explanation.corrected)
 
+    @cached_property
+    def stated(self) -> tuple[Gap, Gap | None]:
+        """The gap by frequency and that of short flights, as they are reported: ``after`` is the corrected file's.
+
+        What the file's effects would close beyond that, were they moved within their tolerances, is in ``tolerances``.
         The causes were judged beside the file's derivatives where the explanation keeps these. What derivatives fitted
         within their tolerances would leave is stated nevertheless.
         """
         spectral, simulated = self.gap, self.simulation_gap
+        if self.corrected is not self.final:
+            spectral = self._gap_of(self.base, self.corrected)
+            simulated = simulation_gap(self.base, self.corrected)
         if self.fitted is None:
             return spectral, simulated
         by_fitted = self.fitted.simulation_gap
@@ -74,11 +84,15 @@ class Check:
             simulated = spectral_error.within_tolerances(simulated, by_fitted)
         return spectral_error.within_tolerances(spectral, self.fitted.gap), simulated
 
-    def as_in_file(self, left: OveridentificationTest) -> Check:
+    def as_in_file(self) -> Check:
         """The validation of the aircraft file as it is, on the same flights."""
         filed = (FlightEvidence.throughout(model, model.simulator.neutral()) for model in self.models)
         base = replace(self.base, flights=tuple(filed))
-        return replace(self, base=base, final=base, gap=spectral_error.gap_of(base, base, left))
+        return replace(self, base=base, final=base, gap=self._gap_of(base, base))
+
+    def _gap_of(self, base: Evidence, after: Evidence) -> Gap:
+        """The gap by frequency of other evidence of the same flights."""
+        return spectral_error.gap_of(base, after, self.explanation.structure_left)
 
 
 def check(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> Check:
@@ -91,7 +105,8 @@ def check(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> Check:
         final = kfold_evidence(
             attribution.chosen.evidence, attribution.corrected, filed=attribution.keeps_file_derivatives
         )
-    return Check(base, final, spectral_error.gap_of(base, final, attribution.structure_left))
+    gap = spectral_error.gap_of(base, final, attribution.structure_left)
+    return Check(base, final, gap, attribution)
 
 
 def validate(
@@ -110,11 +125,11 @@ def validate(
     taken = shares_taken_away(checked.simulation_gap.per_channel) if checked.simulation_gap else ()
     if weather.result() and not (attribution.causes and causes_exceed_weather(taken)):
         attribution = attribution.without_causes().as_in_file()
-        of_file = validator(attribution).as_in_file(attribution.structure_left)
+        of_file = validator(attribution).as_in_file()
         return attribution, replace(of_file, weather_suffices=True)
     if not attribution.causes and file_predicts_better(checked.gaps):
         attribution = attribution.as_in_file()
-        checked = checked.as_in_file(attribution.structure_left)
+        checked = checked.as_in_file()
     return attribution, checked
 
 
@@ -161,7 +176,7 @@ def _with_better_derivatives(
     clearly = not file_predicts_better(checked.gaps)
     if not file_derivatives_suit_causes(found.gaps, checked.gaps, clearly=clearly):
         return attribution, checked
-    filed = found.as_in_file(attribution.structure_left)
+    filed = found.as_in_file()
     gap = spectral_error.gap_of(filed.base, found.final, attribution.structure_left)
     base = replace(filed.base, scores=found.base.scores)
     return explanation, replace(found, base=base, gap=gap, fitted=checked)

@@ -19,9 +19,9 @@ from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 from sysid_node.gap.short_flights.readings import can_be_simulated
+from sysid_node.gap.validation.handed_on import corrected_parameters
 from sysid_node.gap.validation.simulation_error import side_by_side
 from sysid_node.report.files.run_tables import read_columns
 from sysid_node.sim.model.layout import OUTPUTS
@@ -70,10 +70,10 @@ def read_flights(path: Path) -> list[FlightTable]:
 
 def _columns(found: Diagnosis, place: int) -> dict[str, Array]:
     """The columns of one flight."""
-    model, evidence = found.models[place], found.check.final.flights[place]
+    model, evidence = found.models[place], found.check.corrected.flights[place]
     record = model.record
     readings = _readings(model, evidence.points)
-    point = transferred_parameters(found.attribution.corrected, model)
+    point = corrected_parameters(found.attribution.corrected, model)
     coefficients = len(COEFFICIENTS)
     left = [(model.series - model.predicted_series(p))[:, :coefficients] for p in (model.simulator.neutral(), point)]
     left = [np.where(model.axes[:coefficients], values, np.nan) for values in left]

@@ -9,9 +9,9 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.estimation.predictive_density import transferred_parameters
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.short_flights.readings import READINGS, WINDOW, can_be_simulated
+from sysid_node.gap.validation.handed_on import corrected_parameters
 from sysid_node.gap.validation.simulation_error import SideBySide, side_by_side
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, PALE, VERMILION, Figure
@@ -55,7 +55,7 @@ def flight_figures(found: Diagnosis) -> list[tuple[str, Figure]]:
 def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved; each short flight is a separate line."""
     place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
-    record = side_by_side(found.models[place], found.check.final.flights[place].points)
+    record = side_by_side(found.models[place], found.check.corrected.flights[place].points)
     return short_flight_panels(record, list(found.size.per_channel))
 
 
@@ -88,7 +88,7 @@ def _worst(time: Array, error: Array) -> slice:
 def _coefficients(found: Diagnosis) -> list[Panel]:
     """Coefficients without constant offsets, and readings whose errors the correction reduces."""
     model, gaps = found.models[0], found.gap.per_channel
-    point = transferred_parameters(found.attribution.corrected, model)
+    point = corrected_parameters(found.attribution.corrected, model)
     before, after = model.predicted_series(model.simulator.neutral()), model.predicted_series(point)
     mended = [name in gaps and gaps[name]["before"] > _MENDED * gaps[name]["after"] for name in CHANNELS]
     force = np.arange(len(CHANNELS)) < len(COEFFICIENTS)
