@@ -158,6 +158,8 @@ def fit_everywhere(looked_at) -> Callable[..., None]:
 #: Memory of a test worker from which freed memory is given back, and from which compiled programs are let go, MB. The
 #: programs of the gap for two lengths of flights take 700 MB beside 400 MB of libraries; to load them again costs 4 s.
 _LARGE, _TOO_LARGE = 1000.0, 1300.0
+#: Memory from which they are let go even within a module: a worker must stay below 2 GB.
+_FAR_TOO_LARGE = 1450.0
 
 
 @pytest.fixture(autouse=True)
@@ -169,14 +171,22 @@ def returned_memory() -> Iterator[None]:
     yield
     if _resident_megabytes() > _LARGE:
         _trim()
+    if _resident_megabytes() > _FAR_TOO_LARGE:
+        _forget_programs()
 
 
 @pytest.fixture(scope="module", autouse=True)
 def bounded_memory() -> Iterator[None]:
     """Frees JAX's compiled programs after a module of tests whose worker has grown large; the disk keeps them."""
     yield
+    if _resident_megabytes() > _TOO_LARGE:
+        _forget_programs()
+
+
+def _forget_programs() -> None:
+    """Let JAX's compiled programs go, and give their memory back."""
     jax = sys.modules.get("jax")
-    if jax is not None and _resident_megabytes() > _TOO_LARGE:
+    if jax is not None:
         jax.clear_caches()
         gc.collect()
         _trim()

@@ -76,14 +76,16 @@ def test_a_late_imu_cannot_be_told_from_late_commands(aircraft, make_flight) -> 
     assert "a servo of second order that is as late)" in paragraph(found)
 
 
-def test_a_lag_is_named_without_vanes(aircraft, make_flight) -> None:
+def test_a_lag_is_named_without_vanes_and_thrust(aircraft, make_flight) -> None:
+    """Nobody metered the thrust either, so that forward motion is left out."""
     effects = {"actuator_lag": {"time_constant": 0.1}}
-    flights = [blind(aircraft, make_flight(effects, seed=seed), "alpha", "beta") for seed in (5, 6)]
+    flights = [blind(aircraft, make_flight(effects, seed=s), "alpha", "beta", "thrust") for s in (5, 6)]
     found = diagnose(aircraft, flights[:1], flights[1:])
     (cause,) = document(found)["causes"]
     assert found.verdict == "explained" and cause["effect"] == "actuator_lag"
     assert cause["parameters"]["elevator"][0] == pytest.approx(0.1, rel=0.15)
-    assert not {"alpha", "beta"} & found.size.per_channel.keys()
+    assert not {"alpha", "beta", "ax", "V"} & found.size.per_channel.keys()
+    assert "Thrust was not recorded" in paragraph(found)
 
 
 def test_tolerances_are_no_gap_without_vanes(aircraft, make_flight) -> None:
