@@ -28,7 +28,7 @@ def predictor():
 
 @pytest.fixture(scope="module")
 def optimum(predictor):
-    return optimise(predictor, parse_segments(START, CDRW), DURATION, evaluations=60)
+    return optimise(predictor, parse_segments(START, CDRW), DURATION, evaluations=40)
 
 
 def test_the_error_falls(optimum):

@@ -2,6 +2,7 @@
 
 import json
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from sysid_msgs.msg import AirData
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.flight.streams import Streams
+from sysid_node.flight.streams import Arrival, Streams
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.replay import run
@@ -35,6 +36,24 @@ def expected_of(streams: Streams) -> dict[int, Estimates]:
     results = run(aircraft, settings, aligned.time, aligned.samples, due)
     stamps = aligned.stamps[np.searchsorted(aligned.time, due)]
     return dict(zip(stamps.tolist(), results, strict=True))
+
+
+def beginning(streams: Streams, seconds: float) -> Streams:
+    """The first seconds of a flight."""
+    end = int(streams.imu.arrival.stamp_ns[0]) + round(seconds * 1e9)
+    imu, air, joints = (stream.arrival for stream in (streams.imu, streams.air_data, streams.actuators))
+    kept = [one.stamp_ns < end for one in (imu, air, joints)]
+    arrivals = [
+        Arrival(one.stamp_ns[k], one.log_ns[k], one.order[k]) for one, k in zip((imu, air, joints), kept, strict=True)
+    ]
+    return replace(
+        streams,
+        imu=replace(
+            streams.imu, arrival=arrivals[0], values=streams.imu.values[kept[0]], attitude=streams.imu.attitude[kept[0]]
+        ),
+        air_data=replace(streams.air_data, arrival=arrivals[1], values=streams.air_data.values[kept[1]]),
+        actuators=replace(streams.actuators, arrival=arrivals[2], positions=streams.actuators.positions[kept[2]]),
+    )
 
 
 def words(probe: Probe, part: str, level: int) -> str:
@@ -59,14 +78,16 @@ def bits(estimates: Estimates) -> list[object]:
     return [[x.hex() if isinstance(x, float) else x for x in row] for row in derivatives + fits]
 
 
-def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Probe) -> None:
-    bag = ROOT / "bags" / "cdrw_multistep"
+def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Probe, tmp_path: Path) -> None:
+    bag = tmp_path / "multistep"
+    write_streams(bag, beginning(read_streams(ROOT / "bags" / "cdrw_multistep"), 24.0))
     expected = expected_of(read_streams(bag))
-    assert len(expected) == 1200
+    assert len(expected) == pytest.approx(480, abs=2)
     with identifier():
         probe.await_identifier()
         probe.play(bag)
-        probe.spin(0.3)
+        last = max(expected)  # a busy machine may still be computing when the player has finished
+        probe.until(lambda: any(stamp_ns(message.header.stamp) == last for message in probe.estimates[-100:]), 60.0)
     # the first at each stamp: the last is said again once it is stale
     heard = {stamp_ns(message.header.stamp): message for message in reversed(probe.estimates)}
     assert heard.keys() >= expected.keys()
@@ -74,10 +95,10 @@ def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Prob
         assert bits(estimates_from_message(heard[stamp], START_NS)) == bits(estimates), f"at {estimates.time} s"
     assert any(d.valid for d in heard[max(expected)].derivatives), "the comparison must have something to compare"
     assert {heard[stamp].header.frame_id for stamp in expected} == {"imu"}
-    last = probe.gaps[-1]
-    assert (last.aircraft, last.header.frame_id) == ("cdrw", "imu")
-    assert set(last.coefficients) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
-    assert all(value > 0.0 for value in (*last.gap_std, *last.noise_std, *last.relative))
+    gap = probe.gaps[-1]
+    assert (gap.aircraft, gap.header.frame_id) == ("cdrw", "imu")
+    assert set(gap.coefficients) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
+    assert all(value > 0.0 for value in (*gap.gap_std, *gap.noise_std, *gap.relative))
 
 
 def test_forward_right_down_messages_give_the_same(probe: Probe, bag: Path, tmp_path: Path) -> None:
