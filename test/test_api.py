@@ -13,6 +13,7 @@ import sysid_node
 from sysid_node import identify, load, replay
 from sysid_node.cli.main import main
 from sysid_node.errors import InputError
+from sysid_node.flight.csv import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
 BAG = ROOT / "bags" / "cdrw_multistep"
@@ -30,8 +31,16 @@ def replayed(flight):
 
 
 @pytest.fixture(scope="module")
-def identified(flight):
-    return identify(flight, "equation_error")
+def log(flight, tmp_path_factory):
+    """The first 24 s of the flight, as CSV."""
+    path = tmp_path_factory.mktemp("log") / "short.csv"
+    write_csv(path, flight.record.between(0.0, 24.0))
+    return path
+
+
+@pytest.fixture(scope="module")
+def identified(log):
+    return identify(load(log, "cdrw"), "equation_error")
 
 
 def test_the_package_alone_is_light():
@@ -76,17 +85,18 @@ def test_a_figure_shows_the_estimates_as_the_report_does(replayed):
 
 
 def test_an_identification_draws_its_fit_by_default(identified):
-    assert identified.derivatives["Cm_alpha"].value == pytest.approx(TRUTH["Cm_alpha"], rel=0.03)
+    found = identified.derivatives["Cm_alpha"]
+    assert found.valid and found.lower <= TRUTH["Cm_alpha"] <= found.upper
     assert [trace.name for trace in identified.plot().data[:2]] == ["measured", "model"]
     with pytest.raises(InputError, match="this result has fit, excitation, residuals"):
         identified.plot("estimates")
 
 
 @pytest.mark.parametrize("command", [["replay", "--set", "publish_rate=1"], ["identify", "--method", "equation_error"]])
-def test_what_is_saved_is_what_the_command_writes(command, replayed, identified, tmp_path):
+def test_what_is_saved_is_what_the_command_writes(command, log, identified, tmp_path):
     name, *options = command
-    assert main([name, str(BAG), "--aircraft", "cdrw", "--out", str(tmp_path / "command"), "--quiet", *options]) == 0
-    result = {"replay": replayed, "identify": identified}[name]
+    assert main([name, str(log), "--aircraft", "cdrw", "--out", str(tmp_path / "command"), "--quiet", *options]) == 0
+    result = identified if name == "identify" else replay(load(log, "cdrw"), {"publish_rate": 1.0})
     assert result.save(tmp_path / "api") == tmp_path / "api" / "report.html"
     written, expected = ({p.name for p in (tmp_path / f).iterdir()} for f in ("api", "command"))
     assert written == expected

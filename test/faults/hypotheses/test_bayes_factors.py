@@ -67,10 +67,10 @@ def test_what_is_not_worth_it_could_not_have_reached_it() -> None:
 
 
 def test_without_a_fault_factors_are_as_rare_as_markov_says() -> None:
-    """20,000 stretches: a factor beyond K comes with a chance of at most 1/K; the score's mean square is 1."""
+    """10,000 stretches: a factor beyond K comes with a chance of at most 1/K; the score's mean square is 1."""
     root = np.linalg.cholesky(P)
     factors, squares = [], []
-    for _ in range(20_000):
+    for _ in range(10_000):
         y = X @ (root @ RANDOM.standard_normal(D)) + RANDOM.standard_normal(N)
         J, v = bayes_factors.marginal(*summed(y), np.linalg.inv(P))
         factors.append([weighed.factor for weighed in bayes_factors.weigh_each(J, v, SHIFTS, np.ones(3))])
