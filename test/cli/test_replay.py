@@ -207,7 +207,7 @@ def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp
     """The elevator of this flight loses half its effect at 30 s; the report drawn anew from the files says the same."""
     out = tmp_path / "out"
     bag = Path(__file__).resolve().parents[2] / "bags" / "cdrw_failed_elevator"
-    assert main(["replay", str(bag), "--aircraft", "cdrw", "--out", str(out)]) == 0
+    assert main(["replay", str(bag), "--aircraft", "cdrw", "--out", str(out), "--set", "publish_rate=4"]) == 0
     terminal = capsys.readouterr().out
     assert "faults: elevator: loss of effectiveness, " in terminal
     assert "-0.2303 since 30.0 s" in terminal  # half of the file's Cm_de
