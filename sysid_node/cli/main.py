@@ -22,6 +22,7 @@ from typing import NoReturn
 
 from sysid_node.errors import InputError, InputWarning, ModelWarning
 from sysid_node.interruption import end_on_signals
+from sysid_node.linear_algebra import one_thread_for_linear_algebra
 from sysid_node.suggestion import did_you_mean
 
 COMMANDS = {
@@ -102,7 +103,7 @@ def _leave(code: int) -> NoReturn:
 
 
 def _run(command: str, arguments: Sequence[str]) -> int:
-    _one_thread_for_linear_algebra()  # before the command's module imports NumPy
+    one_thread_for_linear_algebra()  # before the command's module imports NumPy
     parser = build_parser(command)
     args = parser.parse_args(arguments)
     if not args.command:
@@ -174,16 +175,6 @@ def build_parser(command: str) -> Parser:
         else:
             commands.add_parser(name, help=meaning)
     return parser
-
-
-def _one_thread_for_linear_algebra() -> None:
-    """Let BLAS use one thread unless the environment says otherwise; it reads this when NumPy is imported.
-
-    The matrices are small, and the commands use threads themselves: with the threads of BLAS in addition,
-    ``sysid gap`` took 34 s instead of 29 s.
-    """
-    if "OMP_NUM_THREADS" not in os.environ:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _show_warning(command: str, usual: Callable[..., None], later: list[str]) -> Callable[..., None]:

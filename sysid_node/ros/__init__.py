@@ -11,6 +11,8 @@ import sys
 import threading
 from pathlib import Path
 
+from sysid_node.linear_algebra import one_thread_for_linear_algebra
+
 PROGRAMS = frozenset(
     {
         *("adapter", "adaptive_controller", "exciter", "fault_monitor"),
@@ -44,4 +46,5 @@ def end_quietly() -> None:
 
 
 end_quietly()
+one_thread_for_linear_algebra()  # before a node's module imports NumPy
 find_packages()

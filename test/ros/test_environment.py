@@ -1,6 +1,7 @@
 """A virtual environment that holds ROS packages names itself to ROS, and nothing else is touched."""
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -22,3 +23,11 @@ def test_environment(
     monkeypatch.setattr(os, "environ", {} if before is None else {"AMENT_PREFIX_PATH": before})
     find_packages()
     assert os.environ.get("AMENT_PREFIX_PATH") == (str(tmp_path) if after == "prefix" else after)
+
+
+def test_linear_algebra_of_the_nodes_has_one_thread() -> None:
+    """Every node's module comes after this package, so the variable is there when NumPy is imported."""
+    program = "import os, sys, sysid_node.ros; print(os.environ.get('OPENBLAS_NUM_THREADS'), 'numpy' in sys.modules)"
+    kept = {k: v for k, v in os.environ.items() if k not in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", program], env=kept, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", "False"]
