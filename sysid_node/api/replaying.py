@@ -170,13 +170,12 @@ class _Run:
         self.alignment: PieceAlignment | None = None
         self.state, self.schedule = estimator.init(aircraft, settings), schedule.Schedule(publish_rate)
         self.monitor = RecordedMonitor(aircraft, FaultSettings()) if judge_faults else None
-        self.history, self.stamps, self.latest = EstimatesLog(), array("q"), Estimates(math.nan, {}, {})
+        self.history, self.stamps = EstimatesLog(), array("q")
         self.samples, self.flow = RecordedSamples(aircraft, flight.imu_messages), flow_angle_filter.init(aircraft)
         self.attitudes = _Attitudes()
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
-        self.due = math.nan  # s, time of the last sample at which estimates fell due
         self.done = 0  # messages
 
     def take(self, piece: FlightPiece) -> None:
@@ -207,10 +206,8 @@ class _Run:
                 self.commands_from = moment
             estimator.update(self.state, moment, sample)
             if schedule.due(self.schedule, moment, wait):
-                self.latest = estimate(self.state, moment)
-                self.history.append(self.latest)
+                self.history.append(estimate(self.state, moment))
                 self.stamps.append(int(aligned.stamps[i]))
-                self.due = moment
             if i % REPORT_EVERY == 0:
                 self._tell(i / aligned.time.size, count, _IDENTIFYING)
 
@@ -237,6 +234,7 @@ class _Run:
         if last is None:
             Actuation.of(self.aircraft).require(self.joints, self.flight.name)
             raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected))
+        estimator.complete(self.state)  # no further sample gives it time
         self.progress(1.0, _FAULTS[2] if self.monitor is not None else _IDENTIFYING[2])
         return Replay(
             aircraft=self.aircraft,
@@ -248,7 +246,7 @@ class _Run:
             rejected=counts_by_reason(rejected),
             history=self.history,
             stamps_ns=np.array(self.stamps, np.int64),
-            final=self.latest if self.due == last else estimate(self.state, last),
+            final=estimate(self.state, last),
             frame_id=self.frame_id,
             truth=truth,
             covariance=estimate_covariance(self.state),

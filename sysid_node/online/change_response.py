@@ -8,30 +8,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.changes import detection
-from sysid_node.online.changes.detection import PIECE, ChangeMonitor, ChangeTests
+from sysid_node.online.changes.detection import PIECE, ChangeDecision, ChangeMonitor, ChangeTests
 from sysid_node.online.changes.excited_segments import no_excited_segments, remember
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.segment_information import fading, information_of, measure_noise_moments, no_information
 from sysid_node.online.segment_solution import solve_with_servos
-from sysid_node.online.state import EstimatorState, current_lines
+from sysid_node.online.state import EstimatorState, Steps, current_lines
 
 Array = NDArray[np.float64]
 
 
-def look_for_changes(state: EstimatorState, lines: Array) -> None:
+def look_for_changes(state: EstimatorState) -> ChangeDecision | None:
+    """What the last pieces say, up to the one that has just ended; None where changes are not looked for."""
+    if not state.model.settings.detect_changes:
+        return None
+    return detection.examine(_change_tests(state), state.changes.excited)
+
+
+def respond(state: EstimatorState, lines: Array, finding: ChangeDecision) -> Steps[None]:
     """Begin anew where the aircraft has changed; note which coefficients the model does not explain."""
     model, now, latest = state.model, state.transform.last, state.latest
     if latest is None:
         return
-    finding = detection.examine(_change_tests(state), state.changes.excited)
     tests = replace(latest.tests, outside_model=finding.outside_model, contradicted=finding.contradicted)
     unchanged = np.array_equal(tests.outside_model, latest.tests.outside_model) and np.array_equal(
         tests.contradicted, latest.tests.contradicted
     )
     if state.flow.active or not unchanged:
-        state.latest = replace(latest, tests=tests, basis=None)
+        state.latest = replace(latest, tests=tests, basis=None, published=None)
     if finding.since is not None:
-        _begin_anew(state, lines, finding.since)
+        yield from _begin_anew(state, lines, finding.since)
     if finding.changed:
         state.changes.changed_at, state.changes.excited = now, no_excited_segments(model.equations, model.layout)
 
@@ -54,7 +60,7 @@ def memory(state: EstimatorState) -> float:
     return state.model.settings.window or state.model.memory
 
 
-def _begin_anew(state: EstimatorState, lines: Array, since: float) -> None:
+def _begin_anew(state: EstimatorState, lines: Array, since: float) -> Steps[None]:
     """Forget all that was before ``since`` (s), the start of a piece."""
     now, segment, pieces = state.transform.last, state.segment, state.changes.monitor.pieces
     measure_noise_moments(state)
@@ -70,7 +76,7 @@ def _begin_anew(state: EstimatorState, lines: Array, since: float) -> None:
     segment.start, segment.first_servos = since, None  # what was before is taken out with the servos as they were
     sampled_transform.take_out(state.transform, before)
     state.changes.monitor = ChangeMonitor()
-    solve_with_servos(state, current_lines(state))
+    yield from solve_with_servos(state, current_lines(state))
 
 
 def _remember_before(state: EstimatorState, lines: Array, end: float) -> None:

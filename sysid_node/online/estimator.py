@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
+from sysid_node.online import pending_renewal
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes.detection import PIECE
 from sysid_node.online.changes.excited_segments import no_excited_segments
@@ -211,9 +212,18 @@ def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float
 
 
 def renew_early(state: EstimatorState) -> None:
-    """Renew what is due to be renewed before the next sample; whoever has time before that comes may do it then."""
+    """Make the steps of a renewal that are due before the next sample, or begin one that is.
+
+    Whoever has time before that sample comes may do it then.
+    """
+    pending_renewal.make_steps(state)
     if reach(state.transform.last, state.inputs.step) >= state.segment.renew_at:
         renew(state)
+
+
+def complete(state: EstimatorState) -> None:
+    """Make all steps that are left of a renewal, as no further sample gives them time."""
+    pending_renewal.complete(state)
 
 
 def first_counted(time: float, settings: OnlineSettings) -> float:
@@ -247,6 +257,8 @@ def leave_out(state: EstimatorState, column: int) -> None:
 
 def interrupt(state: EstimatorState) -> None:
     """Finish the segment at the last sample: nothing is known of the time until the next."""
+    complete(state)
     if state.transform.last > state.segment.start:
         renew(state, last=True)
+        complete(state)
     state.changes.monitor.pieces.clear()

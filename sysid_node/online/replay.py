@@ -52,7 +52,7 @@ def run_to_end(
     commands_from: int | None = None,
     command_interval: float = 0.0,
 ) -> tuple[list[Estimates], EstimatorState]:
-    """The estimates of ``run``, and the estimator as it stands after the last sample."""
+    """The estimates of ``run``, and the estimator as it stands after the last sample, with nothing left to renew."""
     state = estimator.init(aircraft, settings, command_interval=command_interval)
     due = set(np.searchsorted(time, publish_times, side="left").tolist())
     estimates = []
@@ -64,4 +64,5 @@ def run_to_end(
             estimates.append(estimate(state, moment))
         if progress is not None and ((i + 1) % REPORT_EVERY == 0 or i + 1 == time.size):
             progress(moment)
+    estimator.complete(state)
     return estimates, state

@@ -25,9 +25,9 @@ from sysid_node.online.regression.least_squares import InstrumentStrength, Solut
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.selection_bias import selection_bias_factors
 from sysid_node.online.segment_information import finished_information, line_seconds, measure_segment
-from sysid_node.online.state import EstimatorState, FinishedSums, InstrumentChecks, ModelTests, SegmentSolution
+from sysid_node.online.state import EstimatorState, FinishedSums, InstrumentChecks, ModelTests, SegmentSolution, Steps
 from sysid_node.online.systematic import estimation
-from sysid_node.online.systematic.corrected_signals import CorrectedSignals, corrected_signals
+from sysid_node.online.systematic.corrected_signals import CorrectedSignals, corrected_signals, known_changes
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import line_model, remapped
 from sysid_node.online.systematic.servo_model import ServoModel
@@ -37,44 +37,46 @@ SERVO_STEPS = 2  # changes of the servos at most in one renewal
 TIMING_EVERY = 4  # pieces at least between tests for actuator lag, which changes more slowly still
 
 
-def solve_with_servos(state: EstimatorState, lines: Array) -> None:
+def solve_with_servos(state: EstimatorState, lines: Array) -> Steps[None]:
     """Renew the estimates from the transform's ``lines``, again if the estimated servo times have notably changed."""
     imperfect = state.model.imperfections
     for changes in range(SERVO_STEPS + 1):
-        found = look(state, lines)
+        found = yield from look(state, lines)
         if imperfect is None or state.servos is None or found is None or changes == SERVO_STEPS:
             return
         step = estimation.notable_step(imperfect, state.servos, found)
         if step is None:
             return
-        move_servos(state, step)
+        yield from move_servos(state, step)
 
 
-def look(state: EstimatorState, lines: Array) -> SystematicErrors | None:
+def look(state: EstimatorState, lines: Array) -> Steps[SystematicErrors | None]:
     """Renew the estimates; return the systematic errors if they are new.
 
     Where the signals, as the last step corrects them, fit worse than before it, a shorter step is made from there.
     """
     before = last_errors(state)
-    solve_all(state, measure_segment(state, lines))
+    yield from solve_all(state, measure_segment(state, lines))
     found = last_errors(state)
     if found is None or found.pieces != state.finished.pieces:
         return None
     if before is None or not estimation.worse(found, before):
         return found
-    again = _look_at(state, lines, before, 0.5 * before.share)
+    again = yield from _look_at(state, lines, before, 0.5 * before.share)
     if again is not None and not estimation.worse(found, again):
-        return _look_at(state, lines, found, 1.0)
+        return (yield from _look_at(state, lines, found, 1.0))
     return again
 
 
-def _look_at(state: EstimatorState, lines: Array, place: SystematicErrors, share: float) -> SystematicErrors | None:
+def _look_at(
+    state: EstimatorState, lines: Array, place: SystematicErrors, share: float
+) -> Steps[SystematicErrors | None]:
     """Renew the estimates with the signals corrected as in ``place``, and a ``share`` of the step from there."""
     if state.servos is not place.lines:
-        move_servos(state, place.lines)
+        yield from move_servos(state, place.lines)
     else:
         state.changes.monitor.references.pop()
-    solve_all(state, measure_segment(state, lines), (place, share))
+    yield from solve_all(state, measure_segment(state, lines), (place, share))
     return last_errors(state)
 
 
@@ -83,7 +85,7 @@ def last_errors(state: EstimatorState) -> SystematicErrors | None:
     return state.latest.systematic if state.latest is not None else None
 
 
-def move_servos(state: EstimatorState, servos: ServoModel) -> None:
+def move_servos(state: EstimatorState, servos: ServoModel) -> Steps[None]:
     """Replace the controls by what these servos make of them, in all that is remembered."""
     model, imperfect, before = state.model, state.model.imperfections, state.servos
     assert imperfect is not None
@@ -97,26 +99,36 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> None:
         state.segment.first_impulses = state.segment.first_servos.impulses(model.spectrum.omega, first.time)
     state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied)
 
-    def moved(info: Information) -> Information:
-        return remapped(info, imperfect, model.instrument_model, model.layout, model.spectrum, (before, servos))
-
-    state.finished.information = moved(state.finished.information)
-    state.finished.in_window = deque((end, moved(info)) for end, info in state.finished.in_window)
+    finished, found = state.finished, {}
+    kept = [info for _, info in finished.in_window]
+    kept += [segment.information for excited in state.changes.excited for segment in excited.segments]
+    for info in (finished.information, *kept):
+        if id(info) not in found:  # blocks of equations keep the same segments
+            yield
+            found[id(info)] = remapped(
+                info, imperfect, model.instrument_model, model.layout, model.spectrum, (before, servos)
+            )
+    finished.in_window = deque((end, found[id(info)]) for end, info in finished.in_window)
+    finished.information = found[id(finished.information)]
     for excited in state.changes.excited:
-        segments = [replace(segment, information=moved(segment.information)) for segment in excited.segments]
+        segments = [replace(segment, information=found[id(segment.information)]) for segment in excited.segments]
         excited.segments = deque(segments, maxlen=excited.segments.maxlen)
     # earlier estimates used other columns, so they are no reference any more
     state.changes.monitor.references.clear()
 
 
-def solve_all(state: EstimatorState, segment: Information, at: tuple[SystematicErrors, float] | None = None) -> None:
+def solve_all(
+    state: EstimatorState, segment: Information, at: tuple[SystematicErrors, float] | None = None
+) -> Steps[None]:
     """Renew the estimates and their covariances, from the finished segments and the present one.
 
     ``at``: where the signals are to be corrected, and the share of the step that is then made; else by the last step.
     """
+    yield
     past = finished_information(state)
     recorded = past + segment
-    signals = _corrected_signals(state, recorded, at[0].taken_out if at else None)
+    signals = yield from _corrected_signals(state, recorded, at[0].taken_out if at else None)
+    yield
     total = recorded if signals is None else signals.information
     gram = total.grams.sum(axis=0)
     strength, solution, compensation = _solve(state, total, gram)
@@ -135,7 +147,9 @@ def solve_all(state: EstimatorState, segment: Information, at: tuple[SystematicE
     before = ReferenceEstimates(now, equations, solution, spread)
     if signals is not None:
         before = _with_recorded_signals(equations, recorded, compensation, now)
+        yield
     systematic = _systematic(state, signals, solution, before.solution, spread, inflation, at[1] if at else None)
+    yield
     if systematic is not None:
         variance = variance * systematic.considered.misfit[:, None]
     scale = before.solution.residual[:, None] * np.abs(before.solution.inverse.diagonal())
@@ -169,7 +183,7 @@ def _with_recorded_signals(
 
 def _corrected_signals(
     state: EstimatorState, recorded: Information, taken_out: Array | None
-) -> CorrectedSignals | None:
+) -> Steps[CorrectedSignals | None]:
     """The signals without what is so far estimated of the imperfections, or is to be taken out; None where none are."""
     model, servos = state.model, state.servos
     if model.imperfections is None or servos is None:
@@ -177,16 +191,17 @@ def _corrected_signals(
     last = last_errors(state)
     if taken_out is None:
         taken_out = estimation.to_take_out(model.imperfections, servos, last)
+    known = known_changes(model.imperfections, model.aircraft, model.layout, recorded, last.known if last else None)
+    if last is None or known is not last.known:
+        yield
     return corrected_signals(
         model.imperfections,
-        model.aircraft,
-        model.layout,
         model.spectrum,
         model.instrument_model,
         servos,
         recorded,
         taken_out,
-        last.known if last is not None else None,
+        known,
     )
 
 

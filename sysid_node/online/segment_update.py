@@ -1,7 +1,8 @@
 """The update of the slowly changing quantities, after every piece of half a second of data.
 
 With every piece the estimator tests for changes of the aircraft. It also measures the present segment and solves for
-the estimates and their covariances: with every piece at first, and less often as data accumulate.
+the estimates and their covariances: with every piece at first, and less often as data accumulate. That takes long, so
+it is done in steps, with the samples that follow (``pending_renewal``).
 """
 
 from __future__ import annotations
@@ -11,39 +12,53 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import servo_search
-from sysid_node.online.change_response import look_for_changes, memory
+from sysid_node.online import pending_renewal, servo_search
+from sysid_node.online.change_response import look_for_changes, memory, respond
 from sysid_node.online.changes import detection
-from sysid_node.online.changes.detection import PIECE
+from sysid_node.online.changes.detection import PIECE, ChangeDecision
 from sysid_node.online.changes.excited_segments import remember
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
+from sysid_node.online.regression.information import edges, products
 from sysid_node.online.segment_information import fading, measure_noise_moments
 from sysid_node.online.segment_solution import solve_with_servos
-from sysid_node.online.state import EstimatorState, FinishedSums, current_lines
+from sysid_node.online.state import EstimatorState, FinishedSums, Steps, completed, current_lines
 
 Array = NDArray[np.float64]
 SOON = 20.0  # s of data up to which everything is renewed with every piece, then with every second, third, ...
 
 
 def renew(state: EstimatorState, last: bool = False) -> None:
-    """Renew the slowly changing quantities (``SegmentSolution``); ``last`` also finishes the segment."""
+    """Begin to renew the slowly changing quantities (``SegmentSolution``); ``last`` also finishes the segment."""
+    pending_renewal.complete(state)
     time = state.transform.last
     lines = current_lines(state)
     _append_piece(state, lines)
     last = last or reach(time, state.inputs.step) - state.segment.start >= state.model.segment_time
     state.finished.pieces += 1
+    finding = look_for_changes(state)
     if last or _is_due(state):
         measure_noise_moments(state)
-        solve_with_servos(state, lines)
-        servo_search.try_another_solution(state)
-    if state.model.settings.detect_changes:
-        look_for_changes(state, lines)
+        pending_renewal.begin(state, last, lambda copy: _solved(copy, lines, last, finding))
+    elif finding is not None:
+        completed(respond(state, lines, finding))
     if last:
-        finish_segment(state)
+        _count_segment_in(state, lines)
         begin_segment(state)
     else:
         _begin_piece(state)
+    if finding is not None and finding.since is not None:
+        pending_renewal.complete(state)  # nobody shall wait for the news that the aircraft has changed
+
+
+def _solved(state: EstimatorState, lines: Array, last: bool, finding: ChangeDecision | None) -> Steps[None]:
+    """Solve for everything again, respond to changes, and finish the segment if this is its ``last`` renewal."""
+    yield from solve_with_servos(state, lines)
+    yield from servo_search.try_another_solution(state)
+    if finding is not None:
+        yield from respond(state, lines, finding)
+    if last:
+        finish_segment(state)
 
 
 def reach(time: Any, step: Any) -> Any:
@@ -55,6 +70,15 @@ def _is_due(state: EstimatorState) -> bool:
     """Whether it is time to solve for everything again."""
     latest = state.latest
     return latest is None or state.finished.pieces - latest.pieces >= 1 + int(latest.total.energy / SOON)
+
+
+def _count_segment_in(state: EstimatorState, lines: Array) -> None:
+    """Let estimates hold the segment that ends here until its last renewal is done."""
+    latest, model = state.latest, state.model
+    if latest is not None:
+        impulses = edges(model.spectrum.omega, state.segment.start, state.transform.last) if state.servos else None
+        gram = latest.finished.gram + products(lines.copy(), state.line_model, impulses)
+        latest.finished = FinishedSums(gram, latest.finished.integrals + lines[-1])
 
 
 def begin_segment(state: EstimatorState) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 
 from sysid_node.online import segment_solution
 from sysid_node.online.segment_information import measure_segment
-from sysid_node.online.state import ChangeWatch, EstimatorState, current_lines
+from sysid_node.online.state import ChangeWatch, EstimatorState, Steps, current_lines
 from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.consider import Fit
 from sysid_node.online.systematic.estimation import Rival, SystematicErrors
@@ -39,7 +39,7 @@ FREEDOM = 4.0  # degrees of freedom of Student's distribution of a derivative ab
 NEGLIGIBLE = 1e-3  # probability
 
 
-def try_another_solution(state: EstimatorState) -> None:
+def try_another_solution(state: EstimatorState) -> Steps[None]:
     """Try one, if it is time, and take it if it is more probable."""
     imperfect, found, search = state.model.imperfections, segment_solution.last_errors(state), state.search
     if imperfect is None or found is None or not imperfect.unknown.size or found.pieces != state.finished.pieces:
@@ -50,7 +50,7 @@ def try_another_solution(state: EstimatorState) -> None:
     control = int(imperfect.unknown[search.tried % imperfect.unknown.size])
     search.energy, search.tried = energy, search.tried + 1
     search.rivals.pop(control, None)
-    trial = _elsewhere(state, found, control)
+    trial = yield from _elsewhere(state, found, control)
     other = segment_solution.last_errors(trial) if trial is not None else None
     if trial is None or other is None or not _apart(other, found, int(imperfect.timed[control]), control):
         return
@@ -58,40 +58,41 @@ def try_another_solution(state: EstimatorState) -> None:
         trial, other, other.considered.fit, found.considered.fit
     )
     if less > SURELY:
-        _take(state, trial)
+        yield from _take(state, trial)
         other, less = found, -less
     probability = 1.0 / (1.0 + math.exp(min(-0.5 * min(less, 0.0), 100.0)))
     if probability > NEGLIGIBLE:
         search.rivals[control] = Rival.of(imperfect, other, probability)
 
 
-def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> EstimatorState | None:
+def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> Steps[EstimatorState | None]:
     """A copy that has gone on from where one servo is on the other side; None where nothing is found there."""
     imperfect = state.model.imperfections
     assert imperfect is not None and state.servos is not None
-    place, late = int(imperfect.timed[control]), state.servos.lateness
+    at, late = int(imperfect.timed[control]), state.servos.lateness
     trial = replace(
         state,
         segment=replace(state.segment),
         finished=replace(state.finished, in_window=deque()),
         changes=ChangeWatch([]),
     )
-    there = LATE if late[place] < BETWEEN else 0.0
+    there = LATE if late[at] < BETWEEN else 0.0
     by_lateness, by_curvature = np.zeros(late.size), np.zeros(late.size)
-    by_lateness[place] = there - late[place]
-    by_curvature[place] = CURVATURE * there**2 - state.servos.curvature[place]
+    by_lateness[at] = there - late[at]
+    by_curvature[at] = CURVATURE * there**2 - state.servos.curvature[at]
     servos = state.servos.moved(by_lateness, by_curvature)
     taken_out = estimation.to_take_out(imperfect, servos, found)
     for order in range(3):
         taken_out[imperfect.servos.start + order * len(imperfect.controls) + control] = 0.0
     for left in reversed(range(STEPS)):
-        segment_solution.move_servos(trial, servos)
+        yield from segment_solution.move_servos(trial, servos)
         lines = current_lines(trial)
         if left == STEPS - 1:
-            segment_solution.solve_all(trial, measure_segment(trial, lines), (replace(found, taken_out=taken_out), 1.0))
+            place = replace(found, taken_out=taken_out)
+            yield from segment_solution.solve_all(trial, measure_segment(trial, lines), (place, 1.0))
             there_found = segment_solution.last_errors(trial)
         else:
-            there_found = segment_solution.look(trial, lines)
+            there_found = yield from segment_solution.look(trial, lines)
         if there_found is None or trial.servos is None:
             return None
         step = estimation.notable_step(imperfect, trial.servos, there_found)
@@ -120,11 +121,11 @@ def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, oth
     return own.cost(replace(own, noise=noise)) + float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
 
 
-def _take(state: EstimatorState, trial: EstimatorState) -> None:
+def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:
     """Go on with the solution of a ``trial``."""
     assert trial.servos is not None
     if trial.servos is not state.servos:
-        segment_solution.move_servos(state, trial.servos)
+        yield from segment_solution.move_servos(state, trial.servos)
     state.equations, state.latest = trial.equations, trial.latest
     state.segment.information = trial.segment.information
     state.changes.monitor.references.append(trial.changes.monitor.references[-1])

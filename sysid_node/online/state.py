@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Generator
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +28,17 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.weak_instruments import AndersonRubinBounds
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.status import Codes, Vocabulary
+from sysid_node.online.systematic.budget import Budget
 from sysid_node.online.systematic.estimation import Rival, SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections
 from sysid_node.online.systematic.servo_model import ServoModel
 from sysid_node.online.systematic.servo_states import ServoStates
+from sysid_node.online.types import DerivativeEstimate
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+#: Work in steps of a millisecond or two, between which it waits; its result is the generator's.
+Steps = Generator[None, None, T]
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,14 @@ class ValidityBasis:
     floor: Array  # (P,) energy under which a regressor is buried in noise
     fits: Array  # (C, 3) what ``FitQuality`` says besides R squared
     servos: Codes  # (m,) what is said against every derivative of a control whose servo is estimated, 0 = not of every
+
+
+@dataclass(frozen=True)
+class PublishedImperfections:
+    """What is published of imperfections, which does not change between renewals."""
+
+    servos: dict[str, DerivativeEstimate]  # how late each control follows what is recorded of it, s
+    budget: Budget  # but for the derivatives' statistical variances
 
 
 @dataclass
@@ -118,6 +133,7 @@ class SegmentSolution:
     tests: ModelTests
     systematic: SystematicErrors | None = None  # None where all is exact
     basis: ValidityBasis | None = None  # made when first wanted
+    published: PublishedImperfections | None = None  # made when first wanted
 
 
 @dataclass
@@ -193,6 +209,32 @@ class EstimatorState:
     segment: PresentSegment = field(default_factory=PresentSegment)
     search: ServoSearch = field(default_factory=ServoSearch)
     latest: SegmentSolution | None = None
+    pending: PendingRenewal | None = None
+
+
+@dataclass
+class PendingRenewal:
+    """A renewal that is under way, on a copy of the estimator (``pending_renewal``). Times in s."""
+
+    copy: EstimatorState  # as it stood at ``time``, but for what the steps so far have renewed
+    steps: Steps[None]  # what is left of the work
+    time: float
+    lines: Array  # (2F + 1, W) the transform then, without the servos' impulses
+    whole: bool  # whether its segment ended with it
+    begin: float  # of its segment
+    samples: int  # in its segment
+    intervals: float  # s: sum of the air data's intervals in its segment
+    stepped_at: float  # time of the last sample after which a step was made
+
+
+def completed(steps: Steps[T]) -> T:
+    """The result of work in steps, all of which are made at once."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            result: T = end.value
+            return result
 
 
 def current_lines(state: EstimatorState) -> Array:

@@ -13,7 +13,7 @@ from sysid_node.online.estimates.rows import DerivativeRows, FitRows
 from sysid_node.online.estimates.validity import judge, validity_basis
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import weak_instruments
-from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.state import EstimatorState, PublishedImperfections, SegmentSolution
 from sysid_node.online.systematic.budget import Budget
 from sysid_node.online.systematic.estimation import with_steps
 from sysid_node.online.types import DerivativeEstimate, Estimates
@@ -47,7 +47,10 @@ def estimate_of(state: EstimatorState, current: CurrentSolution | None, now: flo
     fits = FitRows(model.equations.coefficients, _fits(state, latest, current))
     if latest.systematic is None:
         return Estimates(time, derivatives, fits)
-    return Estimates(time, derivatives, fits, _servos(state, latest), _budget(state, latest, current))
+    if latest.published is None:
+        latest.published = PublishedImperfections(_servos(state, latest), _budget(state, latest))
+    published = latest.published
+    return Estimates(time, derivatives, fits, published.servos, published.budget.with_variances(current.variances))
 
 
 def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, DerivativeEstimate]:
@@ -68,15 +71,15 @@ def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, Derivat
     return rows
 
 
-def _budget(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Budget:
-    """What the variance of each derivative is made of."""
+def _budget(state: EstimatorState, latest: SegmentSolution) -> Budget:
+    """What the variance of each derivative is made of, but for its statistical part."""
     imperfect, found, table = state.model.imperfections, latest.systematic, state.model.table
     assert imperfect is not None
     assert found is not None
     jacobian = found.considered.jacobian
     per_derivative = jacobian.reshape(jacobian.shape[0], -1)[:, table.place]
     covariance = with_steps(imperfect, found.considered).covariance
-    return Budget(table.names, imperfect.keys, per_derivative, covariance, current.variances)
+    return Budget(table.names, imperfect.keys, per_derivative, covariance, np.zeros(len(table.names)))
 
 
 def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:

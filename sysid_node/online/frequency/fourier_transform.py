@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,6 +229,11 @@ def take_out(state: Transform, part: Array) -> None:
     """Forget a ``part`` (R, width + room) of the transform up to the last sample, such as all up to some time ago."""
     state.done = current(state) - part
     state.begin, state.count = state.last, 0
+
+
+def at_rest(state: Transform) -> Transform:
+    """A copy that stays at the last sample: none is to be added."""
+    return replace(state, done=current(state), begin=state.last, count=0)
 
 
 def current(state: Transform) -> Array:

@@ -104,6 +104,12 @@ def current(state: SampledTransform) -> Array:
     return fourier_transform.current(state.transform)
 
 
+def at_rest(state: SampledTransform) -> SampledTransform:
+    """A copy that stays at the last sample: none is to be added."""
+    transform_waiting(state)
+    return SampledTransform(state.layout, fourier_transform.at_rest(state.transform), [state.last])
+
+
 def take_out(state: SampledTransform, part: Array) -> None:
     """Forget a ``part`` (R, width) of the transform up to the last sample."""
     transform_waiting(state)

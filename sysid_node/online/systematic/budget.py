@@ -30,6 +30,10 @@ class Budget(Mapping[str, Mapping[str, float]]):
     covariance: Array  # (K, K) of the sources
     statistical: Array  # (D,) variances
 
+    def with_variances(self, statistical: Array) -> Budget:
+        """The budget with other ``statistical`` variances (D,)."""
+        return Budget(self.names, self.sources, self.jacobian, self.covariance, statistical)
+
     def __getitem__(self, name: str) -> Mapping[str, float]:
         d = self.names.index(name)
         gradient, total = self.covariance @ self.jacobian[:, d], float(self.statistical[d])

@@ -133,9 +133,9 @@ def consider(
     v[place] = misfits(equations, solution.theta)
     X, V = signals.matrix[place[equations.columns]], signals.matrix[place[equations.instruments]]
     residuals = v.T @ signals.matrix  # (C, 2N)
-    Z = np.tensordot(v.T, changes.signals, axes=(1, 1)) * sigmas[:, None]  # (C, K, 2N), per tolerance
-    _accelerations_by_moments(Z, changes)
-    _predict_outputs(Z, equations, solution, place, signals)
+    # (C, K, 2N), per tolerance; one product for each imperfection, as the changes need not be copied for it
+    Z = np.ascontiguousarray((v.T @ changes.signals).swapaxes(0, 1)) * sigmas[:, None]
+    Z = Z @ _by_the_model(equations, solution, place, signals)
     across = V @ gram
     normal = (across @ X.T) * equations.same_block
     inverse = np.linalg.inv(normal + equations.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
@@ -168,8 +168,18 @@ def consider(
     )
 
 
+def _by_the_model(
+    equations: NormalEquations, solution: Solution, place: NDArray[np.intp], signals: CorrectedSignals
+) -> Array:
+    """(2N, 2N) what each signal and rate is by the model: products with it hold no residual."""
+    found = np.eye(signals.gram.shape[0])
+    _accelerations_by_moments(found, signals.changes)
+    _predict_outputs(found, equations, solution, place, signals)
+    return found
+
+
 def _accelerations_by_moments(Z: Array, changes: ColumnChanges) -> None:
-    """Put moments in the place of the angular accelerations in Z (C, K, 2N), which hold the moments' residuals."""
+    """Put moments in the place of the angular accelerations in Z (..., 2N), which hold the moments' residuals."""
     rates, moments, per_moment = changes.angular_accelerations()
     accelerations = changes.rates[rates]
     Z[..., moments] += Z[..., accelerations] @ per_moment
@@ -179,7 +189,7 @@ def _accelerations_by_moments(Z: Array, changes: ColumnChanges) -> None:
 def _predict_outputs(
     Z: Array, equations: NormalEquations, solution: Solution, place: NDArray[np.intp], signals: CorrectedSignals
 ) -> None:
-    """Put the model's prediction in the place of the coefficients themselves in Z (C, K, 2N), and of their rates.
+    """Put the model's prediction in the place of the coefficients themselves in Z (..., 2N), and of their rates.
 
     A coefficient holds the noise of its own residual. Z would then correlate with the residuals, and an imperfection
     that makes all coefficients smaller would seem to explain noise. The model predicts the corrected coefficient by the

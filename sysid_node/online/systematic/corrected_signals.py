@@ -67,30 +67,34 @@ def _offsets(equations: NormalEquations, solution: Solution, means: Array) -> Ar
     return np.asarray(means[equations.outputs] - means[equations.columns] @ solution.theta)
 
 
+def known_changes(
+    imperfect: Imperfections, aircraft: Aircraft, layout: SignalLayout, total: Information, last: Known | None
+) -> Known:
+    """What one unit of each imperfection changes: the ``last`` known, or by new means where data have grown by much."""
+    if last is not None and last[0] <= total.energy <= GROWTH * last[0]:
+        return last
+    return total.energy, column_changes(imperfect, aircraft, layout, total.integrals)
+
+
 def corrected_signals(
     imperfect: Imperfections,
-    aircraft: Aircraft,
-    layout: SignalLayout,
     lines: Spectrum,
     model: InstrumentModel | None,
     servos: ServoModel,
     total: Information,
     estimate: Array,
-    known: Known | None,
+    known: Known,
 ) -> CorrectedSignals:
     """From the information ``total``, whose lines have the controls where these ``servos`` have them.
 
-    ``model`` is that of the instruments, ``estimate`` (K,) what is to be taken out, ``known`` the changes that were
-    last used: they depend on the flight's means alone.
+    ``model`` is that of the instruments, ``estimate`` (K,) what is to be taken out, ``known`` from ``known_changes``.
     """
+    changes, layout = known[1], known[1].layout
     model = model or InstrumentModel(np.zeros((lines.omega.size, 0, 0), complex), layout.deflections, layout.rates)
     spectra = cross_spectra.with_servos(
         total.spectra, imperfect.columns, model, lines.omega, servo_model.rate_gain(servos, lines.omega)
     )
     moments = cross_spectra.band_moments(spectra, lines.omega, lines.bands)
-    if known is None or not known[0] <= total.energy <= GROWTH * known[0]:
-        known = (total.energy, column_changes(imperfect, aircraft, layout, total.integrals))
-    changes = known[1]
     matrix = _matrix(np.tensordot(estimate, changes.signals, axes=1), changes.rates)
     means = total.integrals / max(float(total.integrals[OFFSET]), 1e-12)
     of_regression = matrix[imperfect.places]

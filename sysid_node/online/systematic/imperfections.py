@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class Imperfections:
     step_time: float  # s: 1 sigma of the time of steps in a log's commands
     places: Index  # (W,) where the columns of the signal vector stand among them
 
-    @property
+    @cached_property
     def keys(self) -> tuple[str, ...]:
         """Of each imperfection the key of its tolerance: all of a servo share theirs."""
         servos = tuple(f"actuator_lag.{name}" for name in self.controls)

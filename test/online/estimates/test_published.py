@@ -15,6 +15,7 @@ from sysid_node.online import estimator
 from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.validity import STALE
+from sysid_node.online.pending_renewal import complete
 from sysid_node.online.replay import run
 from sysid_node.online.segment_update import renew
 from sysid_node.online.settings import METHODS, OnlineSettings
@@ -88,6 +89,7 @@ def test_between_renewals_estimates_use_every_sample(flown: tuple[Array, Array],
     time, rows = flown
     state = fed(time[:samples], rows[:samples])
     renew(state, last=True)
+    complete(state)
     now = current_solution(state)
     assert now is not None
     assert state.latest is not None

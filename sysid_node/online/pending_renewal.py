@@ -1,0 +1,90 @@
+"""A renewal in steps, a few with each sample, so that no sample waits for all of it.
+
+A renewal takes 3 to 80 times as long as a sample may. It is therefore made on a copy of the estimator, which stays at
+the time at which the renewal fell due, while the estimator goes on with new samples and the estimates before. When the
+last step is made, the estimator takes over what was found. How many steps are made depends on the samples' times
+alone, so a replay makes them where the live node does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from sysid_node.online.frequency import sampled_transform
+from sysid_node.online.segment_information import fading
+from sysid_node.online.state import EstimatorState, PendingRenewal, Steps, completed, current_lines
+
+STEP_EVERY = 0.01  # s of data to a step; with each sample at least one is made
+
+
+def begin(state: EstimatorState, whole: bool, work: Callable[[EstimatorState], Steps[None]]) -> None:
+    """Begin ``work`` on a copy of the estimator; ``whole``: whether the segment ends here."""
+    time, segment, at_rest = state.transform.last, state.segment, sampled_transform.at_rest(state.transform)
+    servo_states = None if state.servo_states is None else state.servo_states.copy()
+    # What only renewals use is not copied. Nothing else changes or reads it before the end of this one.
+    copy = replace(
+        state,
+        transform=at_rest,
+        segment=replace(segment),
+        servo_states=servo_states,
+    )
+    lines = sampled_transform.current(at_rest)
+    counts = segment.samples, segment.intervals
+    state.pending = PendingRenewal(copy, work(copy), time, lines, whole, segment.start, *counts, stepped_at=time)
+
+
+def make_steps(state: EstimatorState) -> None:
+    """Make the steps for which the last sample gives time, once for every sample."""
+    pending, now = state.pending, state.transform.last
+    if pending is None or pending.stepped_at == now:
+        return
+    pending.stepped_at = now
+    for _ in range(max(round(state.inputs.step / STEP_EVERY), 1)):
+        if next(pending.steps, pending) is pending:
+            _take_over(state, pending)
+            return
+
+
+def complete(state: EstimatorState) -> None:
+    """Make all that is left of a renewal at once."""
+    if state.pending is not None:
+        completed(state.pending.steps)
+        _take_over(state, state.pending)
+
+
+def _take_over(state: EstimatorState, pending: PendingRenewal) -> None:
+    """Take over what the renewal found."""
+    copy, moved = pending.copy, pending.copy.servos is not state.servos
+    if not pending.whole:
+        _take_over_segment(state, pending, moved)
+    elif moved and copy.servo_states is not None:
+        state.segment.first_servos = copy.servo_states.copy()
+        state.segment.first_impulses = copy.servo_states.impulses(state.model.spectrum.omega, pending.time)
+    if moved and state.servo_states is not None and copy.servo_states is not None:
+        for sample in state.servo_states.recent:
+            if sample[0] > pending.time:
+                copy.servo_states.follow(*sample)
+        state.servo_states = copy.servo_states
+    state.equations, state.latest = copy.equations, copy.latest
+    state.servos, state.line_model = copy.servos, copy.line_model
+    state.pending = None
+
+
+def _take_over_segment(state: EstimatorState, pending: PendingRenewal, moved: bool) -> None:
+    """Take over what was found of the segment, to which samples were added since.
+
+    It begins later where the aircraft was found to have changed in it; what came before is then taken out.
+    """
+    segment, renewed = state.segment, pending.copy.segment
+    began_anew = renewed.start != pending.begin
+    if began_anew:
+        before = pending.lines - sampled_transform.current(pending.copy.transform)
+        sampled_transform.take_out(state.transform, before * fading(state, pending.time))
+        segment.start, segment.noise_moments = renewed.start, renewed.noise_moments
+        segment.samples += renewed.samples - pending.samples
+        segment.intervals += renewed.intervals - pending.intervals
+    segment.information = renewed.information
+    segment.first_servos, segment.first_impulses = renewed.first_servos, renewed.first_impulses
+    if moved or began_anew:
+        segment.piece_lines = current_lines(pending.copy)
