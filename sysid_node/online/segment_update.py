@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid_node.online import pending_renewal, servo_search
 from sysid_node.online.change_response import look_for_changes, memory, respond
 from sysid_node.online.changes import detection
-from sysid_node.online.changes.detection import PIECE, ChangeDecision
+from sysid_node.online.changes.detection import PIECE, ChangeDecision, ChangeMonitor
 from sysid_node.online.changes.excited_segments import remember
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
@@ -36,10 +36,11 @@ def renew(state: EstimatorState, last: bool = False) -> None:
     _append_piece(state, lines)
     last = last or reach(time, state.inputs.step) - state.segment.start >= state.model.segment_time
     state.finished.pieces += 1
+    before = state.changes.monitor.before_examination()
     finding = look_for_changes(state)
     if last or _is_due(state):
         measure_noise_moments(state)
-        pending_renewal.begin(state, last, lambda copy: _solved(copy, lines, last, finding))
+        pending_renewal.begin(state, last, lambda copy: _solved(copy, lines, last, finding, before))
     elif finding is not None:
         completed(respond(state, lines, finding))
     if last:
@@ -51,10 +52,19 @@ def renew(state: EstimatorState, last: bool = False) -> None:
         pending_renewal.complete(state)  # nobody shall wait for the news that the aircraft has changed
 
 
-def _solved(state: EstimatorState, lines: Array, last: bool, finding: ChangeDecision | None) -> Steps[None]:
-    """Solve for everything again, respond to changes, and finish the segment if this is its ``last`` renewal."""
+def _solved(
+    state: EstimatorState, lines: Array, last: bool, finding: ChangeDecision | None, before: ChangeMonitor
+) -> Steps[None]:
+    """Solve for everything again, respond to changes, and finish the segment if this is its ``last`` renewal.
+
+    Where servos turn out to be elsewhere, the ``finding`` does not count, which used them where they were taken to be:
+    the change monitor goes on from ``before``.
+    """
+    servos = state.servos
     yield from solve_with_servos(state, lines)
     yield from servo_search.try_another_solution(state)
+    if finding is not None and state.servos is not servos:
+        state.changes.monitor, finding = before, before.standing(finding.contradicted.size)
     if finding is not None:
         yield from respond(state, lines, finding)
     if last:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby, islice
 from typing import NamedTuple
 
@@ -60,6 +60,20 @@ class ChangeMonitor:
     outside_model: Flags | None = None  # (C,)
     contradicted_by_excited: Flags | None = None  # (C,) by what was learned in well-excited flight
     examinations: int = 0
+
+    def before_examination(self) -> ChangeMonitor:
+        """The same with what the next examination finds left out, but for its number; the pieces are shared."""
+        typical = deque(self.typical_statistic, maxlen=self.typical_statistic.maxlen)
+        return replace(
+            self, typical_statistic=typical, contradicted=dict(self.contradicted), examinations=self.examinations + 1
+        )
+
+    def standing(self, C: int) -> ChangeDecision:
+        """What was found of each of ``C`` coefficients when a span was last looked at."""
+        none = np.zeros(C, dtype=bool)
+        by_excited = none if self.contradicted_by_excited is None else self.contradicted_by_excited
+        contradicted = np.any([by_excited, *self.contradicted.values()], axis=0)
+        return ChangeDecision(contradicted, none if self.outside_model is None else self.outside_model)
 
 
 @dataclass(frozen=True)
@@ -145,21 +159,13 @@ def examine(tests: ChangeTests, excited_segments: list[ExcitedSegments]) -> Chan
         if span == USUAL:
             change_monitor.outside_model = known & (found.share > LOST) & (found.unexplained > NOISE_RATIO)
             _update_typical_statistic(change_monitor, found, C)
-    none = np.zeros(C, dtype=bool)
-    contradicted = np.any(
-        [
-            none if change_monitor.contradicted_by_excited is None else change_monitor.contradicted_by_excited,
-            *change_monitor.contradicted.values(),
-        ],
-        axis=0,
-    )
-    outside_model = none if change_monitor.outside_model is None else change_monitor.outside_model
+    standing = change_monitor.standing(C)
     if surest >= FALSE_ALARM:
-        return ChangeDecision(contradicted, outside_model)
+        return standing
     span = _onset(tests)
     changed = any(_contradicted(tests, span, excited, block) for block, excited in enumerate(excited_segments))
     # the change fell somewhere in the oldest piece: what came after it is all new
-    return ChangeDecision(contradicted, outside_model, change_monitor.pieces[1 - span][0], changed)
+    return replace(standing, since=change_monitor.pieces[1 - span][0], changed=changed)
 
 
 def _typical_statistic(change_monitor: ChangeMonitor, span: int, C: int) -> Array:

@@ -11,7 +11,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
 from sysid_node.online.segment_solution import move_servos
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.state import EstimatorState
+from sysid_node.online.state import EstimatorState, completed
 from test.online.plant import fly, made_aircraft, multisteps
 
 SECONDS, RATE = 30.0, 50.0
@@ -55,7 +55,7 @@ def test_where_servos_go_in_a_gap_is_not_of_the_segment_before_it():
     for gap in (None, 0.3, 2.0):
         state = estimator.init(aircraft, OnlineSettings(), commanded=True)
         assert state.servos is not None
-        move_servos(state, state.servos.moved(np.full(3, 0.05), np.zeros(3)))
+        completed(move_servos(state, state.servos.moved(np.full(3, 0.05), np.zeros(3))))
         for moment, sample in zip(time[:count].tolist(), samples[0][:count].tolist(), strict=True):
             estimator.update(state, moment, sample)
         if gap is None:
