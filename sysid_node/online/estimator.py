@@ -212,17 +212,22 @@ def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float
 
 
 def renew_early(state: EstimatorState) -> None:
-    """Make the steps of a renewal that are due before the next sample, or begin one that is.
+    """Take over what a renewal found, or begin one, where that is due before the next sample.
 
     Whoever has time before that sample comes may do it then.
     """
-    pending_renewal.make_steps(state)
+    pending_renewal.take_over_if_due(state)
     if reach(state.transform.last, state.inputs.step) >= state.segment.renew_at:
         renew(state)
 
 
+def use_pause(state: EstimatorState) -> None:
+    """Make a step of the renewal under way, a millisecond or two: a later sample need then not wait for it."""
+    pending_renewal.make_step(state)
+
+
 def complete(state: EstimatorState) -> None:
-    """Make all steps that are left of a renewal, as no further sample gives them time."""
+    """End the renewal that is under way, as no further sample comes."""
     pending_renewal.complete(state)
 
 

@@ -1,9 +1,9 @@
-"""A renewal in steps, a few with each sample, so that no sample waits for all of it.
+"""A renewal in steps, so that no sample waits for all of it.
 
-A renewal takes 3 to 80 times as long as a sample may. It is therefore made on a copy of the estimator, which stays at
-the time at which the renewal fell due, while the estimator goes on with new samples and the estimates before. When the
-last step is made, the estimator takes over what was found. How many steps are made depends on the samples' times
-alone, so a replay makes them where the live node does.
+A renewal takes 3 to 80 times as long as there is between two samples. It is therefore made on a copy of the estimator,
+which stays at the time at which the renewal fell due, while the estimator goes on with new samples and the estimates
+before. ``AFTER`` s of data later the estimator takes over what was found. Until then the live node makes the steps
+whenever it has time; a replay makes them all at once. Neither changes what is found, or when it is used.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.segment_information import fading
 from sysid_node.online.state import EstimatorState, PendingRenewal, Steps, completed, current_lines
 
-STEP_EVERY = 0.01  # s of data to a step; with each sample at least one is made
+AFTER = 0.2  # s of data after which a renewal counts
 
 
 def begin(state: EstimatorState, whole: bool, work: Callable[[EstimatorState], Steps[None]]) -> None:
@@ -31,23 +31,24 @@ def begin(state: EstimatorState, whole: bool, work: Callable[[EstimatorState], S
     )
     lines = sampled_transform.current(at_rest)
     counts = segment.samples, segment.intervals
-    state.pending = PendingRenewal(copy, work(copy), time, lines, whole, segment.start, *counts, stepped_at=time)
+    state.pending = PendingRenewal(copy, work(copy), time, lines, whole, segment.start, *counts)
 
 
-def make_steps(state: EstimatorState) -> None:
-    """Make the steps for which the last sample gives time, once for every sample."""
-    pending, now = state.pending, state.transform.last
-    if pending is None or pending.stepped_at == now:
-        return
-    pending.stepped_at = now
-    for _ in range(max(round(state.inputs.step / STEP_EVERY), 1)):
-        if next(pending.steps, pending) is pending:
-            _take_over(state, pending)
-            return
+def make_step(state: EstimatorState) -> None:
+    """Make the next step of the renewal under way, if there is one left."""
+    if state.pending is not None:
+        next(state.pending.steps, None)
+
+
+def take_over_if_due(state: EstimatorState) -> None:
+    """Take over what a renewal found, if that is due before the next sample."""
+    pending = state.pending
+    if pending is not None and state.transform.last + 0.5 * state.inputs.step >= pending.time + AFTER:
+        complete(state)
 
 
 def complete(state: EstimatorState) -> None:
-    """Make all that is left of a renewal at once."""
+    """Make all steps that are left of a renewal, and take over what it found."""
     if state.pending is not None:
         completed(state.pending.steps)
         _take_over(state, state.pending)

@@ -148,7 +148,9 @@ def solve_all(
     if signals is not None:
         before = _with_recorded_signals(equations, recorded, compensation, now)
         yield
-    systematic = _systematic(state, signals, solution, before.solution, spread, inflation, at[1] if at else None)
+    systematic = yield from _systematic(
+        state, signals, solution, before.solution, spread, inflation, at[1] if at else None
+    )
     yield
     if systematic is not None:
         variance = variance * systematic.considered.misfit[:, None]
@@ -194,7 +196,7 @@ def _corrected_signals(
     known = known_changes(model.imperfections, model.aircraft, model.layout, recorded, last.known if last else None)
     if last is None or known is not last.known:
         yield
-    return corrected_signals(
+    found = yield from corrected_signals(
         model.imperfections,
         model.spectrum,
         model.instrument_model,
@@ -203,6 +205,7 @@ def _corrected_signals(
         taken_out,
         known,
     )
+    return found
 
 
 def _systematic(
@@ -213,7 +216,7 @@ def _systematic(
     spread: Uncertainty,
     inflation: Array,
     share: float | None,
-) -> SystematicErrors | None:
+) -> Steps[SystematicErrors | None]:
     """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for.
 
     With a ``share`` of a step they are looked at anew, else when it is time.
@@ -225,7 +228,7 @@ def _systematic(
     last = last_errors(state)
     if share is None and last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
         return replace(last, correction=correction)
-    return estimation.systematic_errors(
+    found = yield from estimation.systematic_errors(
         imperfect,
         servos,
         equations,
@@ -238,6 +241,7 @@ def _systematic(
         1.0 if share is None else share,
         tuple(state.search.rivals.values()),
     )
+    return found
 
 
 def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:

@@ -57,13 +57,13 @@ def _solved(
 ) -> Steps[None]:
     """Solve for everything again, respond to changes, and finish the segment if this is its ``last`` renewal.
 
-    Where servos turn out to be elsewhere, the ``finding`` does not count, which used them where they were taken to be:
-    the change monitor goes on from ``before``.
+    Where servos were moved, earlier estimates are no reference any more. The ``finding`` by these does not count then:
+    the change monitor goes on from ``before`` it.
     """
-    servos = state.servos
     yield from solve_with_servos(state, lines)
     yield from servo_search.try_another_solution(state)
-    if finding is not None and state.servos is not servos:
+    tested = any(one.time < state.transform.last for one in state.changes.monitor.references)
+    if finding is not None and not tested:
         state.changes.monitor, finding = before, before.standing(finding.contradicted.size)
     if finding is not None:
         yield from respond(state, lines, finding)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -17,6 +18,8 @@ from sysid_node.online.estimates.published import estimate_of
 from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
+
+BUSY = 0.4  # share of the time between estimates in which nothing long is begun before the next
 
 
 class Due(NamedTuple):
@@ -45,6 +48,8 @@ class Session:
         self.schedule = schedule.Schedule(self.publish_rate)
         self.samples = 0
         self._heard = time.monotonic()
+        self._published = -math.inf  # s, time.perf_counter when estimates last fell due
+        self._free = (1.0 - BUSY) / self.publish_rate  # s after that in which there is time
 
     @property
     def rejected(self) -> dict[str, int]:
@@ -73,8 +78,13 @@ class Session:
         return servo_gaps(self._servo_times, due.estimates.servos)
 
     def use_pause(self) -> None:
-        """Do what would else be done when the next sample comes; called when all that fell due is published."""
+        """Do what would else be done when later samples come; called when all that fell due is published.
+
+        Nothing long is begun where the next estimates may soon fall due.
+        """
         estimator.renew_early(self.state)
+        if time.perf_counter() - self._published < self._free:
+            estimator.use_pause(self.state)
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message that cannot be read."""
@@ -104,4 +114,6 @@ class Session:
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())
+        if results:
+            self._published = time.perf_counter()
         return results

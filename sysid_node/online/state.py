@@ -224,7 +224,6 @@ class PendingRenewal:
     begin: float  # of its segment
     samples: int  # in its segment
     intervals: float  # s: sum of the air data's intervals in its segment
-    stepped_at: float  # time of the last sample after which a step was made
 
 
 def completed(steps: Steps[T]) -> T:

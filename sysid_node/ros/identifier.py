@@ -130,7 +130,8 @@ class Identifier(CarefulNode):
                 return
             for due in take(self._session, numbers, texts):
                 self._publish(self._session, due)
-            self._session.use_pause()
+            if topic == IMU:  # others are often followed by one at once
+                self._session.use_pause()
 
         overrides = QoSOverridingOptions.with_default_policies()
         subscription = self.create_subscription(

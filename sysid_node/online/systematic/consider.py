@@ -27,6 +27,7 @@ moments' residuals, and a smaller moment of inertia would seem to explain noise.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,12 +122,12 @@ def consider(
     centre: Array,
     precision: Array,
     freedom: Array,
-) -> Considered:
+) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``sigmas`` (K,) are the tolerances,
     ``centre`` (K,) the expected values before the flight, ``precision`` (K, K) the inverse of their correlations then,
-    and ``freedom`` (C,) the noise's degrees of freedom.
+    and ``freedom`` (C,) the noise's degrees of freedom. It is made in two steps (``state.Steps``).
     """
     gram, changes, C = signals.gram, signals.changes, len(equations.coefficients)
     v = np.zeros((changes.columns.width, C))
@@ -144,6 +145,7 @@ def consider(
     # what the instruments find in the residuals is the noise's part, or rounding
     left = inverse @ ((across @ residuals.T) * equations.belongs) * equations.belongs  # (P, C)
     both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)  # (C, K + 1, 2N)
+    yield
     scores, misfit, explained = Scores.none(sigmas.size), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(equations.block.max()) + 1):

@@ -10,6 +10,7 @@ that a first-order correction attributes the rest of it to a late rudder.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,16 +85,18 @@ def corrected_signals(
     total: Information,
     estimate: Array,
     known: Known,
-) -> CorrectedSignals:
+) -> Generator[None, None, CorrectedSignals]:
     """From the information ``total``, whose lines have the controls where these ``servos`` have them.
 
     ``model`` is that of the instruments, ``estimate`` (K,) what is to be taken out, ``known`` from ``known_changes``.
+    It is made in two steps (``state.Steps``).
     """
     changes, layout = known[1], known[1].layout
     model = model or InstrumentModel(np.zeros((lines.omega.size, 0, 0), complex), layout.deflections, layout.rates)
     spectra = cross_spectra.with_servos(
         total.spectra, imperfect.columns, model, lines.omega, servo_model.rate_gain(servos, lines.omega)
     )
+    yield
     moments = cross_spectra.band_moments(spectra, lines.omega, lines.bands)
     matrix = _matrix(np.tensordot(estimate, changes.signals, axes=1), changes.rates)
     means = total.integrals / max(float(total.integrals[OFFSET]), 1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,16 +90,16 @@ def systematic_errors(
     pieces: int,
     share: float,
     rivals: tuple[Rival, ...],
-) -> SystematicErrors:
+) -> Generator[None, None, SystematicErrors]:
     """By the corrected ``signals`` and their ``solution``, which differs by ``correction`` from that of recorded ones.
 
     The lines have the controls where the ``servos`` have them. ``inflation`` (C,): factors of the statistical
     variances, which hold for what the flight tells of imperfections too. At most a ``share`` of the step is made. The
-    intervals reach to the ``rivals``.
+    intervals reach to the ``rivals``. It is made in steps (``state.Steps``).
     """
     sigmas, centre = prior(imperfect, servos)
     noise = inflation * noise_per_gram(equations, spread, signals.information)
-    found = consider(
+    found = yield from consider(
         equations, solution, noise, signals, imperfect.places, sigmas, centre, imperfect.precision, spread.freedom
     )
     at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
