@@ -57,7 +57,7 @@ def test_it_says_how_much_was_recorded_and_what_is_missing(tmp_path: Path, ros: 
     process = start("recorder", str(tmp_path / "empty"))
     assert process.stdout is not None
     assert "records into" in process.stdout.readline()
-    time.sleep(0.5)  # rcl publishes the line on /rosout only after it was printed, and complains where a signal comes in between
+    time.sleep(0.5)  # rcl prints the line before it publishes it on /rosout, and complains of a signal in between
     process.send_signal(signal.SIGINT)
     text, _ = process.communicate(timeout=20.0)
     assert "recorded 0 messages of 0 topics; nothing came on /imu/data, /air_data, /actuators" in text
