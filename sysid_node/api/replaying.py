@@ -201,7 +201,7 @@ class _Run:
         begin = aligned.commands_from
         columns = (part.tolist() for part in (aligned.time, aligned.samples, aligned.wait))
         for i, (moment, sample, wait) in enumerate(zip(*columns, strict=True)):
-            if i == begin and not self.state.model.commanded:
+            if i == begin and not self.state.model.sample.commanded:
                 self.state = estimator.begin_with_commands(self.state, moment)
                 self.commands_from = moment
             estimator.update(self.state, moment, sample)

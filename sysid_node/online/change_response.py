@@ -57,7 +57,7 @@ def _change_tests(state: EstimatorState) -> ChangeTests:
 
 def memory(state: EstimatorState) -> float:
     """How long ago is not forgotten, s."""
-    return state.model.settings.window or state.model.memory
+    return state.model.settings.window or state.model.times.memory
 
 
 def _begin_anew(state: EstimatorState, lines: Array, since: float) -> Steps[None]:

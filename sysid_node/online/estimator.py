@@ -31,7 +31,14 @@ from sysid_node.online.regression.instruments import INSTRUMENTED, instrument_mo
 from sysid_node.online.regression.mixed_estimation import believed_derivatives
 from sysid_node.online.segment_update import begin_segment, reach, renew
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.state import ChangeWatch, EstimatorModel, EstimatorState, FinishedSegments
+from sysid_node.online.state import (
+    ChangeWatch,
+    EstimatorModel,
+    EstimatorState,
+    FinishedSegments,
+    SampleModel,
+    SegmentTimes,
+)
 from sysid_node.online.status import vocabulary
 from sysid_node.online.systematic.imperfections import imperfections
 from sysid_node.online.systematic.servo_states import ServoStates
@@ -58,7 +65,7 @@ def init(
     grid = fourier_transform.lines(*settings.frequencies)
     model = _model(aircraft, settings, grid.omega, commanded, command_interval)
     layout, equations, imperfect = model.layout, model.equations, model.imperfections
-    transform = fourier_transform.start(grid, layout.transformed, model.memory, len(layout.instrumented))
+    transform = fourier_transform.start(grid, layout.transformed, model.times.memory, len(layout.instrumented))
     return EstimatorState(
         model,
         SampledTransform(layout, transform),
@@ -90,13 +97,19 @@ def _model(
         settings=settings,
         layout=layout,
         equations=equations,
-        table=derivative_index(aircraft, equations, settings.valid_fraction),
-        vocabulary=vocabulary(aircraft, equations),
+        table=derivative_index(aircraft, equations.structure, settings.valid_fraction),
+        vocabulary=vocabulary(aircraft, equations.structure),
         spectrum=information.spectrum(omega, memory),
-        lower_limits=_lowest(len(aircraft.controls)),
-        signals=regression_signals.scalar_signals(aircraft),
-        momentum=regression_signals.momentum_gain(aircraft),
-        prior=believed_derivatives(aircraft, equations),
+        sample=SampleModel(
+            lower_limits=_lowest(len(aircraft.controls)),
+            signals=regression_signals.scalar_signals(aircraft),
+            momentum=regression_signals.momentum_gain(aircraft),
+            commanded=commanded,
+            command_interval=command_interval,
+            timed=tuple(aircraft.control_symbols.index(symbol) for symbol in layout.timed),
+        ),
+        times=SegmentTimes(max(segment_time, 4.0 * PIECE), memory),
+        prior=believed_derivatives(aircraft, equations.structure),
         instrument_model=instrument_model(aircraft, layout, omega),
         imperfections=imperfections(
             aircraft,
@@ -105,11 +118,6 @@ def _model(
             positions=settings.actuators == "positions",
             command_interval=command_interval,
         ),
-        segment_time=max(segment_time, 4.0 * PIECE),
-        memory=memory,
-        commanded=commanded,
-        command_interval=command_interval,
-        timed=tuple(aircraft.control_symbols.index(symbol) for symbol in layout.timed),
     )
 
 
@@ -119,7 +127,7 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     What the samples said of the aircraft's instruments remains known.
     """
     model = state.model
-    fresh = init(model.aircraft, model.settings, commanded=True, command_interval=model.command_interval)
+    fresh = init(model.aircraft, model.settings, commanded=True, command_interval=model.sample.command_interval)
     fresh.transform.transform.last = time
     fresh.flow, fresh.inputs.begin = state.flow, state.inputs.begin
     if fresh.servo_states is not None:
@@ -166,7 +174,7 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
 def _append(state: EstimatorState, time: float, sample: Sequence[float], excess: Sequence[float]) -> None:
     """Append a complete sample to the transform; after a gap, begin a segment with it."""
     model, inputs, previous = state.model, state.inputs, state.inputs.previous
-    row, angles = model.signals(sample)
+    row, angles = model.sample.signals(sample)
     row.insert(DRIFT, time)
     motion = (*sample[3:6], *angles)
     renew_early(state)
@@ -179,8 +187,8 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
         begin_segment(state)
         return
     inputs.step = time - previous[0]
-    gain = model.momentum(previous[1], motion)
-    extra = [row[OFFSET] * excess[i] for i in model.timed] if excess else ()
+    gain = model.sample.momentum(previous[1], motion)
+    extra = [row[OFFSET] * excess[i] for i in model.sample.timed] if excess else ()
     if extra:
         gain += [inputs.step * part for part in extra]
     if state.servo_states is not None:
@@ -195,16 +203,16 @@ def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Seq
 
     A recorded flight has a place for the excess in all its samples, in those before commands were told, too.
     """
-    count = len(model.lower_limits)
+    count = len(model.sample.lower_limits)
     if len(sample) == count:
         return sample, ()
-    return sample[:count], sample[count:] if model.commanded else ()
+    return sample[:count], sample[count:] if model.sample.commanded else ()
 
 
 def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     """Let the servos follow a sample that does not count, so that they are where they are when samples begin to."""
     V, density = sample[AIRSPEED], sample[DENSITY]
-    controls = [sample[len(SAMPLE_COLUMNS) + i] for i in state.model.timed]
+    controls = [sample[len(SAMPLE_COLUMNS) + i] for i in state.model.sample.timed]
     if state.servo_states is not None and math.isfinite(V * density * math.fsum(controls)):
         reference = state.model.aircraft.reference
         k = density * V * V / (reference.air_density * reference.airspeed**2)
@@ -243,7 +251,7 @@ def _completed(state: EstimatorState, time: float, sample: Sequence[float]) -> S
     if powerless:
         filled[THRUST] = 0.0
     for column, value in enumerate(filled):
-        if not state.model.lower_limits[column] < value < LIMIT:
+        if not state.model.sample.lower_limits[column] < value < LIMIT:
             leave_out(state, column)
             return ()
     if not time < LIMIT:

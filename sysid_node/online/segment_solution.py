@@ -141,7 +141,7 @@ def solve_all(
     inflation = gust_correlation.inflation(spread, gusts)
     variance = inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
     mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
-    none = np.zeros(len(equations.coefficients), dtype=bool)
+    none = np.zeros(len(equations.structure.coefficients), dtype=bool)
     selection_bias = selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior)
     bounds = weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts)
     before = ReferenceEstimates(now, equations, solution, spread)

@@ -34,7 +34,7 @@ def renew(state: EstimatorState, last: bool = False) -> None:
     time = state.transform.last
     lines = current_lines(state)
     _append_piece(state, lines)
-    last = last or reach(time, state.inputs.step) - state.segment.start >= state.model.segment_time
+    last = last or reach(time, state.inputs.step) - state.segment.start >= state.model.times.length
     state.finished.pieces += 1
     before = state.changes.monitor.before_examination()
     finding = look_for_changes(state)

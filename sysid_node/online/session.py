@@ -106,7 +106,7 @@ class Session:
         results = []
         for moment, sample, wait in samples:
             start = time.perf_counter()
-            if moment >= self.intake.commands_from and not self.state.model.commanded:
+            if moment >= self.intake.commands_from and not self.state.model.sample.commanded:
                 self.state = estimator.begin_with_commands(self.state, moment)
             estimator.update(self.state, moment, sample)
             self.update_times.add(time.perf_counter() - start)

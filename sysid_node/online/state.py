@@ -42,6 +42,26 @@ Steps = Generator[None, None, T]
 
 
 @dataclass(frozen=True)
+class SampleModel:
+    """How a sample is taken in: what it must lie within, and what signals it becomes."""
+
+    lower_limits: tuple[float, ...]  # of each value of a sample, exclusive
+    signals: ScalarSignals
+    momentum: MomentumGain
+    commanded: bool = False  # whether deflections follow from commands by the aircraft file's servos
+    command_interval: float = 0.0  # s between a log's commands where lines stand between them
+    timed: tuple[int, ...] = ()  # places among the aircraft's controls of those in the layout's order
+
+
+@dataclass(frozen=True)
+class SegmentTimes:
+    """How long data are taken together, and how long they count (s)."""
+
+    length: float  # of a segment
+    memory: float  # inf = nothing is forgotten
+
+
+@dataclass(frozen=True)
 class EstimatorModel:
     """What does not change in flight."""
 
@@ -52,17 +72,11 @@ class EstimatorModel:
     table: DerivativeIndex
     vocabulary: Vocabulary
     spectrum: Spectrum
-    lower_limits: tuple[float, ...]  # of each value of a sample, exclusive
-    signals: ScalarSignals
-    momentum: MomentumGain
+    sample: SampleModel
+    times: SegmentTimes
     prior: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
     instrument_model: InstrumentModel | None  # None where the method is least squares
     imperfections: Imperfections | None  # None where the aircraft file states that all is exact
-    segment_time: float  # s
-    memory: float  # s, inf = nothing is forgotten
-    commanded: bool = False  # whether deflections follow from commands by the aircraft file's servos
-    command_interval: float = 0.0  # s between a log's commands where lines stand between them
-    timed: tuple[int, ...] = ()  # places among the aircraft's controls of those in the layout's order
 
 
 @dataclass(frozen=True)

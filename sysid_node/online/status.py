@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.normal_equations import ModelStructure
 
 Codes = NDArray[np.uint8]
 
@@ -50,8 +50,8 @@ class Vocabulary:
         return tuple([self.words[code] for code in codes.tolist()])
 
 
-def vocabulary(aircraft: Aircraft, equations: NormalEquations) -> Vocabulary:
-    """The words for the estimates by these ``equations``."""
-    collinear = (f"collinear with {regressor}" for regressor in equations.regressors)
+def vocabulary(aircraft: Aircraft, structure: ModelStructure) -> Vocabulary:
+    """The words for the estimates of a model of this ``structure``."""
+    collinear = (f"collinear with {regressor}" for regressor in structure.regressors)
     late = (f"{control} not on time" for control in aircraft.control_symbols)
     return Vocabulary((*WORDS, *collinear, *late), len(WORDS))

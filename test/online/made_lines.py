@@ -30,8 +30,8 @@ def made(equations: NormalEquations, seed: int = 0, noise: float = 0.3) -> tuple
     rng = np.random.default_rng(seed)
     lines = rng.normal(size=(ROWS, equations.width))
     truth = {}
-    for c, coefficient in enumerate(equations.coefficients):
-        unknowns = equations.unknowns(c)
+    for c, coefficient in enumerate(equations.structure.coefficients):
+        unknowns = equations.structure.unknowns(c)
         truth[coefficient] = rng.normal(size=unknowns.size)
         lines[:, equations.outputs[c]] = lines[:, equations.columns[unknowns]] @ truth[
             coefficient

@@ -10,14 +10,13 @@ from sysid_node.online import estimator, status
 from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate, estimate_of
 from sysid_node.online.estimates.validity import SETTLING, STALE, judge
-from sysid_node.online.frequency import regression_signals
-from sysid_node.online.regression import normal_equations
+from sysid_node.online.regression.normal_equations import model_structure
 from sysid_node.online.settings import METHODS, OnlineSettings
 from sysid_node.online.state import EstimatorState
 from sysid_node.online.status import vocabulary
 
 AIRCRAFT = made_aircraft()
-PLAN = normal_equations.normal_equations(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
+STRUCTURE = model_structure(AIRCRAFT.model_structure)
 
 
 def flown(seconds: float, method: str = "iv_rft") -> EstimatorState:
@@ -30,10 +29,10 @@ def flown(seconds: float, method: str = "iv_rft") -> EstimatorState:
 
 
 def test_every_number_has_its_word() -> None:
-    words = vocabulary(AIRCRAFT, PLAN)
+    words = vocabulary(AIRCRAFT, STRUCTURE)
     assert words.words[status.OK] == "ok"
     assert words.words[status.INERTIA] == "inertia unknown"
-    assert words.words[words.collinear + PLAN.regressors.index("beta")] == "collinear with beta"
+    assert words.words[words.collinear + STRUCTURE.regressors.index("beta")] == "collinear with beta"
     assert words.code("dr not on time") == len(words.words) - 1
     assert len(words.words) < 256, "they are kept in bytes"
     codes = np.array([status.STALE, status.OK], np.uint8)

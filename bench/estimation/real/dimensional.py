@@ -57,9 +57,9 @@ def regress(
     spread = least_squares.uncertainty(plan, solution, total)
     errors = np.sqrt(spread.covariance.diagonal(axis1=1, axis2=2))
     return {
-        f"{equation}_{plan.regressors[i]}": Value(float(solution.theta[i, c]), float(errors[c, i]))
+        f"{equation}_{plan.structure.regressors[i]}": Value(float(solution.theta[i, c]), float(errors[c, i]))
         for c, equation in enumerate(left)
-        for i in plan.unknowns(c)
+        for i in plan.structure.unknowns(c)
     }
 
 

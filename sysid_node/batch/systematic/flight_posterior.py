@@ -123,7 +123,7 @@ def _told(state: EstimatorState) -> _OneFlight | None:
     inverse = np.linalg.inv(found.considered.covariance / sigmas / sigmas[:, None])
     jacobian = found.considered.jacobian
     return _OneFlight(
-        _named(imperfect, commanded=state.model.commanded),
+        _named(imperfect, commanded=state.model.sample.commanded),
         sigmas,
         base + centre,
         inverse - imperfect.precision,

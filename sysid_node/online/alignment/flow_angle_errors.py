@@ -33,18 +33,19 @@ def reconstruction_covariance(
     An error e of a regressor moves the solution by theta (Z'A)^-1 Z'e. Only the energy of e is known, so its largest
     possible effect (the Cauchy-Schwarz inequality) is counted. ``at``: time in s.
     """
-    covariance = np.zeros((len(equations.coefficients), equations.columns.size, equations.columns.size))
+    structure = equations.structure
+    covariance = np.zeros((len(structure.coefficients), equations.columns.size, equations.columns.size))
     if filter_.missing is None or not filter_.active or not solution.usable:
         return covariance
     gram = info.grams.sum(axis=0)
-    outer = gram[equations.instruments[:, None], equations.instruments] * equations.same_block
+    outer = gram[equations.instruments[:, None], equations.instruments] * structure.same_block
     reach = solution.inverse @ outer @ solution.inverse.T
     energies = _error_energies(filter_, at, aircraft, layout, lines, info)
     for name, missing, energy in zip(("alpha", "beta"), filter_.missing, energies, strict=True):
         if missing:
-            theta = np.array([regressor == name for regressor in equations.regressors]) @ solution.theta
+            theta = np.array([regressor == name for regressor in structure.regressors]) @ solution.theta
             covariance += (energy * theta**2)[:, None, None] * reach
-    return covariance * equations.belongs.T[:, :, None] * equations.belongs.T[:, None, :]
+    return covariance * structure.belongs.T[:, :, None] * structure.belongs.T[:, None, :]
 
 
 def _error_energies(

@@ -148,7 +148,7 @@ def _due(look: int) -> list[int]:
 
 def examine(tests: ChangeTests, excited_segments: list[ExcitedSegments]) -> ChangeDecision:
     """What the tests of the spans that are due say of each coefficient, and from when on all must be learned anew."""
-    change_monitor, C = tests.change_monitor, len(tests.full.coefficients)
+    change_monitor, C = tests.change_monitor, len(tests.full.structure.coefficients)
     change_monitor.examinations += 1
     surest = 1.0
     for span, found in tests.contradictions(_due(change_monitor.examinations)):
@@ -195,7 +195,7 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
     if reference is None or excited.exceeds_all((lines[:, excited.controls] ** 2).sum(axis=0)):
         return False
     found = score_test(reference, lines, tests.spectrum, tests.now - start)
-    tested = (tests.full.block == block) & (found.freedom >= KNOWN)
+    tested = (tests.full.structure.block == block) & (found.freedom >= KNOWN)
     return bool((found.chance(MARGIN)[tested] < FALSE_ALARM).any())
 
 
@@ -204,9 +204,9 @@ def compare(
 ) -> None:
     """Mark the coefficients whose estimates contradict those from well-excited flight."""
     published = change_monitor.references[-1]
-    change_monitor.contradicted_by_excited = np.zeros(len(full.coefficients), dtype=bool)
+    change_monitor.contradicted_by_excited = np.zeros(len(full.structure.coefficients), dtype=bool)
     for block, excited in enumerate(excited_segments):
         reference = estimates_of(excited, full, published.time - memory, published.time)
         if reference is not None:
-            firm = (full.block == block) & (reference.uncertainty.freedom >= KNOWN)
+            firm = (full.structure.block == block) & (reference.uncertainty.freedom >= KNOWN)
             change_monitor.contradicted_by_excited |= firm & (disagreement(reference, published) < DOUBT)

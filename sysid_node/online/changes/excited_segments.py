@@ -58,7 +58,8 @@ class ExcitedSegments:
 
 def no_excited_segments(equations: NormalEquations, layout: SignalLayout) -> list[ExcitedSegments]:
     """An empty collection for each block of the normal equations."""
-    blocks = (equations.columns[equations.group == block] for block in range(int(equations.group.max()) + 1))
+    group = equations.structure.group
+    blocks = (equations.columns[group == block] for block in range(int(group.max()) + 1))
     moved = np.arange(layout.width)[layout.deflections]
     return [ExcitedSegments(columns[np.isin(columns, moved)]) for columns in blocks]
 

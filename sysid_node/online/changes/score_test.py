@@ -82,11 +82,12 @@ class ScoreTest:
 def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, duration: Any) -> ScoreTest:
     """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
     equations, known = reference.equations, reference.uncertainty
+    structure = equations.structure
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
     gram = lines.swapaxes(-1, -2) @ lines.copy()  # of one array half would be made and mirrored, which is slower
     regressed = gram.take(equations.columns, axis=-1)
     left_over = gram.take(equations.outputs, axis=-1) - regressed @ reference.solution.theta
-    count = equations.belongs.sum(axis=0)
+    count = structure.belongs.sum(axis=0)
     rest = _unexplained(equations, reference, regressed, left_over)
     energy = 0.5 * lines.shape[-2] * np.asarray(duration)[..., None]
     density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
@@ -95,9 +96,9 @@ def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, 
     of_each = _band_of_each(tuple(band.stop for band in spectrum.bands))
     noise = (Z.swapaxes(-1, -2) * known.bands.take(of_each, axis=-1)[..., None, :]) @ Z
     noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
-    G = (regressed.take(equations.instruments, axis=-2) * equations.same_block)[..., None, :, :]
+    G = (regressed.take(equations.instruments, axis=-2) * structure.same_block)[..., None, :, :]
     spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
-    score = (left_over.take(equations.instruments, axis=-2) * equations.belongs).swapaxes(-1, -2)
+    score = (left_over.take(equations.instruments, axis=-2) * structure.belongs).swapaxes(-1, -2)
     motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(equations.outputs, axis=-1), TINY)
     return ScoreTest(_normalised(equations, spread, score) / count, count, known.freedom, excess, rest / motion)
 
@@ -106,10 +107,11 @@ def _unexplained(
     equations: NormalEquations, reference: ReferenceEstimates, regressed: Array, left_over: Array
 ) -> Array:
     """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
+    structure = equations.structure
     misfit: Array = left_over.take(equations.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
-    score = left_over.take(equations.columns, axis=-2) * equations.belongs
-    normal = regressed.take(equations.columns, axis=-2) * equations.same_block
-    normal += equations.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
+    score = left_over.take(equations.columns, axis=-2) * structure.belongs
+    normal = regressed.take(equations.columns, axis=-2) * structure.same_block
+    normal += structure.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
     solved = np.empty_like(score)
     for one, right, found in zip(_each(normal), _each(score), _each(solved), strict=True):
         found[:] = dposv(one, right)[1]
@@ -130,11 +132,11 @@ def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
 
 def _normalised(equations: NormalEquations, spread: Array, score: Array) -> Array:
     """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong."""
-    belongs = equations.belongs.T
+    belongs = equations.structure.belongs.T
     variance = spread.diagonal(axis1=-2, axis2=-1) * belongs
     weight = np.where(variance > 0.0, 1.0 / np.sqrt(np.maximum(variance, TINY**2)), 0.0)
     correlation = spread * weight[..., None] * weight[..., None, :]
-    correlation += equations.unit * (RIDGE + (weight == 0.0))[..., None]
+    correlation += equations.structure.unit * (RIDGE + (weight == 0.0))[..., None]
     scaled = score * weight
     return np.asarray((scaled * np.linalg.solve(correlation, scaled[..., None])[..., 0]).sum(axis=-1))
 
@@ -142,8 +144,9 @@ def _normalised(equations: NormalEquations, spread: Array, score: Array) -> Arra
 def disagreement(one: ReferenceEstimates, other: ReferenceEstimates) -> Array:
     """(C,) the chance that the estimates of two stretches differ as much, were they independent and both unbiased."""
     equations = one.equations
-    difference = ((one.solution.theta - other.solution.theta) * equations.belongs).T
-    count = equations.belongs.sum(axis=0)
+    structure = equations.structure
+    difference = ((one.solution.theta - other.solution.theta) * structure.belongs).T
+    count = structure.belongs.sum(axis=0)
     spread = one.uncertainty.covariance + other.uncertainty.covariance
     freedom = np.minimum(one.uncertainty.freedom, other.uncertainty.freedom)
     return np.asarray(fdtrc(count, np.maximum(freedom, 1.0), _normalised(equations, spread, difference) / count))

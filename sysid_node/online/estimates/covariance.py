@@ -57,7 +57,7 @@ def _statistical_correlation(state: EstimatorState, latest: SegmentSolution) -> 
     error follows from the slopes' errors and from the noise of the integrals.
     """
     equations, table = state.equations, state.model.table
-    C, P = len(equations.coefficients), equations.columns.size
+    C, P = len(equations.structure.coefficients), equations.columns.size
     weight = latest.total.integrals[OFFSET]
     x = latest.total.integrals[equations.columns] / (weight if weight else 1.0)
     covariance = np.zeros((C, P + 1, P + 1))
@@ -81,7 +81,7 @@ def _statistical_correlation(state: EstimatorState, latest: SegmentSolution) -> 
 def _with_prior(state: EstimatorState, covariance: Array) -> Array:
     """(C, P, P) the covariance after the aircraft file's values are counted in: see ``mixed_estimation``."""
     _, precisions = state.model.prior
-    gain = state.equations.unit + covariance * precisions.T[:, None]
+    gain = state.equations.structure.unit + covariance * precisions.T[:, None]
     return gained(gain, covariance)
 
 

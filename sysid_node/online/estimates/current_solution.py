@@ -80,7 +80,7 @@ def growth_since(latest: SegmentSolution, time: float) -> float:
 def _with_prior(state: EstimatorState, latest: SegmentSolution, slopes: Array) -> tuple[Array, Array]:
     """(C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their variances."""
     covariance = latest.uncertainty.covariance
-    values, spread = weighed(state.equations, slopes.T, covariance, *state.model.prior)
+    values, spread = weighed(state.equations.structure, slopes.T, covariance, *state.model.prior)
     return values.T, spread.diagonal(axis1=1, axis2=2)
 
 
@@ -91,8 +91,8 @@ def _offsets(
 
     At zero frequency k C_0 = y - sum k C_j x_j, with the ``slopes`` (C, P).
     """
-    P, C = equations.belongs.shape
-    weight, sums = integrals[OFFSET], integrals.take(equations.sides)
+    P, C = equations.structure.belongs.shape
+    weight, sums = integrals[OFFSET], integrals.take(equations.entries.sides)
     x, y = sums[:P, None], sums[P:]
     left = y - slopes.dot(x)[:, 0]
     # x' covariance x

@@ -31,6 +31,7 @@ def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[Co
     if current is None or latest is None or not current.solution.usable:
         return []
     equations, (values, precisions) = state.equations, state.model.prior
+    structure = equations.structure
     start, _, stop = state.model.settings.frequencies
     per_energy = 2.0 * (stop - start) / max(float(latest.total.traces.sum()), 1e-12)
     gram, theta = current.gram, current.solution.theta
@@ -41,15 +42,15 @@ def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[Co
     growth = growth_since(latest, current.time)
     variances = slope_variances(latest, current.solution.residual, current.size, growth)
     if latest.systematic is not None:
-        theta = theta + latest.systematic.correction[:, :-1].T * equations.belongs
+        theta = theta + latest.systematic.correction[:, :-1].T * structure.belongs
         variances = variances + latest.systematic.variance[:, :-1]
     spread = np.sqrt(np.maximum(variances.T, 0.0) + _tolerances(precisions))
-    deviations = np.where(equations.belongs > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
+    deviations = np.where(structure.belongs > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()
-    names = [f"{c}_{equations.regressors[i]}" for c, i in zip(equations.coefficients, worst, strict=True)]
+    names = [f"{c}_{structure.regressors[i]}" for c, i in zip(structure.coefficients, worst, strict=True)]
     noise = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density)
     stds = (column.tolist() for column in (np.sqrt(per_energy * energy), noise, relative))
-    return list(map(CoefficientGap, equations.coefficients, *stds, names, deviations.max(axis=0).tolist()))
+    return list(map(CoefficientGap, structure.coefficients, *stds, names, deviations.max(axis=0).tolist()))
 
 
 def _tolerances(precisions: Array) -> Array:

@@ -44,7 +44,7 @@ def estimate_of(state: EstimatorState, current: CurrentSolution | None, now: flo
         numbers = np.concatenate([numbers, np.tile(nothing, (missing, 1))])
         codes = np.concatenate([codes, np.full(missing, status.INERTIA, codes.dtype)])
     derivatives = DerivativeRows(model.table.all_names, numbers, codes, model.vocabulary)
-    fits = FitRows(model.equations.coefficients, _fits(state, latest, current))
+    fits = FitRows(model.equations.structure.coefficients, _fits(state, latest, current))
     if latest.systematic is None:
         return Estimates(time, derivatives, fits)
     if latest.published is None:

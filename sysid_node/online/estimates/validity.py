@@ -42,7 +42,8 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     c = table.coefficient
     start, _, stop = state.model.settings.frequencies
     # an equation with one weak instrument is solved by least squares, which gusts bias
-    strength = np.where(equations.belongs > 0.0, latest.instruments.strength.strength[:, None], np.inf).min(axis=0)
+    strengths = latest.instruments.strength.strength[:, None]
+    strength = np.where(equations.structure.belongs > 0.0, strengths, np.inf).min(axis=0)
     objections, squares = _objections(state, latest), student_95(freedom)[c] ** 2
     factors = latest.instruments.selection_bias_factors
     cautions = np.where(table.offset, factors.max(axis=0)[c], factors[table.unknown, c])
@@ -58,7 +59,7 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
         allowed=np.minimum((table.allowed**2 - systematic) / caution, longest),
         relative=table.relative**2 / caution if table.relative.any() else None,
         systematic=systematic,
-        floor=np.maximum(BURIED * latest.total.bias.take(equations.energy), least_squares.TINY),
+        floor=np.maximum(BURIED * latest.total.bias.take(equations.entries.energy), least_squares.TINY),
         fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
         servos=_of_servos(state, objections),
     )
@@ -72,7 +73,7 @@ def _of_servos(state: EstimatorState, objections: Codes) -> Codes:
     imperfect, table, layout = state.model.imperfections, state.model.table, state.model.layout
     if imperfect is None:
         return np.zeros(0, np.uint8)
-    regressors, found = np.array(state.equations.regressors), np.zeros(imperfect.timed.size, np.uint8)
+    regressors, found = np.array(state.equations.structure.regressors), np.zeros(imperfect.timed.size, np.uint8)
     for i, place in enumerate(imperfect.timed.tolist()):
         of_it = objections[(regressors[table.unknown] == layout.timed[place]) & ~table.offset]
         if of_it.size and (of_it != status.OK).all():
@@ -96,8 +97,9 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     lag = latest.tests.lag
     biased = lag.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{lag.blamed_control[i]} not on time") for i in c[biased].tolist()]
+    solved = state.equations.structure
     for symbol in _ahead_of_commands(state, latest):
-        of_it = state.equations.belongs[np.array(state.equations.regressors) == symbol].any(axis=0)
+        of_it = solved.belongs[np.array(solved.regressors) == symbol].any(axis=0)
         objections[np.asarray(of_it)[c] & ~table.offset] = words.code(f"{symbol} not on time")
     objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
     if not state.inputs.thrust_known:
@@ -123,7 +125,7 @@ def _ahead_of_commands(state: EstimatorState, latest: SegmentSolution) -> tuple[
 def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution, now: float) -> Codes:
     """(D,) statuses of the estimates ``current``, at ``now`` (s)."""
     table, equations, basis = state.model.table, state.equations, validity_basis(state, latest)
-    motion = current.gram.reshape(-1).take(equations.energy)
+    motion = current.gram.reshape(-1).take(equations.entries.energy)
     inflation = current.size * motion
     buried = motion < basis.floor
     hidden = buried | (inflation > INDISTINGUISHABLE)
@@ -164,7 +166,7 @@ def _poor(current: CurrentSolution) -> Flags:
 def _with_hidden_slope(state: EstimatorState, hidden: Flags) -> Flags:
     """(D,) offsets that hold what a hidden slope (P,) of their coefficient does."""
     table = state.model.table
-    return np.asarray(((hidden @ state.equations.belongs) > 0.0).take(table.coefficient) & table.offset)
+    return np.asarray(((hidden @ state.equations.structure.belongs) > 0.0).take(table.coefficient) & table.offset)
 
 
 def _reasons(

@@ -55,17 +55,18 @@ def examine(
 
     ``systematic`` (C, P) are the variances of the slopes by what is taken as known: the interval holds them, too.
     """
-    biased = np.zeros(equations.belongs.shape, dtype=bool)
+    structure = equations.structure
+    biased = np.zeros(structure.belongs.shape, dtype=bool)
     blamed_control: dict[int, str] = {}
     best: dict[str, Lag] = {}
     for c in np.flatnonzero(spread.density > 0.0).tolist():
-        unknowns = equations.unknowns(c)
+        unknowns = structure.unknowns(c)
         variance = spread.covariance[c].diagonal()[unknowns]
         if systematic is not None:
             variance = variance + systematic[c, unknowns]
         errors = np.sqrt(np.maximum(variance, 0.0))
         for symbol in layout.timed:
-            places = [k for k, i in enumerate(unknowns.tolist()) if equations.regressors[i] == symbol]
+            places = [k for k, i in enumerate(unknowns.tolist()) if structure.regressors[i] == symbol]
             if not places:
                 continue
             lag, moved = _with_rate(equations, layout, solution, spread, gram, c, symbol, places[0])
@@ -92,7 +93,7 @@ def _with_rate(
     place: int,
 ) -> tuple[Lag | None, Array]:
     """The control's lag by one coefficient's equation, and how far (p,) its estimates move when it is allowed for."""
-    unknowns = equations.unknowns(c)
+    unknowns = equations.structure.unknowns(c)
     J, rate = equations.columns[unknowns], layout.column(f"{symbol} rate")
     block = solution.inverse[np.ix_(unknowns, unknowns)]
     v = np.zeros(equations.width)

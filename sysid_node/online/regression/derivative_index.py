@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.normal_equations import ModelStructure
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class DerivativeIndex:
         return self.names + self.unformed
 
 
-def derivative_index(aircraft: Aircraft, equations: NormalEquations, valid_fraction: float) -> DerivativeIndex:
-    """The aircraft's derivatives in the solution of its ``equations``.
+def derivative_index(aircraft: Aircraft, structure: ModelStructure, valid_fraction: float) -> DerivativeIndex:
+    """The aircraft's derivatives in the solution of a model of this ``structure``.
 
     A standard error is measured against the believed size of a derivative, or twice its tolerance where that is more:
     not against the estimate, which would call the large ones of many chance values valid. An estimate is valid with a
@@ -44,17 +44,17 @@ def derivative_index(aircraft: Aircraft, equations: NormalEquations, valid_fract
     names, coefficients, unknowns, offsets, sizes, unformed = [], [], [], [], [], []
     for name, belief in aircraft.derivatives.items():
         of, _, regressor = name.partition("_")
-        if of not in equations.coefficients:
+        if of not in structure.coefficients:
             unformed.append(name)
             continue
-        c = equations.coefficients.index(of)
+        c = structure.coefficients.index(of)
         names.append(name)
         coefficients.append(c)
         offsets.append(regressor == "0")
-        unknowns.append(next((int(i) for i in equations.unknowns(c) if equations.regressors[i] == regressor), 0))
+        unknowns.append(next((int(i) for i in structure.unknowns(c) if structure.regressors[i] == regressor), 0))
         sizes.append(max(abs(belief.value), 2.0 * (belief.tolerance or 0.0)))
     coefficient, unknown, offset = np.array(coefficients, np.intp), np.array(unknowns, np.intp), np.array(offsets)
-    P = len(equations.regressors)
+    P = len(structure.regressors)
     return DerivativeIndex(
         names=tuple(names),
         coefficient=coefficient,

@@ -59,4 +59,4 @@ def sensed(
     turning = aircraft.noise["gyro"] * math.sqrt(float(np.mean(omega**2))) / qS
     gains = {"CL": force, "CD": force, "CY": force}
     gains |= {"Cl": turning * i.Ixx / g.b, "Cm": turning * i.Iyy / g.cbar, "Cn": turning * i.Izz / g.b}
-    return density + step * np.array([gains[c] for c in equations.coefficients]) ** 2
+    return density + step * np.array([gains[c] for c in equations.structure.coefficients]) ** 2

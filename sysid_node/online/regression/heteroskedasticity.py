@@ -64,6 +64,7 @@ def measure(
     over which their noise lasts. ``boxes``: into so many stretches, as long as the lines' band resolves, regressors are
     averaged; the noise's density is not.
     """
+    structure = equations.structure
     x = rows[:, equations.columns] - mean[equations.columns]
     relative = 2.0 * aircraft.noise["airspeed"] / aircraft.reference.airspeed
     w, alpha_weighted, accelerometer_power = (
@@ -72,9 +73,9 @@ def measure(
         np.zeros(theta.shape[1]),
     )
     step = duration / len(rows)
-    if "CD" in equations.coefficients and "alpha" in layout.names:
-        c = equations.coefficients.index("CD")
-        of_alpha = theta[[i for i in equations.unknowns(c).tolist() if equations.regressors[i] == "alpha"], c].sum()
+    if "CD" in structure.coefficients and "alpha" in layout.names:
+        c = structure.coefficients.index("CD")
+        of_alpha = theta[[i for i in structure.unknowns(c).tolist() if structure.regressors[i] == "alpha"], c].sum()
         turned = rows[:, layout.column("CL")] - of_alpha * rows[:, OFFSET]
         alpha_weighted[:, c] = (aircraft.noise["alpha"] * turned) ** 2
         accelerometer_power[c] = duration * step * (aircraft.noise["accel"] * _per_acceleration(aircraft)) ** 2

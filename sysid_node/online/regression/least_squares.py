@@ -44,8 +44,8 @@ def solve(equations: NormalEquations, gram: Array, bias: Array | None = None) ->
     Least squares, Z = A, by Cholesky factors; instrumental variables by LU.
     """
     P, flat = equations.columns.size, gram.reshape(-1)
-    gathered = flat.take(equations.entries)
-    gathered *= equations.counted
+    gathered = flat.take(equations.entries.normal)
+    gathered *= equations.entries.counted
     normal, cross = gathered
     if bias is not None:
         cross -= bias
@@ -54,7 +54,7 @@ def solve(equations: NormalEquations, gram: Array, bias: Array | None = None) ->
     # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
     misfit = theta.T.dot(normal[:P])
     misfit -= normal[P:]
-    motion = flat.take(equations.square)
+    motion = flat.take(equations.entries.square)
     residual: Array = np.maximum(misfit.dot(theta).diagonal() + motion, ROUNDING * motion)
     return Solution(theta, solved[:, :P], residual, motion, usable)
 
@@ -66,7 +66,7 @@ def _factorised(equations: NormalEquations, cross: Array) -> tuple[Array, bool]:
         # a regressor that has not moved, or that moved as others did: its own estimate is lost, not all of them
         P = equations.columns.size
         ridged = cross.copy()
-        ridged[:P] += equations.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
+        ridged[:P] += equations.structure.unit * (RIDGE * np.abs(cross[:P].diagonal()) + TINY)
         solved, fault = _factorise(equations, ridged)
     if fault or not math.isfinite(solved[0, 0]):
         return np.zeros_like(solved), False
@@ -76,7 +76,7 @@ def _factorised(equations: NormalEquations, cross: Array) -> tuple[Array, bool]:
 def _factorise(equations: NormalEquations, cross: Array) -> tuple[Array, int]:
     """(P, P + C) the inverse and the solutions of what is gathered (P + C, P), and LAPACK's fault, 0 for none."""
     P = equations.columns.size
-    known = equations.known.copy()
+    known = equations.entries.known.copy()
     known[P:] = cross[P:]
     solver = dposv if equations.least_squares else dgesv
     *_, solved, fault = solver(cross[:P].T, known.T)
@@ -85,7 +85,7 @@ def _factorise(equations: NormalEquations, cross: Array) -> tuple[Array, int]:
 
 def bias_of(equations: NormalEquations, bias: Array) -> Array:
     """(P + C, P) the entries of a (W, W) expected noise Gram matrix that ``solve`` subtracts."""
-    return np.asarray(bias.take(equations.entries[1]) * equations.counted[1])
+    return np.asarray(bias.take(equations.entries.normal[1]) * equations.entries.counted[1])
 
 
 def misfits(equations: NormalEquations, theta: Array) -> Array:
@@ -109,14 +109,15 @@ class Uncertainty:
 
 def uncertainty(equations: NormalEquations, solution: Solution, info: Information) -> Uncertainty:
     """Sandwich covariance with the residual's density estimated in each band, and with noise that comes and goes."""
-    C, P = len(equations.coefficients), equations.columns.size
+    structure = equations.structure
+    C, P = len(structure.coefficients), equations.columns.size
     if not solution.usable or info.trace_square <= 0.0:
         return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
     v = misfits(equations, solution.theta)
     least = ROUNDING * info.grams[:, equations.outputs, equations.outputs]
     squares = np.maximum(((info.grams @ v) * v).sum(axis=1), least).T  # (C, B)
-    scores = info.scores[:, equations.instruments[:, None], equations.instruments] * equations.same_block
-    used = ((scores * solution.inverse.T).sum(axis=2) @ equations.belongs).T  # (C, B): taken up by the unknowns
+    scores = info.scores[:, equations.instruments[:, None], equations.instruments] * structure.same_block
+    used = ((scores * solution.inverse.T).sum(axis=2) @ structure.belongs).T  # (C, B): taken up by the unknowns
     expected = np.maximum(info.traces - used, 0.05 * info.traces + TINY)
     whole = expected.sum(axis=1)
     density = squares.sum(axis=1) / whole
@@ -125,10 +126,10 @@ def uncertainty(equations: NormalEquations, solution: Solution, info: Informatio
     bands = (share * squares / expected + BAND_PRIOR * density[:, None]) / (share + BAND_PRIOR)
     middle = np.tensordot(bands, scores, axes=(1, 0))  # (C, P, P)
     middle += heteroskedasticity.heteroskedastic_excess(
-        info.noise_moments, scores.sum(axis=0), equations.same_block, density
+        info.noise_moments, scores.sum(axis=0), structure.same_block, density
     )
     covariance = solution.inverse @ middle @ solution.inverse.T
-    covariance *= equations.belongs.T[:, :, None] * equations.belongs.T[:, None, :]
+    covariance *= structure.belongs.T[:, :, None] * structure.belongs.T[:, None, :]
     return Uncertainty(covariance, density, bands, freedom)
 
 
@@ -149,18 +150,19 @@ def instrument_strength(equations: NormalEquations, solution: Solution, info: In
     chance correlation adds to it, instruments seem strong, and small standard errors and large errors occur together.
     The strength is therefore that of Z'Z where this is less; ``selection_factor`` is the ratio of the variances.
     """
+    structure = equations.structure
     P = equations.columns.size
     if equations.least_squares:
         return InstrumentStrength(np.full(P, np.inf), np.ones(P))
     if not solution.usable or info.trace_square <= 0.0:
         return InstrumentStrength(np.zeros(P), np.ones(P))
     gram = info.grams.sum(axis=0)
-    outer = gram[equations.instruments[:, None], equations.instruments] * equations.same_block
-    plain = solve(with_least_squares_in(equations, tuple(range(int(equations.group.max()) + 1))), gram)
+    outer = gram[equations.instruments[:, None], equations.instruments] * structure.same_block
+    plain = solve(with_least_squares_in(equations, tuple(range(int(structure.group.max()) + 1))), gram)
     if not plain.usable:
         return InstrumentStrength(np.zeros(P), np.ones(P))
     achieved = np.maximum((solution.inverse @ outer @ solution.inverse.T).diagonal(), TINY)
-    ridged = outer + equations.unit * (RIDGE * outer.diagonal() + TINY)
+    ridged = outer + structure.unit * (RIDGE * outer.diagonal() + TINY)
     expected = np.maximum(np.linalg.inv(ridged).diagonal(), achieved)
     efficiency = np.clip(plain.inverse.diagonal() / expected, 0.0, 1.0 - 1e-9)
     freedom = float(info.traces.sum()) ** 2 / info.trace_square
@@ -176,9 +178,10 @@ def student_95(freedom: Array) -> Array:
 
 def most_correlated(equations: NormalEquations, solution: Solution) -> Index:
     """(P,) of each unknown the one of the same equation whose estimate is most correlated with its own."""
+    structure = equations.structure
     spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     # each row's own spread is common to all of it
     correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
-    correlation *= equations.same_block - equations.unit
+    correlation *= structure.same_block - structure.unit
     rival: Index = correlation.argmax(axis=-1)
     return rival

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.normal_equations import ModelStructure
 
 Array = NDArray[np.float64]
 
 
-def believed_derivatives(aircraft: Aircraft, equations: NormalEquations) -> tuple[Array, Array]:
+def believed_derivatives(aircraft: Aircraft, structure: ModelStructure) -> tuple[Array, Array]:
     """(P, C) believed values and their precisions 1 / tolerance^2; precision 0 where the file states no tolerance."""
-    values, precisions = np.zeros(equations.belongs.shape), np.zeros(equations.belongs.shape)
-    for c, coefficient in enumerate(equations.coefficients):
-        for i in equations.unknowns(c).tolist():
-            belief = aircraft.derivatives[f"{coefficient}_{equations.regressors[i]}"]
+    values, precisions = np.zeros(structure.belongs.shape), np.zeros(structure.belongs.shape)
+    for c, coefficient in enumerate(structure.coefficients):
+        for i in structure.unknowns(c).tolist():
+            belief = aircraft.derivatives[f"{coefficient}_{structure.regressors[i]}"]
             values[i, c] = belief.value
             if belief.tolerance:
                 precisions[i, c] = belief.tolerance**-2
@@ -28,12 +28,12 @@ def believed_derivatives(aircraft: Aircraft, equations: NormalEquations) -> tupl
 
 
 def weighed(
-    equations: NormalEquations, theta: Array, covariance: Array, values: Array, precisions: Array
+    structure: ModelStructure, theta: Array, covariance: Array, values: Array, precisions: Array
 ) -> tuple[Array, Array]:
     """``theta`` (P, C) and its ``covariance`` (C, P, P) with the aircraft file's values counted in."""
     prior = covariance @ (precisions * values).T[:, :, None]
     # gain form: needs no inverse of a covariance that may be near singular
-    gain = equations.unit + covariance * precisions.T[:, None]
+    gain = structure.unit + covariance * precisions.T[:, None]
     return gained(gain, theta.T[..., None] + prior)[..., 0].T, gained(gain, covariance)
 
 

@@ -36,11 +36,10 @@ def selection_bias_factors(
     ``values`` and ``precisions`` (P, C) are those of ``mixed_estimation.believed_derivatives``.
     """
     if equations.least_squares or not solution.usable:
-        return np.ones_like(equations.belongs)
-    meeting, _ = weighed(equations, solution.theta, spread.covariance, values, precisions)
+        return np.ones_like(equations.structure.belongs)
+    meeting, _ = weighed(equations.structure, solution.theta, spread.covariance, values, precisions)
     v = misfits(equations, meeting)
     squares = ((gram @ v) * v).sum(axis=0)
     more = np.where(equations.instrumented, np.maximum(squares / np.maximum(solution.residual, 1e-300), 1.0), 1.0)
-    return np.asarray(
-        np.where(equations.instrumented, instrument_strength.selection_factor[:, None], 1.0) * more * equations.belongs
-    )
+    factor = np.where(equations.instrumented, instrument_strength.selection_factor[:, None], 1.0) * more
+    return np.asarray(factor * equations.structure.belongs)

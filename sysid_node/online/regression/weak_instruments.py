@@ -56,8 +56,8 @@ def anderson_rubin_bounds(
     """
     covariance, P = spread.covariance, equations.columns.size
     v = misfits(equations, solution.theta)
-    gradient = (gram[equations.columns] @ v).T * equations.belongs.T  # (C, P)
-    normal = gram[equations.columns[:, None], equations.columns] * equations.same_block
+    gradient = (gram[equations.columns] @ v).T * equations.structure.belongs.T  # (C, P)
+    normal = gram[equations.columns[:, None], equations.columns] * equations.structure.same_block
     in_offset = covariance @ mean
     ways = np.empty((*covariance.shape[:2], P + 1))  # how the slopes move with each, and behind them with the offset
     ways[:, :, :P] = covariance / np.maximum(covariance.diagonal(axis1=1, axis2=2), TINY)[:, None, :]

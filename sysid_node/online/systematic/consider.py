@@ -129,7 +129,8 @@ def consider(
     ``centre`` (K,) the expected values before the flight, ``precision`` (K, K) the inverse of their correlations then,
     and ``freedom`` (C,) the noise's degrees of freedom. It is made in two steps (``state.Steps``).
     """
-    gram, changes, C = signals.gram, signals.changes, len(equations.coefficients)
+    structure = equations.structure
+    gram, changes, C = signals.gram, signals.changes, len(structure.coefficients)
     v = np.zeros((changes.columns.width, C))
     v[place] = misfits(equations, solution.theta)
     X, V = signals.matrix[place[equations.columns]], signals.matrix[place[equations.instruments]]
@@ -138,21 +139,21 @@ def consider(
     Z = np.ascontiguousarray((v.T @ changes.signals).swapaxes(0, 1)) * sigmas[:, None]
     Z = Z @ _by_the_model(equations, solution, place, signals)
     across = V @ gram
-    normal = (across @ X.T) * equations.same_block
-    inverse = np.linalg.inv(normal + equations.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
-    J = inverse @ (across @ Z.swapaxes(1, 2) * equations.belongs.T[:, :, None])  # (C, P, K)
-    J *= equations.belongs.T[:, :, None]
+    normal = (across @ X.T) * structure.same_block
+    inverse = np.linalg.inv(normal + structure.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
+    J = inverse @ (across @ Z.swapaxes(1, 2) * structure.belongs.T[:, :, None])  # (C, P, K)
+    J *= structure.belongs.T[:, :, None]
     # what the instruments find in the residuals is the noise's part, or rounding
-    left = inverse @ ((across @ residuals.T) * equations.belongs) * equations.belongs  # (P, C)
+    left = inverse @ ((across @ residuals.T) * structure.belongs) * structure.belongs  # (P, C)
     both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)  # (C, K + 1, 2N)
     yield
     scores, misfit, explained = Scores.none(sigmas.size), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
-    for block in range(int(equations.block.max()) + 1):
+    for block in range(int(structure.block.max()) + 1):
         project = _projection(equations, changes, place, gram, block)
-        for c in np.flatnonzero((equations.block == block) & (noise > 0.0) & moves).tolist():
+        for c in np.flatnonzero((structure.block == block) & (noise > 0.0) & moves).tolist():
             q, D = project @ both[c].T, both[c, :-1]
-            further = project.shape[0] - int(equations.belongs[:, c].sum())  # than the unknowns take
+            further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
             explained[c] = float(q[:, -1] @ q[:, -1])
             misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
             share = further / max(float(freedom[c]), 1.0)
@@ -199,7 +200,7 @@ def _predict_outputs(
     """
     rates, matrix = signals.changes.rates, signals.matrix
     for c, output in enumerate(place[equations.outputs].tolist()):
-        unknowns = np.flatnonzero(equations.belongs[:, c])
+        unknowns = np.flatnonzero(equations.structure.belongs[:, c])
         columns, theta = place[equations.columns[unknowns]], solution.theta[unknowns, c]
         share = Z[..., output].copy()
         Z[..., output] = 0.0
@@ -214,7 +215,7 @@ def _projection(
     equations: NormalEquations, changes: ColumnChanges, place: NDArray[np.intp], gram: Array, block: int
 ) -> Array:
     """(E, 2N) whose product with a combination of signals and rates has the norm of its exogenous part."""
-    columns, of_block = changes.columns, equations.group == block
+    columns, of_block = changes.columns, equations.structure.group == block
     N = columns.width
     chosen = np.zeros(2 * N, dtype=bool)
     first, made = columns.servos.start, columns.instruments

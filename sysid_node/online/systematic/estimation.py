@@ -168,8 +168,8 @@ def noise_per_gram(equations: NormalEquations, spread: Uncertainty, total: Infor
     V = equations.instruments
     energies = total.grams.sum(axis=0).diagonal()[V]
     scores = spread.bands @ total.scores.diagonal(axis1=1, axis2=2)[:, V]  # (C, P)
-    shares = scores / np.maximum(energies, TINY) * equations.belongs.T
-    return np.asarray(shares.sum(axis=1) / equations.belongs.sum(axis=0))
+    shares = scores / np.maximum(energies, TINY) * equations.structure.belongs.T
+    return np.asarray(shares.sum(axis=1) / equations.structure.belongs.sum(axis=0))
 
 
 def notable_step(imperfect: Imperfections, servos: ServoModel, found: SystematicErrors) -> ServoModel | None:

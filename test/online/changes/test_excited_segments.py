@@ -33,7 +33,7 @@ def segment(seed: int = 0, theta: float = 1.0, **moved: float) -> Information:
     for name, size in moved.items():
         lines[..., LAYOUT.column(name)] *= size
     for c in range(PLAN.outputs.size):
-        x = lines[..., PLAN.columns[PLAN.unknowns(c)]]
+        x = lines[..., PLAN.columns[PLAN.structure.unknowns(c)]]
         lines[..., PLAN.outputs[c]] = theta * x.sum(axis=-1) + 1e-3 * rng.normal(size=x.shape[:-1])
     said = nothing(LAYOUT)
     said.grams = lines.swapaxes(-1, -2) @ lines
@@ -73,7 +73,7 @@ def test_what_was_quiet_beside_later_manoeuvres_is_not_recalled(known: list[Exci
     found = estimates_of(known[0], PLAN, -math.inf, 60.0)
     assert found is not None
     assert found.time == 50.0
-    np.testing.assert_allclose(found.solution.theta[PLAN.unknowns(0), 0], 1.0, rtol=1e-2)
+    np.testing.assert_allclose(found.solution.theta[PLAN.structure.unknowns(0), 0], 1.0, rtol=1e-2)
 
 
 def test_only_segments_of_the_time_are_recalled(known: list[ExcitedSegments]) -> None:
@@ -81,7 +81,7 @@ def test_only_segments_of_the_time_are_recalled(known: list[ExcitedSegments]) ->
         remember(known, segment(seed=int(end), theta=theta), end)
     found = estimates_of(known[1], PLAN, 30.0, 60.0)
     assert found is not None
-    np.testing.assert_allclose(found.solution.theta[PLAN.unknowns(1), 1], 2.0, rtol=1e-2)
+    np.testing.assert_allclose(found.solution.theta[PLAN.structure.unknowns(1), 1], 2.0, rtol=1e-2)
     assert estimates_of(known[1], PLAN, -math.inf, 20.0) is None
 
 

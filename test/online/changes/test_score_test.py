@@ -40,10 +40,10 @@ def test_statistic_is_that_of_plain_least_squares() -> None:
     rng = np.random.default_rng(0)
     lines, duration, density = rng.normal(size=(LINES, PLAN.width)), 500.0, 3.0
     P, C = PLAN.columns.size, PLAN.outputs.size
-    theta = rng.normal(size=(P, C)) * PLAN.belongs
+    theta = rng.normal(size=(P, C)) * PLAN.structure.belongs
     found = score_test(reference(theta, np.zeros((C, P, P)), density), lines, SPECTRUM, duration)
     for c in range(C):
-        unknowns = PLAN.unknowns(c)
+        unknowns = PLAN.structure.unknowns(c)
         X = lines[:, PLAN.columns[unknowns]]
         r = lines[:, PLAN.outputs[c]] - X @ theta[unknowns, c]
         fit = X @ np.linalg.lstsq(X, r, rcond=None)[0]
@@ -73,7 +73,7 @@ def test_disagreement_is_the_chance_of_the_difference() -> None:
     P, C = PLAN.columns.size, PLAN.outputs.size
     covariance = np.tile(0.5 * np.eye(P), (C, 1, 1))
     shift = np.zeros((P, C))
-    shift[PLAN.unknowns(1)[0], 1] = 3.0
+    shift[PLAN.structure.unknowns(1)[0], 1] = 3.0
     chance = disagreement(reference(shift, covariance), reference(np.zeros((P, C)), covariance, freedom=30.0))
     assert chance[0] == pytest.approx(1.0)
     assert chance[1] == pytest.approx(fisher.sf(9.0 / 3, 3, 30.0), rel=1e-6)
@@ -113,6 +113,6 @@ def test_half_a_surface_lost_contradicts_its_own_equation(method: str) -> None:
     time, flights = fly(AIRCRAFT, multisteps(SECONDS, RATE), RATE, 2, seed=4, gusts=0.7, after=after)
     for samples in flights:
         state = flown(samples, time, method)
-        chance = dict(zip(state.equations.coefficients, looked(state, 7).chance(1.0), strict=True))
+        chance = dict(zip(state.equations.structure.coefficients, looked(state, 7).chance(1.0), strict=True))
         assert chance["Cl"] < 1e-6
         assert chance["Cm"] > 1e-3

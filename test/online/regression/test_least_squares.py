@@ -16,10 +16,12 @@ Array = NDArray[np.float64]
 
 
 def test_plan_shares_blocks_and_knows_its_unknowns() -> None:
-    assert PLAIN.coefficients == tuple(STRUCTURE)
+    assert PLAIN.structure.coefficients == tuple(STRUCTURE)
     for c, regressors in enumerate(STRUCTURE.values()):
-        assert [PLAIN.regressors[i] for i in PLAIN.unknowns(c)] == [r for r in regressors if r != "0"]
-    assert PLAIN.block[0] == PLAIN.block[2] != PLAIN.block[1]
+        assert [PLAIN.structure.regressors[i] for i in PLAIN.structure.unknowns(c)] == [
+            r for r in regressors if r != "0"
+        ]
+    assert PLAIN.structure.block[0] == PLAIN.structure.block[2] != PLAIN.structure.block[1]
     assert PLAIN.least_squares
     assert not INSTRUMENTAL.least_squares
 
@@ -29,7 +31,7 @@ def test_all_coefficients_at_once_equal_lstsq_each() -> None:
     solution = least_squares.solve(PLAIN, lines.T @ lines)
     assert solution.usable
     for c in range(len(STRUCTURE)):
-        unknowns = PLAIN.unknowns(c)
+        unknowns = PLAIN.structure.unknowns(c)
         expected, residual, *_ = np.linalg.lstsq(lines[:, PLAIN.columns[unknowns]], lines[:, PLAIN.outputs[c]])
         np.testing.assert_allclose(solution.theta[unknowns, c], expected, rtol=1e-10)
         assert solution.residual[c] == pytest.approx(residual[0], rel=1e-9)
@@ -45,7 +47,7 @@ def test_instrumental_variables_are_those_of_two_stages() -> None:
     ]  # instruments that are correlated with their regressors
     solution = least_squares.solve(equations, lines.T @ lines)
     for c in range(len(STRUCTURE)):
-        unknowns = equations.unknowns(c)
+        unknowns = equations.structure.unknowns(c)
         A, Z, y = (
             lines[:, equations.columns[unknowns]],
             lines[:, equations.instruments[unknowns]],
@@ -63,7 +65,7 @@ def test_known_noise_is_taken_out_of_the_normal_equations() -> None:
     gram = lines.T @ lines
     bias = np.diag(np.linspace(1.0, 5.0, PLAIN.width))
     solution = least_squares.solve(PLAIN, gram, least_squares.bias_of(PLAIN, bias))
-    unknowns = PLAIN.unknowns(0)
+    unknowns = PLAIN.structure.unknowns(0)
     J, y = PLAIN.columns[unknowns], PLAIN.outputs[0]
     expected = np.linalg.solve((gram - bias)[np.ix_(J, J)], gram[J, y])
     np.testing.assert_allclose(solution.theta[unknowns, 0], expected, rtol=1e-10)
@@ -102,16 +104,20 @@ def test_nothing_flown_says_nothing_of_anything(equations: NormalEquations) -> N
 def test_one_regressor_that_tells_nothing_costs_no_other(equations: NormalEquations, twin: bool) -> None:
     """Their own errors are without bound; the other equations, and the other regressors, are as ever."""
     lines, _ = made(equations, 3)
-    alpha, q, de = equations.unknowns(0)
+    alpha, q, de = equations.structure.unknowns(0)
     lines[:, equations.columns[de]] = lines[:, equations.columns[q]] if twin else 0.0
     lines[:, equations.instruments[q]] = lines[:, equations.columns[q]]
     solution = least_squares.solve(equations, lines.T @ lines)
     assert solution.usable
     assert abs(solution.inverse[de, de]) > 1e8
-    for c, others in ((0, np.array([alpha])), (3, equations.unknowns(3)), (5, equations.unknowns(5))):
+    for c, others in (
+        (0, np.array([alpha])),
+        (3, equations.structure.unknowns(3)),
+        (5, equations.structure.unknowns(5)),
+    ):
         J, Z, y = (
-            equations.columns[equations.unknowns(c)],
-            equations.instruments[equations.unknowns(c)],
+            equations.columns[equations.structure.unknowns(c)],
+            equations.instruments[equations.structure.unknowns(c)],
             lines[:, equations.outputs[c]],
         )
         used = np.array([0, 1]) if c == 0 else np.arange(J.size)
@@ -126,7 +132,7 @@ def test_covariance_of_independent_lines_is_the_textbook_one() -> None:
     """
     lines, _ = made(PLAIN, 4)
     for c in range(len(STRUCTURE)):  # the same residual in every band
-        unknowns = PLAIN.unknowns(c)
+        unknowns = PLAIN.structure.unknowns(c)
         A = lines[:, PLAIN.columns[unknowns]]
         residual = lines[:, PLAIN.outputs[c]] - A @ np.linalg.lstsq(A, lines[:, PLAIN.outputs[c]])[0]
         for part in np.split(np.arange(ROWS), BANDS):
@@ -136,7 +142,7 @@ def test_covariance_of_independent_lines_is_the_textbook_one() -> None:
         solution = least_squares.solve(PLAIN, info.grams.sum(axis=0))
         spread = least_squares.uncertainty(PLAIN, solution, info)
         for c in range(len(STRUCTURE)):
-            unknowns = PLAIN.unknowns(c)
+            unknowns = PLAIN.structure.unknowns(c)
             A, y = lines[:, PLAIN.columns[unknowns]], lines[:, PLAIN.outputs[c]]
             s2 = np.sum((y - A @ solution.theta[unknowns, c]) ** 2) / (ROWS - unknowns.size)
             textbook = s2 * np.linalg.inv(A.T @ A)
@@ -191,7 +197,8 @@ def test_a_regressor_that_follows_its_instrument_more_than_expected_is_chance(ra
     )
     free = columns != instruments
     np.testing.assert_allclose(
-        found.selection_factor[free & (INSTRUMENTAL.group == INSTRUMENTAL.block[5])], max(ratio, 1.0) ** 2
+        found.selection_factor[free & (INSTRUMENTAL.structure.group == INSTRUMENTAL.structure.block[5])],
+        max(ratio, 1.0) ** 2,
     )
     assert (found.selection_factor >= 1.0).all()
 
@@ -212,9 +219,9 @@ def test_an_instrument_that_does_not_move_is_none() -> None:
 
 def test_weak_instruments_cost_their_block_alone() -> None:
     strength = np.full(INSTRUMENTAL.columns.size, 100.0)
-    strength[INSTRUMENTAL.unknowns(3)[0]] = 2.0
+    strength[INSTRUMENTAL.structure.unknowns(3)[0]] = 2.0
     mixed = normal_equations.with_strong_instruments(INSTRUMENTAL, strength)
-    weak = INSTRUMENTAL.group == INSTRUMENTAL.block[3]
+    weak = INSTRUMENTAL.structure.group == INSTRUMENTAL.structure.block[3]
     np.testing.assert_array_equal(mixed.instruments[weak], INSTRUMENTAL.columns[weak])
     np.testing.assert_array_equal(mixed.instruments[~weak], INSTRUMENTAL.instruments[~weak])
 
@@ -227,7 +234,7 @@ def test_quantiles_are_students() -> None:
 
 def test_a_rival_is_the_regressor_that_moved_alike() -> None:
     lines, _ = made(PLAIN, 9)
-    alpha, q, de = (PLAIN.columns[i] for i in PLAIN.unknowns(0))
+    alpha, q, de = (PLAIN.columns[i] for i in PLAIN.structure.unknowns(0))
     lines[:, q] = lines[:, de] + 0.05 * lines[:, alpha] + 0.01 * np.random.default_rng(1).normal(size=ROWS)
     names = least_squares.most_correlated(PLAIN, least_squares.solve(PLAIN, lines.T @ lines))
-    assert [PLAIN.regressors[names[i]] for i in PLAIN.unknowns(0)][1:] == ["de", "q"]
+    assert [PLAIN.structure.regressors[names[i]] for i in PLAIN.structure.unknowns(0)][1:] == ["de", "q"]

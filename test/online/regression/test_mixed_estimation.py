@@ -7,21 +7,20 @@ import pytest
 from plant import TRUTH, exact_flight, made_aircraft
 
 from sysid_node.aircraft.model import Derivative
-from sysid_node.online.frequency import regression_signals
-from sysid_node.online.regression import normal_equations
 from sysid_node.online.regression.mixed_estimation import believed_derivatives, gained, weighed
+from sysid_node.online.regression.normal_equations import model_structure
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 
 AIRCRAFT = made_aircraft()
-PLAN = normal_equations.normal_equations(AIRCRAFT.model_structure, regression_signals.layout(AIRCRAFT))
+STRUCTURE = model_structure(AIRCRAFT.model_structure)
 
 
 def test_beliefs_are_the_file_s() -> None:
     aircraft = replace(AIRCRAFT, derivatives={**AIRCRAFT.derivatives, "CL_q": Derivative(3.0)})
-    values, precisions = believed_derivatives(aircraft, PLAN)
-    c = PLAN.coefficients.index("CL")
-    named = {PLAN.regressors[i]: (values[i, c], precisions[i, c]) for i in PLAN.unknowns(c)}
+    values, precisions = believed_derivatives(aircraft, STRUCTURE)
+    c = STRUCTURE.coefficients.index("CL")
+    named = {STRUCTURE.regressors[i]: (values[i, c], precisions[i, c]) for i in STRUCTURE.unknowns(c)}
     assert named["alpha"] == (TRUTH["CL_alpha"], pytest.approx((0.1 * TRUTH["CL_alpha"]) ** -2))
     assert named["q"] == (3.0, 0.0)
 
@@ -29,15 +28,15 @@ def test_beliefs_are_the_file_s() -> None:
 def test_the_mean_is_that_of_mixed_estimation() -> None:
     """Klein & Morelli (2006), sec. 5.4: (P^-1 + D^-1)^-1 (P^-1 theta + D^-1 believed)."""
     rng = np.random.default_rng(0)
-    values, precisions = believed_derivatives(AIRCRAFT, PLAN)
-    theta = (values + 0.3 * rng.normal(size=values.shape)) * PLAN.belongs
-    covariance = np.zeros((theta.shape[1], *PLAN.same_block.shape))
+    values, precisions = believed_derivatives(AIRCRAFT, STRUCTURE)
+    theta = (values + 0.3 * rng.normal(size=values.shape)) * STRUCTURE.belongs
+    covariance = np.zeros((theta.shape[1], *STRUCTURE.same_block.shape))
     for c in range(theta.shape[1]):
-        root = rng.normal(size=PLAN.same_block.shape)
-        covariance[c] = root @ root.T * np.outer(PLAN.belongs[:, c], PLAN.belongs[:, c])
-    mean, spread = weighed(PLAN, theta, covariance, values, precisions)
+        root = rng.normal(size=STRUCTURE.same_block.shape)
+        covariance[c] = root @ root.T * np.outer(STRUCTURE.belongs[:, c], STRUCTURE.belongs[:, c])
+    mean, spread = weighed(STRUCTURE, theta, covariance, values, precisions)
     for c in range(theta.shape[1]):
-        unknowns = PLAN.unknowns(c)
+        unknowns = STRUCTURE.unknowns(c)
         P, D = np.linalg.inv(covariance[c][np.ix_(unknowns, unknowns)]), np.diag(precisions[unknowns, c])
         expected = np.linalg.inv(P + D)
         np.testing.assert_allclose(spread[c][np.ix_(unknowns, unknowns)], expected, rtol=1e-7)
@@ -47,11 +46,11 @@ def test_the_mean_is_that_of_mixed_estimation() -> None:
 
 
 def test_without_tolerances_nothing_changes() -> None:
-    values, precisions = believed_derivatives(AIRCRAFT, PLAN)
-    theta, covariance = values + 1.0, np.tile(PLAN.same_block, (values.shape[1], 1, 1))
-    mean, spread = weighed(PLAN, theta, covariance, values, 0.0 * precisions)
+    values, precisions = believed_derivatives(AIRCRAFT, STRUCTURE)
+    theta, covariance = values + 1.0, np.tile(STRUCTURE.same_block, (values.shape[1], 1, 1))
+    mean, spread = weighed(STRUCTURE, theta, covariance, values, 0.0 * precisions)
     for c in range(theta.shape[1]):
-        unknowns = PLAN.unknowns(c)
+        unknowns = STRUCTURE.unknowns(c)
         np.testing.assert_allclose(mean[unknowns, c], theta[unknowns, c])
         np.testing.assert_allclose(spread[c][np.ix_(unknowns, unknowns)], covariance[c][np.ix_(unknowns, unknowns)])
 

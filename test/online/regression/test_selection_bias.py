@@ -19,13 +19,13 @@ def judged(equations: normal_equations.NormalEquations, lines: Array, prior: Arr
         least_squares.uncertainty(equations, solution, info),
     )
     return selection_bias_factors(
-        equations, solution, spread, instrument_strength, gram, prior, equations.belongs * tolerance**-2
+        equations, solution, spread, instrument_strength, gram, prior, equations.structure.belongs * tolerance**-2
     )
 
 
 def test_least_squares_need_none() -> None:
     lines, _ = made(PLAIN, 1)
-    np.testing.assert_array_equal(judged(PLAIN, lines, 0.0 * PLAIN.belongs, 0.1), 1.0)
+    np.testing.assert_array_equal(judged(PLAIN, lines, 0.0 * PLAIN.structure.belongs, 0.1), 1.0)
 
 
 def test_a_residual_that_is_small_because_the_estimate_is_off_counts_as_what_it_would_be() -> None:
@@ -33,8 +33,8 @@ def test_a_residual_that_is_small_because_the_estimate_is_off_counts_as_what_it_
     rng = np.random.default_rng(4)
     equations, c = INSTRUMENTAL, 5
     x, z, y = (
-        equations.columns[equations.unknowns(c)[0]],
-        equations.instruments[equations.unknowns(c)[0]],
+        equations.columns[equations.structure.unknowns(c)[0]],
+        equations.instruments[equations.structure.unknowns(c)[0]],
         equations.outputs[c],
     )
     lines = rng.normal(size=(120, equations.width))
@@ -42,9 +42,9 @@ def test_a_residual_that_is_small_because_the_estimate_is_off_counts_as_what_it_
     lines[:, z] = rng.normal(size=120) + 0.4 * u  # instruments that know of the noise, as chance may have it
     lines[:, x] = lines[:, z] + u
     lines[:, y] = lines[:, x] + u
-    truth = equations.belongs * 0.0
-    truth[equations.unknowns(c)[0], c] = 1.0
+    truth = equations.structure.belongs * 0.0
+    truth[equations.structure.unknowns(c)[0], c] = 1.0
     known, unknown = judged(equations, lines, truth, 0.01), judged(equations, lines, truth, 1e3)
-    unknowns = equations.unknowns(c)[0], c
+    unknowns = equations.structure.unknowns(c)[0], c
     assert known[unknowns] > 1.1 * unknown[unknowns]
-    assert (judged(equations, lines, truth, 0.1)[equations.belongs > 0.0] >= 1.0).all()
+    assert (judged(equations, lines, truth, 0.1)[equations.structure.belongs > 0.0] >= 1.0).all()

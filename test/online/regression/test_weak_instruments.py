@@ -75,7 +75,7 @@ def bent(solution: Solution, gram: Array, covariance: Array, freedom: float, gus
     )
 
 
-TABLE = derivative_index(AIRCRAFT, PLAN, 0.3)
+TABLE = derivative_index(AIRCRAFT, PLAN.structure, 0.3)
 
 
 def test_for_the_share_of_gusts_students_quantile_is_not_paid_back() -> None:

@@ -40,7 +40,7 @@ def test_noise_is_not_explained_by_what_makes_all_coefficients_smaller():
 def test_a_relative_error_of_the_area_is_that_of_every_slope():
     """C = F / (qbar S), so that d C_j / dS = -C_j / S exactly, of every slope."""
     aircraft, state = flown({"geometry.S": 0.01 * 0.55})
-    found, belongs = state.latest.systematic, state.equations.belongs.T > 0.0
+    found, belongs = state.latest.systematic, state.equations.structure.belongs.T > 0.0
     slopes = state.latest.solution.theta.T + found.correction[:, :-1]
     jacobian = found.considered.jacobian[0, :, :-1]
     np.testing.assert_allclose(jacobian[belongs], -slopes[belongs] / aircraft.geometry.S, rtol=1e-3)
