@@ -38,7 +38,7 @@ _TOGETHER = ("test/gap/", "test/batch/", "test/sim/")
 #: What takes longest. It begins first, so that no worker ends long after the other.
 _FIRST = (
     *("test/gap/", "test/docs/test_snippets.py", "test/batch/", "test/sim/", "test/ros/test_closed_loop.py"),
-    *("test/cli/test_loop.py", "test/cli/test_demo.py", "test/ros/", "test/cli/", "test/fleet/", "test/bench/"),
+    *("test/cli/live/", "test/ros/", "test/cli/", "test/fleet/", "test/bench/"),
 )
 
 

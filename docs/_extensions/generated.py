@@ -60,7 +60,7 @@ def commands() -> str:
         "anything else. `--debug` adds the traceback of an error.\n",
     ]
     for name in main.COMMANDS:
-        parts += _command(name, _subparser(main.build_parser(name), name), main.COMMANDS[name])
+        parts += _command(name, _subparser(main.build_parser(name), name), main.COMMANDS[name].meaning)
     return "\n".join(parts)
 
 

@@ -1,6 +1,6 @@
 """``sysid``: finds the command, runs it, and turns an error into one line and an exit code.
 
-A command is the module of its name beside this one; that of ``import`` is ``import_model``. It has
+A command is a module of its name in a package beside this module; that of ``import`` is ``import_model``. It has
 ``add_parser(commands)``, which adds its parser to argparse's ``commands`` and returns it, and ``run(args)``. Only the
 module of the command that is run is imported.
 """
@@ -18,29 +18,37 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from sysid_node.errors import InputError, InputWarning, ModelWarning
 from sysid_node.interruption import end_on_signals
 from sysid_node.linear_algebra import one_thread_for_linear_algebra
 from sysid_node.suggestion import did_you_mean
 
+
+class Command(NamedTuple):
+    """A command of ``sysid``."""
+
+    module: str  # within ``sysid_node.cli``
+    meaning: str
+
+
 COMMANDS = {
-    "replay": "identify an aircraft from a bag, as the live node does",
-    "identify": "identify an aircraft from bags with a batch method",
-    "simulate": "fly a simulated aircraft into a bag",
-    "excite": "design a manoeuvre and predict its accuracy",
-    "gap": "find why the simulator does not fly like the aircraft",
-    "fleet": "identify many flights of many aircraft, and say what they tell together",
-    "aircraft": "say what an aircraft file means, as a handbook would",
-    "check": "say what a flight's file is good for",
-    "convert": "turn a flight log into a bag",
-    "export": "write an estimate as another simulator's model",
-    "import": "read another simulator's model as an aircraft file",
-    "report": "write report.html again from the files of a run",
-    "view": "show a flight in 3-D and against time",
-    "demo": "identify a recorded flight live, over DDS",
-    "loop": "an adaptive controller in closed loop, over DDS",
+    "replay": Command("flights.replay", "identify an aircraft from a bag, as the live node does"),
+    "identify": Command("flights.identify", "identify an aircraft from bags with a batch method"),
+    "simulate": Command("models.simulate", "fly a simulated aircraft into a bag"),
+    "excite": Command("models.excite", "design a manoeuvre and predict its accuracy"),
+    "gap": Command("flights.gap", "find why the simulator does not fly like the aircraft"),
+    "fleet": Command("flights.fleet", "identify many flights of many aircraft, and say what they tell together"),
+    "aircraft": Command("models.aircraft", "say what an aircraft file means, as a handbook would"),
+    "check": Command("flights.check", "say what a flight's file is good for"),
+    "convert": Command("flights.convert", "turn a flight log into a bag"),
+    "export": Command("models.export", "write an estimate as another simulator's model"),
+    "import": Command("models.import_model", "read another simulator's model as an aircraft file"),
+    "report": Command("flights.report", "write report.html again from the files of a run"),
+    "view": Command("flights.view", "show a flight in 3-D and against time"),
+    "demo": Command("live.demo", "identify a recorded flight live, over DDS"),
+    "loop": Command("live.loop", "an adaptive controller in closed loop, over DDS"),
 }
 
 #: The file under ``requirements/`` that brings a package which not every command needs.
@@ -157,8 +165,8 @@ def exit_code(command: str, work: Callable[[], int], *, debug: bool = False) -> 
 
 
 def module_of(command: str) -> str:
-    """The name of a command's module: its own, but for a command that is a word of the language."""
-    return f"sysid_node.cli.{'import_model' if command == 'import' else command}"
+    """The full name of a command's module."""
+    return f"sysid_node.cli.{COMMANDS[command].module}"
 
 
 def build_parser(command: str) -> Parser:
@@ -166,7 +174,7 @@ def build_parser(command: str) -> Parser:
     parser = Parser(prog="sysid", description="Identify a fixed-wing aircraft in flight and at the desk.")
     parser.add_argument("--debug", action="store_true", help="print the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
-    for name, meaning in COMMANDS.items():
+    for name, (_, meaning) in COMMANDS.items():
         if find_spec(module_of(name)) is None:
             continue  # this command belongs to a layer that is not installed
         if name == command:

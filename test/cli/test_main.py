@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from sysid_node.cli.main import COMMANDS, exit_code, main
+from sysid_node.cli.main import COMMANDS, exit_code, main, module_of
 from sysid_node.errors import InputError
 
 CONVERT = ["convert", "log.csv", "--out", "bag"]
@@ -122,7 +122,7 @@ def test_runs_as_a_module():
     )
 
 
-@pytest.mark.parametrize("command", [name for name in COMMANDS if find_spec(f"sysid_node.cli.{name}")])
+@pytest.mark.parametrize("command", [name for name in COMMANDS if find_spec(module_of(name))])
 def test_every_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as caught:
         main([command, "--help"])

@@ -240,6 +240,6 @@ def test_another_file_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixt
 
 @pytest.mark.parametrize("command", ["replay", "report", "gap", "view"])
 def test_other_commands_do_not_load_the_viewer(command: str) -> None:
-    code = f"import sys, sysid_node.cli.{command}; print('rerun' in sys.modules, 'pyarrow' in sys.modules)"
+    code = f"import sys, sysid_node.cli.flights.{command}; print('rerun' in sys.modules, 'pyarrow' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]

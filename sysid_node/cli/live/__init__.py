@@ -1,1 +1,4 @@
-"""What the commands that run ROS nodes share: processes, a ROS domain of their own, and the live table."""
+"""Commands that run ROS nodes, ``demo`` and ``loop``, and the programs ``view`` and ``markers``, which show a flight.
+
+They share processes, a ROS domain of their own, and the live table.
+"""

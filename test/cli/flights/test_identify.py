@@ -12,7 +12,7 @@ from sysid_node.cli.main import main
 from sysid_node.flight.csv import write_csv
 from sysid_node.flight.logs.opening import load_flight_record
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 BAGS = ROOT / "bags"
 KEYS = {"aircraft", "method", "data_seconds", "samples", "rejected", "settings", "derivatives", "fits", "holdout"}
 

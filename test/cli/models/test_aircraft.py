@@ -42,5 +42,5 @@ def test_an_unknown_name_is_one_line(capsys):
 
 
 def test_it_starts_light():
-    code = "import sys, sysid_node.cli.aircraft; sys.exit(bool({'jax', 'rclpy', 'pandas'} & sys.modules.keys()))"
+    code = "import sys, sysid_node.cli.models.aircraft; sys.exit(bool({'jax', 'rclpy', 'pandas'} & sys.modules.keys()))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -9,7 +9,7 @@ from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 
-BAG = Path(__file__).resolve().parents[2] / "bags" / "cdrw_multistep"
+BAG = Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep"
 
 
 def said(capsys: pytest.CaptureFixture[str]) -> str:

@@ -13,7 +13,7 @@ from sysid_node.cli.main import main
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def demo(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -12,7 +12,7 @@ from sysid_node.cli.main import main
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def loop(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -14,7 +14,7 @@ from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 BAGS = ROOT / "bags"
 
 MANOEUVRE = [

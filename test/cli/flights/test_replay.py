@@ -206,7 +206,7 @@ def test_frame_and_topics_are_options(arguments, tmp_path, flight, bag):
 def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp_path, capsys):
     """The elevator of this flight loses half its effect at 30 s; the report drawn anew from the files says the same."""
     out = tmp_path / "out"
-    bag = Path(__file__).resolve().parents[2] / "bags" / "cdrw_failed_elevator"
+    bag = Path(__file__).resolve().parents[3] / "bags" / "cdrw_failed_elevator"
     assert main(["replay", str(bag), "--aircraft", "cdrw", "--out", str(out), "--set", "publish_rate=4"]) == 0
     terminal = capsys.readouterr().out
     assert "faults: elevator: loss of effectiveness, " in terminal
