@@ -43,6 +43,7 @@ ROOMS = {
         "thresholds", "flightdata", "residuals", "estimation", "instruments", "short_flights", "selection",
         "validation", "verdict", "surrogate", "diagnose", "document", "correction", "reflying",
     ),
+    "control": ("settings", "types", "design", "adaptation", "inputs", "law", "controller"),
     "cli": ("shared", "live", "models", "flights", "main", "__main__"),
 }  # fmt: skip
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import controller
-from sysid_node.control.estimates import identified_derivatives
+from sysid_node.control.inputs.estimates import identified_derivatives
 from sysid_node.control.settings import ControllerSettings as Control
 from sysid_node.control.types import Measurements, SetPoints
 from sysid_node.dynamics.atmosphere import GRAVITY

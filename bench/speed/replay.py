@@ -29,7 +29,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, ImuStream, JointStream, Streams, arrivals_in_stamp_order
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.report.files.estimates_bag import write_estimates
+from sysid_node.report.files.runs.estimates_bag import write_estimates
 
 GRAVITY = 9.81
 STATES, CONTROLS = ("alpha", "q", "beta", "p", "r"), ("de", "da", "dr")

@@ -17,7 +17,7 @@ from sysid_node.fleet.catalogue.locations import local_copy
 from sysid_node.fleet.outcome import FleetSettings, FlightOutcome, FlightTask
 from sysid_node.flight.logs.origin import log_origin
 from sysid_node.flight.record import Array
-from sysid_node.report.files.run_folder import REPORT, write_run
+from sysid_node.report.files.runs.run_folder import REPORT, write_run
 
 #: Hz at which a fleet's replays estimate: what its result holds is the estimate at the end.
 PUBLISH_RATE = 1.0

@@ -24,7 +24,7 @@ from sysid_node.fleet.state.store import FILES, STATE, FleetState
 from sysid_node.fleet.statistics.summarise import summarise
 from sysid_node.fleet.tables import document, write_tables
 from sysid_node.report import fleet as fleet_report
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.results.fleet_report import FleetReport
 
 SUMMARY = "fleet.json"

@@ -22,8 +22,8 @@ from sysid_node.gap.flightdata.gap_flight import load_gap_flight
 from sysid_node.gap.reflying import InSimulator, fly_in, reflown_content
 from sysid_node.report.drawing.plotly_figure import plotly_figure
 from sysid_node.report.files.gap_folder import UNFINISHED, write_gap
-from sysid_node.report.files.output_folder import output_folder
-from sysid_node.report.files.run_folder import REPORT
+from sysid_node.report.files.outputs.output_folder import output_folder
+from sysid_node.report.files.runs.run_folder import REPORT
 from sysid_node.report.sections.gap.flight import flight_figures
 from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.report.sections.gap.waterfall import waterfall

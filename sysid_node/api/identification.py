@@ -13,9 +13,9 @@ from sysid_node.batch.identify import identify as identify_records
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.truth import read_truth
-from sysid_node.report.files.batch_tables import write_batch_tables
-from sysid_node.report.files.output_folder import output_folder
-from sysid_node.report.files.run_folder import REPORT, write_run
+from sysid_node.report.files.outputs.output_folder import output_folder
+from sysid_node.report.files.runs.batch_tables import write_batch_tables
+from sysid_node.report.files.runs.run_folder import REPORT, write_run
 from sysid_node.report.results.from_identification import identification_result
 from sysid_node.report.results.run_result import RunResult
 

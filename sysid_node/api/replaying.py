@@ -34,9 +34,9 @@ from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
-from sysid_node.report.files.estimates_bag import write_estimates
-from sysid_node.report.files.output_folder import output_folder
-from sysid_node.report.files.run_folder import REPORT, write_run
+from sysid_node.report.files.outputs.output_folder import output_folder
+from sysid_node.report.files.runs.estimates_bag import write_estimates
+from sysid_node.report.files.runs.run_folder import REPORT, write_run
 from sysid_node.report.results.from_replay import replay_result
 from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import RunResult

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.control.axis import ControlAxis
-from sysid_node.control.margins import margins
+from sysid_node.control.design.axis import ControlAxis
+from sysid_node.control.design.margins import margins
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import IdentifiedDerivative
 

@@ -16,13 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.control import adaptation, law
+from sysid_node.control import adaptation
 from sysid_node.control.adaptation import AxisAdaptation
-from sysid_node.control.axis import axes
-from sysid_node.control.input_checks import InputChecks
-from sysid_node.control.law import LONGEST_STEP, LawState
+from sysid_node.control.design.axis import axes
+from sysid_node.control.inputs.input_checks import InputChecks
+from sysid_node.control.law import control_law
+from sysid_node.control.law.control_law import LONGEST_STEP, LawState
+from sysid_node.control.law.tracking import TrackingWatch
 from sysid_node.control.settings import ControllerSettings
-from sysid_node.control.tracking import TrackingWatch
 from sysid_node.control.types import Command, IdentifiedDerivative, Measurements, SetPoints
 
 NO_EXCITATION = (0.0, 0.0, 0.0)
@@ -50,7 +51,7 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> ControllerState:
     Raises InputError where the aircraft file or the actuators do not suffice.
     """
     pitch, lateral = (adaptation.init(axis) for axis in axes(aircraft, settings.actuator_lag, settings.delay))
-    flown = law.init(aircraft, settings)
+    flown = control_law.init(aircraft, settings)
     checks = InputChecks(np.minimum(flown.design.limits, settings.largest_excitation))
     return ControllerState(settings, (pitch, lateral), flown, checks, TrackingWatch(settings.largest_tracking_error))
 
@@ -86,7 +87,7 @@ def step(
         adaptation.advance(axis, state.settings, duration)
     pitch, lateral = state.axes
     parameters = ((pitch.axis, pitch.flown), (lateral.axis, lateral.flown))
-    command = law.step(state.law, measured, points, parameters, added, duration)
+    command = control_law.step(state.law, measured, points, parameters, added, duration)
     if state.law.wanted is not None:
         state.tracking.update(measured, state.law.wanted)
     return command

@@ -16,10 +16,10 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.control import controller
-from sysid_node.control.allocation import Allocation
-from sysid_node.control.estimates import identified_derivatives
-from sysid_node.control.plant import CONTROLS
-from sysid_node.control.set_point_input import SetPointInput
+from sysid_node.control.design.plant import CONTROLS
+from sysid_node.control.inputs.estimates import identified_derivatives
+from sysid_node.control.inputs.set_point_input import SetPointInput
+from sysid_node.control.law.allocation import Allocation
 from sysid_node.control.settings import RANGES, ControllerSettings
 from sysid_node.control.types import Command, Measurements
 from sysid_node.flight.live import messages

@@ -7,8 +7,8 @@ import pytest
 from flying import AIRCRAFT, NAN, STEP, beliefs, level
 
 from sysid_node.control import adaptation, controller
-from sysid_node.control.axis import axes
-from sysid_node.control.margins import margins
+from sysid_node.control.design.axis import axes
+from sysid_node.control.design.margins import margins
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import SetPoints
 from sysid_node.errors import InputError

@@ -20,7 +20,7 @@ from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.report.files.loop_folder import write_loop_folder
-from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.files.runs.run_folder import write_run
 from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.results.signals import Response, RunSignals

@@ -25,7 +25,7 @@ from sysid_node.flight.logs.opening import open_log
 from sysid_node.flight.logs.rates import rates_of_streams
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.streams import COMMAND_FRACTIONS
-from sysid_node.report.files.output_file import output_bag
+from sysid_node.report.files.outputs.output_file import output_bag
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sysid_node.api.flight_file import load
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

@@ -13,7 +13,7 @@ from sysid_node.batch.identify import METHODS
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar, show_estimates
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

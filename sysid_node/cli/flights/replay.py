@@ -10,7 +10,7 @@ from sysid_node.api.flight_file import load
 from sysid_node.api.replaying import replay
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar, show_estimates, show_faults
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

@@ -36,8 +36,8 @@ from sysid_node.online import replay
 from sysid_node.online.alignment.in_pieces import AlignedSamples, align_streams
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
-from sysid_node.report.files.output_folder import output_folder
-from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.files.outputs.output_folder import output_folder
+from sysid_node.report.files.runs.run_folder import write_run
 from sysid_node.report.results.from_replay import replay_result
 from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import RunResult

@@ -24,7 +24,7 @@ from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.online.settings import METHODS
 from sysid_node.report.files.loop_folder import write_loop_folder
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 
 if TYPE_CHECKING:

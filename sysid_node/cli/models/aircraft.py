@@ -13,7 +13,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.shared import options
 from sysid_node.dynamics.handbook.handbook import Handbook, handbook
 from sysid_node.report.files.handbook_folder import write_handbook
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.sections import handbook as section
 from sysid_node.report.wording.numbers import number
 

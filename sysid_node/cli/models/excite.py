@@ -11,7 +11,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
 from sysid_node.errors import InputError
-from sysid_node.report.files.output_folder import output_folder
+from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.suggestion import did_you_mean
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from sysid_node.aircraft.load import load_aircraft, named_aircraft
 from sysid_node.aircraft.model import Aircraft, Derivative
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
-from sysid_node.report.files.output_file import check_file, write_file
+from sysid_node.report.files.outputs.output_file import check_file, write_file
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]

@@ -12,7 +12,7 @@ from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import parse_aircraft
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
-from sysid_node.report.files.output_file import check_file, write_file
+from sysid_node.report.files.outputs.output_file import check_file, write_file
 
 if TYPE_CHECKING:
     from sysid_node.sim.importing.imported import Imported

@@ -21,7 +21,7 @@ from sysid_node.flight.commands import COMMANDS, POSITIONS
 from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.streams import JointStream, Streams
 from sysid_node.flight.truth import truth_path
-from sysid_node.report.files.output_file import output_bag
+from sysid_node.report.files.outputs.output_file import output_bag
 
 if TYPE_CHECKING:
     from sysid_node.excite.manoeuvre import Manoeuvre

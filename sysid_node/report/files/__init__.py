@@ -1,5 +1,5 @@
-"""The files of a run: written into the folder of ``--out``, and read back.
+"""The files that commands write into the folder of ``--out``, and read back.
 
-``run_folder`` writes ``summary.json``, the CSV tables and ``report.html`` from a ``RunResult``, and reads them for
-``sysid report``. Estimates and faults also become bags, which ``ros2 bag play`` shows as if they were live.
+``outputs`` makes a file or folder appear whole or not at all. ``runs`` holds the files of an identification; the
+folders of the other commands have a module each. ``rewriting`` makes any of their reports again.
 """

@@ -23,7 +23,7 @@ from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 from sysid_node.gap.short_flights.readings import can_be_simulated
 from sysid_node.gap.validation.handed_on import corrected_parameters
 from sysid_node.gap.validation.simulation_error import side_by_side
-from sysid_node.report.files.run_tables import read_columns
+from sysid_node.report.files.runs.run_tables import read_columns
 from sysid_node.sim.model.layout import OUTPUTS
 
 FLIGHTS = "flights.csv"

@@ -10,7 +10,7 @@ from typing import Any
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.online.types import DerivativeEstimate
-from sysid_node.report.files.run_tables import read_columns
+from sysid_node.report.files.runs.run_tables import read_columns
 from sysid_node.report.pages.closed_loop_page import write_loop
 from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from sysid_node.errors import InputError
 from sysid_node.report.files.loop_folder import read_loop
-from sysid_node.report.files.run_folder import REPORT, rebuild_report
+from sysid_node.report.files.runs.run_folder import REPORT, rebuild_report
 from sysid_node.report.pages.closed_loop_page import write_loop
 
 #: Why the page of a folder cannot be made from its files alone, by the command.

@@ -16,7 +16,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData
 
-from sysid_node.control.allocation import Allocation
+from sysid_node.control.law.allocation import Allocation
 from sysid_node.errors import InputError
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.frames import quaternion_from_euler

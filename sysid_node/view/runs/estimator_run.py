@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.report.files.run_folder import read_run
+from sysid_node.report.files.runs.run_folder import read_run
 from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.wording.names import COEFFICIENT_WORDS
 from sysid_node.view.bodies import body_of_record, shape_of_aircraft

@@ -4,7 +4,7 @@ import pytest
 
 from sysid_node.cli.main import main
 from sysid_node.online.types import DerivativeEstimate, Estimates
-from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.files.runs.run_folder import write_run
 from sysid_node.report.results.run_result import Prior, References, RunResult
 
 

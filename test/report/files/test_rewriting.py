@@ -8,7 +8,7 @@ import synthetic
 from sysid_node.errors import InputError
 from sysid_node.report.files.loop_folder import write_loop_folder
 from sysid_node.report.files.rewriting import rewrite_report
-from sysid_node.report.files.run_folder import write_run
+from sysid_node.report.files.runs.run_folder import write_run
 from sysid_node.report.results.closed_loop import ClosedLoopFlight, Event
 
 

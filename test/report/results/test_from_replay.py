@@ -11,7 +11,7 @@ from sysid_node.aircraft.model import Aircraft, Sensors
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS, DerivativeEstimate, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
-from sysid_node.report.files.run_folder import rebuild_report, write_run
+from sysid_node.report.files.runs.run_folder import rebuild_report, write_run
 from sysid_node.report.results.from_replay import replay_result
 from sysid_node.report.results.recorded_samples import RecordedSamples
 

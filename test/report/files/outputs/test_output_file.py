@@ -3,7 +3,7 @@
 import pytest
 
 from sysid_node.errors import InputError
-from sysid_node.report.files.output_file import check_file, output_bag, write_file
+from sysid_node.report.files.outputs.output_file import check_file, output_bag, write_file
 
 MARK = "sysid export"
 

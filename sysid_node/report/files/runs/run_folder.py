@@ -15,8 +15,8 @@ from sysid_node.errors import InputError
 from sysid_node.interruption import on_interrupt
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.drawing.thinning import MAX_ROWS, thin_curve, thin_flight
-from sysid_node.report.files import run_tables as tables
-from sysid_node.report.files.fault_summary import as_summary, from_summary
+from sysid_node.report.files.runs import run_tables as tables
+from sysid_node.report.files.runs.fault_summary import as_summary, from_summary
 from sysid_node.report.pages.run_page import write_report
 from sysid_node.report.results.run_result import References, RunData, RunResult
 from sysid_node.report.results.signals import Response, RunSignals

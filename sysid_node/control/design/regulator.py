@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 
-from sysid_node.control.margins import margins
+from sysid_node.control.design.margins import margins
 from sysid_node.dynamics.linear_model import LinearModel
 from sysid_node.errors import InputError
 

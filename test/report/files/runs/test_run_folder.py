@@ -10,7 +10,7 @@ import synthetic
 
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
-from sysid_node.report.files.run_folder import read_run, rebuild_report, summary, write_run
+from sysid_node.report.files.runs.run_folder import read_run, rebuild_report, summary, write_run
 from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.results.signals import RunSignals
 

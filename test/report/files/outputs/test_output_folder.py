@@ -7,7 +7,7 @@ import os
 import pytest
 
 from sysid_node.errors import InputError
-from sysid_node.report.files.output_folder import STAGE, output_folder
+from sysid_node.report.files.outputs.output_folder import STAGE, output_folder
 from sysid_node.version import VERSION
 
 

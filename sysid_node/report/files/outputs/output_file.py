@@ -13,7 +13,7 @@ from pathlib import Path
 from sysid_node.errors import InputError
 from sysid_node.flight.truth import truth_path
 from sysid_node.interruption import indivisible, on_interrupt
-from sysid_node.report.files.output_folder import refuse_inputs
+from sysid_node.report.files.outputs.output_folder import refuse_inputs
 
 _BAG_SUFFIXES = (".mcap", ".db3")
 

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.control import reference
 from sysid_node.control.adaptation import AxisParameters
-from sysid_node.control.axis import ControlAxis
-from sysid_node.control.reference import DelayedReference, ReferenceMotion, ReferenceState
+from sysid_node.control.design.axis import ControlAxis
+from sysid_node.control.law import reference
+from sysid_node.control.law.reference import DelayedReference, ReferenceMotion, ReferenceState
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import Command, Measurements, SetPoints
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sysid_node.control import controller
-from sysid_node.control.set_point_input import SetPointInput
+from sysid_node.control.inputs.set_point_input import SetPointInput
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import SetPoints
 

@@ -12,7 +12,7 @@ from sysid_node.flight.streams import Stamps
 from sysid_node.flight.topics import DERIVATIVES, DERIVATIVES_TYPE
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.types import Estimates
-from sysid_node.report.files.fault_messages import FAULTS, FAULTS_TYPE, fault_messages
+from sysid_node.report.files.runs.fault_messages import FAULTS, FAULTS_TYPE, fault_messages
 
 _AT_ONCE = 1024  # estimates that are serialised together
 

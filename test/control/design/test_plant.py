@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.control import plant
+from sysid_node.control.design import plant
 from sysid_node.dynamics.linear_model import DimensionalScales
 from sysid_node.dynamics.linearised import trimmed
 from sysid_node.errors import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sysid_node.control.reference import ReferenceMotion
+from sysid_node.control.law.reference import ReferenceMotion
 from sysid_node.control.types import Measurements
 
 #: s for which the error must be too large until the baseline is flown, and small until estimates may be used again.

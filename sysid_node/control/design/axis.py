@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.control import plant, regulator
+from sysid_node.control.design import plant, regulator
 from sysid_node.dynamics.linear_model import Derivatives, DimensionalScales, LinearModel
 from sysid_node.dynamics.linearised import table_derivatives, trimmed
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid_node.control import margins as m
-from sysid_node.control.plant import behind_actuators
+from sysid_node.control.design import margins as m
+from sysid_node.control.design.plant import behind_actuators
 from sysid_node.dynamics.linear_model import LinearModel
 
 INTEGRATOR = LinearModel(np.zeros((1, 1)), np.ones((1, 1)))

@@ -8,7 +8,7 @@ import pytest
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
-from sysid_node.report.files import run_tables as tables
+from sysid_node.report.files.runs import run_tables as tables
 from sysid_node.report.results.run_result import Prior, References
 from sysid_node.report.results.signals import Response, Spectra
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.control.allocation import Allocation
+from sysid_node.control.law.allocation import Allocation
 from sysid_node.flight.actuation import Actuation
 
 

@@ -1,0 +1,1 @@
+"""Outputs of commands, files and folders: made aside, and moved into their place when they are whole."""
