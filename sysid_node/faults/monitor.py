@@ -43,7 +43,7 @@ from sysid_node.faults.model.residual_whitening import ORDER
 from sysid_node.faults.model.terms import Terms, terms
 from sysid_node.faults.report import Detection, fault_of
 from sysid_node.faults.settings import FaultMonitorSettings
-from sysid_node.faults.state import LAG, SPANS, Alarm, MonitorState, WhitenedBlock
+from sysid_node.faults.state import LAG, SPANS, Alarm, FaultHypotheses, MonitorState, WhitenedBlock
 from sysid_node.faults.types import DAMAGE, VANE_STUCK, Fault
 from sysid_node.online.frequency.regression_signals import OFFSET
 
@@ -87,24 +87,25 @@ def update(state: MonitorState, time: float, sample: Sequence[float]) -> Fault |
 
 def take(state: MonitorState, block: Block) -> None:
     """Take a block."""
+    history = state.history
     if not block.follows:
-        state.raw.clear()
-        state.pieces.clear()
+        history.raw.clear()
+        history.pieces.clear()
     design, residual = _compare_with_reference(state, block)
-    state.count, state.latest = state.count + 1, block
-    learning = state.count * PERIOD <= state.settings.learning
+    history.count, history.latest = history.count + 1, block
+    learning = history.count * PERIOD <= state.settings.learning
     if learning:
         _learn(state, block, residual)
-        if state.count % RENEWED == 0:
+        if history.count % RENEWED == 0:
             residual_whitening.settle(state.whitening)
-    if len(state.raw) == ORDER:
+    if len(history.raw) == ORDER:
         piece = _piece(state, block, design, residual)
-        state.pieces.append(piece)
+        history.pieces.append(piece)
         if not learning:
             _judge(state, piece)
-        elif state.count * PERIOD > SETTLED * state.settings.learning:
+        elif history.count * PERIOD > SETTLED * state.settings.learning:
             _learn_model(state)
-    state.raw.append(_compare_with_reference(state, block))
+    history.raw.append(_compare_with_reference(state, block))
 
 
 def _compare_with_reference(state: MonitorState, block: Block) -> tuple[Array, Array]:
@@ -119,7 +120,7 @@ def _piece(state: MonitorState, block: Block, design: Array, residual: Array) ->
     k = block.regressors[OFFSET]
     off = residual - k * state.reference.offsets
     designs = [design]
-    for (earlier, before), share in zip(reversed(state.raw), state.whitening.filter, strict=True):
+    for (earlier, before), share in zip(reversed(state.history.raw), state.whitening.filter, strict=True):
         designs.append(designs[-1] - share[:, None] * earlier)
         off = off - share * (before - k * state.reference.offsets)
     *begun, A = (state.whitening.unmix @ one for one in designs)
@@ -129,14 +130,14 @@ def _piece(state: MonitorState, block: Block, design: Array, residual: Array) ->
 
 def _judge(state: MonitorState, piece: WhitenedBlock) -> None:
     if state.alarm is not None:
-        if state.count % EVERY == 0:
+        if state.history.count % EVERY == 0:
             _follow(state, state.alarm)
         return
-    if state.count % RENEWED == 0 or not state.hypotheses:
+    if state.history.count % RENEWED == 0 or state.renewed is None:
         _renew(state, piece.block)
     _watch(state)
-    if state.alarm is None and len(state.pieces) > LAG:
-        old = state.pieces[-LAG - 1]
+    if state.alarm is None and len(state.history.pieces) > LAG:
+        old = state.history.pieces[-LAG - 1]
         _learn(state, old.block, old.residual)
         _learn_model(state)
 
@@ -145,7 +146,7 @@ def _learn(state: MonitorState, block: Block, residual: Array) -> None:
     """Learn autocorrelation, offsets and mean regressors from a block without a fault."""
     residual_whitening.learn(state.whitening, residual, block.follows)
     known = state.reference
-    weight = max(PERIOD / OFFSETS, 1.0 / (state.count or 1))
+    weight = max(PERIOD / OFFSETS, 1.0 / (state.history.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
     known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
 
@@ -156,12 +157,12 @@ def _learn_model(state: MonitorState) -> None:
     In closed loop the surfaces respond to gusts. Where gusts cause most of the motion, least squares are biased (Ljung,
     "System Identification", 2nd ed. (1999), sect. 13.4), and R^2 is small.
     """
-    if len(state.pieces) <= LAG:
+    if len(state.history.pieces) <= LAG:
         return
-    if state.count % RENEWED == 0 or not state.explained.size:
-        last = islice(state.pieces, len(state.pieces) - LAG - 1, None)
+    if state.history.count % RENEWED == 0 or not state.explained.size:
+        last = islice(state.history.pieces, len(state.history.pieces) - LAG - 1, None)
         state.explained = _explained(state.terms, [piece.block for piece in last])
-    old = state.pieces[-LAG - 1]
+    old = state.history.pieces[-LAG - 1]
     reference_model.learn(state.reference, old.J, old.v, state.explained)
 
 
@@ -189,35 +190,38 @@ def _renew(state: MonitorState, now: Block) -> None:
         vane: reference_model.noise_of(state.terms, state.whitening, vane, variance)
         for vane, variance in variances.items()
     }
-    state.prior = reference_model.model_prior(
+    prior = reference_model.model_prior(
         state.reference, sum(noise.values()) * state.reference.blocks, state.settings.slack
     )
-    believed = state.reference.values + state.prior.shift
-    state.flattened = {vane: (variances[vane], added @ believed) for vane, added in noise.items()}
-    state.hypotheses = hypotheses(
-        state.aircraft, state.terms, reference_model.whole(state.reference, state.prior.shift)
+    believed = state.reference.values + prior.shift
+    each = hypotheses(state.aircraft, state.terms, reference_model.whole(state.reference, prior.shift))
+    state.renewed = FaultHypotheses(
+        each,
+        Shifts([hypothesis.shift for hypothesis in each]),
+        prior,
+        {vane: (variances[vane], added @ believed) for vane, added in noise.items()},
     )
-    state.shifts = Shifts([hypothesis.shift for hypothesis in state.hypotheses])
 
 
 def _rebuild(state: MonitorState) -> None:
     """Whiten the last blocks again, with new reference values; the first ones, whose past is lost, are dropped."""
-    last = [piece.block for piece in state.pieces]
-    state.pieces.clear()
-    state.raw.clear()
+    history = state.history
+    last = [piece.block for piece in history.pieces]
+    history.pieces.clear()
+    history.raw.clear()
     for block in last:
         design, residual = _compare_with_reference(state, block)
-        if len(state.raw) == ORDER:
-            state.pieces.append(_piece(state, block, design, residual))
-        state.raw.append((design, residual))
-    state.raw.pop()  # ``take`` adds the newest
+        if len(history.raw) == ORDER:
+            history.pieces.append(_piece(state, block, design, residual))
+        history.raw.append((design, residual))
+    history.raw.pop()  # ``take`` adds the newest
 
 
 def _watch(state: MonitorState) -> None:
     """Test the spans that are due for a fault."""
-    new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses)))
+    new = state.usual[-1].copy() if state.usual else np.ones((len(SPANS), len(state.hypotheses.each)))
     for row, span in enumerate(SPANS):
-        if state.count % max(span // EVERY, 1) or span > len(state.pieces):
+        if state.history.count % max(span // EVERY, 1) or span > len(state.history.pieces):
             continue
         over = last_interval(state, span)
         usual = state.usual[-span - 1][row] if span < len(state.usual) else new[row]
@@ -233,7 +237,7 @@ def _watch(state: MonitorState) -> None:
 def _proven(state: MonitorState, over: FlightInterval, usual: Array, squares: Array) -> float:
     """The largest log Bayes factor; large ones are computed with the variance of the interval's own residuals."""
     threshold = state.settings.threshold
-    whole = np.array([hypothesis.whole for hypothesis in state.hypotheses])
+    whole = np.array([hypothesis.whole for hypothesis in state.hypotheses.each])
     usual = gust_correlation.usual_size_in_gusts(whole, usual, len(over.pieces))
     found = promising(state, over, usual, squares, threshold)
     best = float(stuck_vanes(state, over.pieces).max()) if len(over.pieces) >= PATIENT else 0.0
@@ -249,8 +253,9 @@ def _proven(state: MonitorState, over: FlightInterval, usual: Array, squares: Ar
 
 def _alarm(state: MonitorState, over: FlightInterval, usual: Array) -> None:
     """Raise an alarm."""
-    now, earliest = over.pieces[-1].block.time, state.pieces[-min(len(state.pieces), LAG)].block.time - PERIOD
-    state.alarm = Alarm(now, earliest, earliest, usual, over.prior)
+    pieces = state.history.pieces
+    earliest = pieces[-min(len(pieces), LAG)].block.time - PERIOD
+    state.alarm = Alarm(over.pieces[-1].block.time, earliest, earliest, usual, over.prior)
     _follow(state, state.alarm)
 
 
@@ -259,36 +264,36 @@ def _follow(state: MonitorState, alarm: Alarm) -> None:
 
     Damage explains the first blocks as well as a failed surface does, so that it is reported only after more blocks.
     """
-    if len(state.pieces) < LEAST:
+    if len(state.history.pieces) < LEAST:
         return  # after a gap
-    now = state.pieces[-1].block.time
+    now = state.history.pieces[-1].block.time
     if now - alarm.found <= DATED:
         alarm.since, alarm.prior = _onset(state, alarm)
-    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(state.pieces)), alarm.prior)
+    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(state.history.pieces)), alarm.prior)
     found = explained(state, over, alarm.usual)
     factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
     place = int(np.argmax(factors))
     times = Detection(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
     if place >= len(found):
         state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
-    elif state.hypotheses[place].kind != DAMAGE or now - alarm.found > (EVERY - 0.5) * PERIOD:
-        state.fault = fault_of(state.hypotheses[place], found[place], state.terms, times)
+    elif state.hypotheses.each[place].kind != DAMAGE or now - alarm.found > (EVERY - 0.5) * PERIOD:
+        state.fault = fault_of(state.hypotheses.each[place], found[place], state.terms, times)
     if now - alarm.found > LAG * PERIOD and _over(state, place, alarm):
         state.alarm = state.fault = None
-        state.pieces.clear()
+        state.history.pieces.clear()
         state.usual.clear()
 
 
 def _sure(state: MonitorState, factors: Array, place: int) -> float:
     """The posterior probability of a fault: of all hypotheses with the same kind and part."""
-    names = [*((h.kind, h.part) for h in state.hypotheses), *((VANE_STUCK, vane) for vane in VANES)]
+    names = [*((h.kind, h.part) for h in state.hypotheses.each), *((VANE_STUCK, vane) for vane in VANES)]
     share = np.exp(factors - factors[place])
     return float(share[[name == names[place] for name in names]].sum() / share.sum())
 
 
 def _since(state: MonitorState, time: float) -> int:
     """The number of blocks since a time (s)."""
-    return sum(piece.block.time > time + 0.5 * PERIOD for piece in state.pieces)
+    return sum(piece.block.time > time + 0.5 * PERIOD for piece in state.history.pieces)
 
 
 def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
@@ -302,7 +307,7 @@ def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
     spans = onsets(state, counts, counts[-1])
 
     def at(place: int) -> tuple[float, ModelPrior]:
-        return state.pieces[-counts[place]].block.time - PERIOD, spans[place].prior
+        return state.history.pieces[-counts[place]].block.time - PERIOD, spans[place].prior
 
     factors = np.array([[w.factor for w in weights(state, over, alarm.usual)] for over in spans])
     vanes = stuck_vanes(state, spans[-1].pieces, counts)
@@ -325,6 +330,6 @@ def _left(state: MonitorState, over: FlightInterval, usual: Array) -> float:
 
 def _over(state: MonitorState, place: int, alarm: Alarm) -> bool:
     """Whether the last seconds contradict the fault."""
-    over = last_interval(state, min(LAG, len(state.pieces)), alarm.prior)
+    over = last_interval(state, min(LAG, len(state.history.pieces)), alarm.prior)
     factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over.pieces)[0]]
     return bool(factors[place] < 0.0)

@@ -49,6 +49,26 @@ class Alarm:
     prior: ModelPrior  # of the model without a fault
 
 
+@dataclass(frozen=True)
+class FaultHypotheses:
+    """The hypotheses that blocks are tested for, renewed with what has been learned."""
+
+    each: list[Hypothesis]
+    shifts: Shifts  # of each
+    prior: ModelPrior  # of the model without a fault
+    flattened: dict[str, tuple[float, Array]]  # by vane: its noise's variance, and (D,) what that takes from the score
+
+
+@dataclass
+class BlockHistory:
+    """The blocks so far, of which the last are kept."""
+
+    count: int = 0
+    latest: Block | None = None
+    raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
+    pieces: deque[WhitenedBlock] = field(default_factory=lambda: deque(maxlen=LONGEST))
+
+
 @dataclass
 class MonitorState:
     """The state of the monitor."""
@@ -59,19 +79,17 @@ class MonitorState:
     blocks: BlockAverager
     reference: ReferenceModel
     whitening: WhiteningFilter
-    pieces: deque[WhitenedBlock] = field(default_factory=lambda: deque(maxlen=LONGEST))
-    raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
-    hypotheses: list[Hypothesis] = field(default_factory=list)
-    shifts: Shifts | None = None  # of the hypotheses
-    prior: ModelPrior | None = None  # of the model without a fault
-    flattened: dict[str, tuple[float, Array]] = field(
-        default_factory=dict
-    )  # by vane: its noise's variance, and (D,) ...
+    history: BlockHistory = field(default_factory=BlockHistory)
+    renewed: FaultHypotheses | None = None  # None: nothing has been tested yet
     explained: NDArray[np.bool_] = field(
         default_factory=lambda: np.empty(0, dtype=bool)
     )  # (D,) terms with a large R^2, which are learned
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) mean statistics by block
-    count: int = 0
-    latest: Block | None = None
     alarm: Alarm | None = None
     fault: Fault | None = None
+
+    @property
+    def hypotheses(self) -> FaultHypotheses:
+        """The hypotheses that are tested; there are some before the first test."""
+        assert self.renewed is not None
+        return self.renewed

@@ -58,7 +58,7 @@ class MessageWatch:
     @property
     def judged(self) -> float:
         """Seconds of flight that were checked for faults."""
-        return max(0.0, self.state.count * blocks.PERIOD - self.state.settings.learning)
+        return max(0.0, self.state.history.count * blocks.PERIOD - self.state.settings.learning)
 
 
 def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:
@@ -149,11 +149,11 @@ class Announcements:
 def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
     for moment, sample, _ in samples:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
-        count = watch.state.count
+        count = watch.state.history.count
         rate_limits.move(watch.limits, moment, sample)
         monitor.update(watch.state, moment, servo_follower.deflected(watch.follower, moment, sample))
-        if watch.state.count > count and watch.state.latest is not None:
-            rate_limits.take(watch.limits, watch.state.latest, watch.state.whitening.filter)
+        if watch.state.history.count > count and watch.state.history.latest is not None:
+            rate_limits.take(watch.limits, watch.state.history.latest, watch.state.whitening.filter)
 
 
 def _time_of(taken: AlignmentState, stamp_ns: int) -> float:

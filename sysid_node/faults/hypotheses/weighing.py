@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.hypotheses.bayes_factors import (
-    Shifts,
     Weighed,
     marginal,
     most,
@@ -52,8 +51,7 @@ class FlightInterval(NamedTuple):
 
 def last_interval(state: MonitorState, count: int, prior: ModelPrior | None = None) -> FlightInterval:
     """The interval of the last ``count`` blocks, with a prior; None: the present one."""
-    prior = prior or state.prior
-    assert prior is not None
+    prior = prior or state.hypotheses.prior
     pieces = _last(state, count)
     J, v = (np.sum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
     return _against(state, pieces, (J, v), prior)
@@ -78,8 +76,7 @@ def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[Fligh
     An error of the reference model is present before a fault, too. With those blocks in the prior, an error that the
     prior's uncertainty would allow for is not mistaken for a change from one block to the next.
     """
-    assert state.prior is not None
-    pieces, base_prior = _last(state, sound), state.prior
+    pieces, base_prior = _last(state, sound), state.hypotheses.prior
     read = _readings(pieces)
     J, v = (np.cumsum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
     found = []
@@ -109,7 +106,7 @@ def allowing_for_gusts(state: MonitorState, over: FlightInterval) -> FlightInter
 
 
 def _last(state: MonitorState, count: int) -> list[WhitenedBlock]:
-    return list(islice(state.pieces, len(state.pieces) - count, None))
+    return list(islice(state.history.pieces, len(state.history.pieces) - count, None))
 
 
 def _against(
@@ -137,7 +134,7 @@ def _flattened(state: MonitorState, read: Array) -> Array:
     total = np.zeros(len(state.terms.names))
     if len(read) < LONG:
         return total
-    for vane, (variance, score) in state.flattened.items():
+    for vane, (variance, score) in state.hypotheses.flattened.items():
         variance_read = float(read[:, VANES[vane][0]].var(ddof=1))
         total += min(1.0, variance_read / variance) * len(read) * score
     return total
@@ -156,7 +153,7 @@ def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[W
     best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
     scale = max(float(usual.max()), best, 1.0)
     found = []
-    for hypothesis, weighed in zip(state.hypotheses, first, strict=True):
+    for hypothesis, weighed in zip(state.hypotheses.each, first, strict=True):
         moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
         one = weigh_loosely(*over.whole, hypothesis.shift, over.prior.precision, LOOSE * moved, scale)
         if hypothesis.whole:
@@ -167,24 +164,19 @@ def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[W
 
 def statistics(state: MonitorState, over: FlightInterval) -> Array:
     """(H,) the mean square score of each hypothesis; see ``bayes_factors.score_squares``."""
-    return score_squares(over.J, over.v, _shifts(state))
+    return score_squares(over.J, over.v, state.hypotheses.shifts)
 
 
 def weights(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
     """The Bayes factor of each hypothesis; ``usual`` (H,) is the mean of its statistic without a fault."""
-    return weigh_each(over.J, over.v, _shifts(state), np.maximum(usual, 1.0))
+    return weigh_each(over.J, over.v, state.hypotheses.shifts, np.maximum(usual, 1.0))
 
 
 def promising(state: MonitorState, over: FlightInterval, usual: Array, squares: Array, least: float) -> list[Weighed]:
     """As ``weights``, where only factors above ``least`` matter; ``squares`` (H,) are the interval's statistics."""
     usual = np.maximum(usual, 1.0)
-    worth = most(_shifts(state), squares, usual) > least - MARGIN
-    return weigh_each(over.J, over.v, _shifts(state), usual, worth)
-
-
-def _shifts(state: MonitorState) -> Shifts:
-    assert state.shifts is not None
-    return state.shifts
+    worth = most(state.hypotheses.shifts, squares, usual) > least - MARGIN
+    return weigh_each(over.J, over.v, state.hypotheses.shifts, usual, worth)
 
 
 def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weighed) -> float:
@@ -192,7 +184,7 @@ def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weigh
 
     It is the largest of the six coefficients'.
     """
-    shift = state.hypotheses[place].shift
+    shift = state.hypotheses.each[place].shift
     moved = shift.fixed + shift.free @ weighed.size + over.prior.shift
     left = np.array([piece.whitened - piece.design @ moved for piece in over.pieces])
     return float((left**2).mean(axis=0).max())
