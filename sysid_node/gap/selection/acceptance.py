@@ -18,7 +18,6 @@ accepted where all of these hold:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -70,48 +69,68 @@ class DerivativeShift:
         return (self.distance - self.expected) / float(np.sqrt(2.0 * max(self.expected, 1.0)))
 
 
+@dataclass(frozen=True)
+class AddedSize:
+    """How large what the candidate adds is."""
+
+    time: float | None  # s, where it is an effect of one time; else none
+    sample_period: float  # s, of the slowest topic
+    largest: float = 0.0  # of its sizes beyond its standard error, in multiples of what real parts show
+    bias: float = 0.0  # the largest that was added beyond its standard error, in 1 sigma that the file states, else 0
+
+
+@dataclass(frozen=True)
+class ScoresInGusts:
+    """What tells of an effect in gusts, where most of the power that is left is weather. By channel (12,)."""
+
+    structure: RemainingStructure  # of the flights fitted
+    mean_power: RemainingPower  # of the means of what is left, which gusts do not change
+
+
+@dataclass(frozen=True)
+class ChannelScores:
+    """Powers by channel (12,) of forces, moments and kinematics."""
+
+    motion: Array  # of what was measured, about the windows' means
+    power: RemainingPower  # on flight not fitted, all flights together
+    contribution: Array  # what comes back without the candidate, the others held, as a share of what nuisances leave
+    by_flight: tuple[tuple[Array, RemainingPower], ...] = ()  # of each of several flights: motion, and power left
+    in_gusts: ScoresInGusts | None = None  # none where no flight is one in gusts
+    #: Error of the simulator's model, as a share of the motion; zero where the simulator itself is known.
+    simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+
+
+@dataclass(frozen=True)
+class ReadingScores:
+    """Mean squares (11,) by reading of short simulated flights, on flight not fitted if there is."""
+
+    errors: RemainingPower
+    motion: Array  # as measured; infinite where a reading is not compared
+    simulator_error: Array  # errors of the simulator's model, as shares of the motion
+
+
 class ComparisonScores(Protocol):
-    """An explanation with a candidate, compared with the explanation without it. Powers are by channel (12,)."""
+    """An explanation with a candidate, compared with the explanation without it."""
 
     @property
-    def time(self) -> float | None:
-        """Size of the candidate, s, where it is an effect of one time; else none."""
-
-    @property
-    def sample_period(self) -> float:
-        """Sample period of the slowest topic, s."""
+    def added(self) -> AddedSize:
+        """Size of what the candidate adds."""
 
     @property
     def probability(self) -> float:
         """That flight not fitted is better predicted with the candidate than without it."""
 
     @property
-    def gusty(self) -> bool:
-        """Whether any of the flights is one in gusts."""
+    def channels(self) -> ChannelScores:
+        """What it removes by channel."""
 
     @property
-    def motion(self) -> Array:
-        """Power of what was measured, about the windows' means."""
+    def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:
+        """Of all derivatives together from the file: without and with the candidate."""
 
     @property
-    def power(self) -> RemainingPower:
-        """Power left on flight not fitted, all flights together."""
-
-    @property
-    def by_flight(self) -> Sequence[tuple[Array, RemainingPower]]:
-        """Of each of several flights the motion's power and the power left."""
-
-    @property
-    def structure(self) -> RemainingStructure:
-        """Of the flights fitted, what of the power is structure. Asked for in gusts only."""
-
-    @property
-    def mean_power(self) -> RemainingPower:
-        """Power of the means of what is left, which gusts do not change. Asked for in gusts only."""
-
-    @property
-    def contribution(self) -> Array:
-        """Power that comes back without the candidate, the others held, as a share of what nuisances alone leave."""
+    def readings(self) -> ReadingScores:
+        """What it removes of the errors of short flights."""
 
     @property
     def log_bayes_factor(self) -> float:
@@ -121,58 +140,23 @@ class ComparisonScores(Protocol):
     def searched(self) -> int:
         """Number of effects that the candidate was picked from."""
 
-    @property
-    def simulator_error(self) -> Array:
-        """Error (12,) of the simulator's model, as a share of the motion; zero where the simulator itself is known."""
 
-    @property
-    def size(self) -> float:
-        """Largest of its sizes beyond its standard error, in multiples of what real parts show."""
-
-    @property
-    def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:
-        """Of all derivatives together from the file: without and with the candidate."""
-
-    @property
-    def bias(self) -> float:
-        """Largest bias that was added beyond its standard error, in 1 sigma that the file states; zero without one."""
-
-    @property
-    def readings(self) -> RemainingPower:
-        """Mean squares (11,) of the errors of short simulated flights, by reading, on flight not fitted if there is."""
-
-    @property
-    def reading_motion(self) -> Array:
-        """Mean squares (11,) of the measured motion by reading; infinite where a reading is not compared."""
-
-    @property
-    def reading_errors(self) -> Array:
-        """Errors (11,) of the simulator's model on short flights, as shares of the motion."""
+def _no_readings() -> ReadingScores:
+    """Nothing known of short flights."""
+    return ReadingScores(RemainingPower(np.zeros(1), np.zeros(1)), np.full(1, np.inf), np.zeros(1))
 
 
 @dataclass(frozen=True)
 class ComparisonTable:
     """The scores of one comparison as plain values: recorded, or made by hand."""
 
-    time: float | None
-    sample_period: float
+    added: AddedSize
     probability: float
-    gusty: bool
-    motion: Array
-    power: RemainingPower
-    structure: RemainingStructure
-    mean_power: RemainingPower
-    contribution: Array
+    channels: ChannelScores
     log_bayes_factor: float
     searched: int
-    by_flight: tuple[tuple[Array, RemainingPower], ...] = ()
-    simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))
-    size: float = 0.0
     shifts: tuple[DerivativeShift, DerivativeShift] = (DerivativeShift(0.0, 0.0), DerivativeShift(0.0, 0.0))
-    bias: float = 0.0
-    readings: RemainingPower = RemainingPower(np.zeros(1), np.zeros(1))
-    reading_motion: Array = field(default_factory=lambda: np.full(1, np.inf))
-    reading_errors: Array = field(default_factory=lambda: np.zeros(1))
+    readings: ReadingScores = field(default_factory=_no_readings)
 
 
 def is_accepted(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -209,9 +193,10 @@ def is_relevant(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -
 
 def _implausibility(scores: ComparisonScores, thresholds: Thresholds) -> str | None:
     """What of rule 1 the candidate fails, in words; none where it passes."""
-    if scores.time is not None and abs(scores.time) < scores.sample_period:
+    added = scores.added
+    if added.time is not None and abs(added.time) < added.sample_period:
         return "its time is within one sample"
-    return "no real part is off so far" if scores.size > thresholds.acceptance.plausible else None
+    return "no real part is off so far" if added.largest > thresholds.acceptance.plausible else None
 
 
 def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -221,11 +206,12 @@ def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> 
 
 def _is_large(scores: ComparisonScores, limits: Acceptance) -> bool:
     """Whether the candidate matters by any of the measures of rule 3, the cheapest first."""
-    if np.any(channels_improved(scores, limits) & (scores.contribution > limits.share_of_gap)):
+    channels = scores.channels
+    if np.any(channels_improved(channels, limits) & (channels.contribution > limits.share_of_gap)):
         return True
-    if relieves(scores.shifts, scores.searched, limits) or scores.bias > limits.bias:
+    if relieves(scores.shifts, scores.searched, limits) or scores.added.bias > limits.bias:
         return True
-    return bool(readings_improved(scores, limits).any())
+    return bool(readings_improved(scores.readings, limits).any())
 
 
 def relieves(
@@ -249,17 +235,17 @@ def nats_by_tolerances(
     return without - with_it if shifts[1].deviations < limits.joint else 0.0
 
 
-def readings_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
+def readings_improved(scores: ReadingScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
     """Readings (11,) of short flights on which the candidate removes enough of the error to matter.
 
     What an instrument does is small in forces and moments, and in what an observer predicts that follows the readings.
     In a flight of some seconds from a state that was read wrongly it adds up.
     """
-    least = np.sqrt(limits.noticeable_error**2 + scores.reading_errors**2)
-    return _matters(scores.readings, 1.0, scores.reading_motion, least, limits)
+    least = np.sqrt(limits.noticeable_error**2 + scores.simulator_error**2)
+    return _matters(scores.errors, 1.0, scores.motion, least, limits)
 
 
-def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
+def channels_improved(scores: ChannelScores, limits: Acceptance = THRESHOLDS.acceptance) -> NDArray[np.bool_]:
     """Channels (12,) on which the candidate removes enough of the remainder to matter.
 
     In one flight is enough: another may show what no effect describes, and more of it than all that this one holds. In
@@ -270,12 +256,12 @@ def channels_improved(scores: ComparisonScores, limits: Acceptance = THRESHOLDS.
     motion, enough = scores.motion, np.zeros(len(CHANNELS), bool)
     for moved, power in ((motion, scores.power), *scores.by_flight):
         enough |= _matters(power, 1.0, moved, least, limits) | (power.removed > large**2 * moved)
-    if not scores.gusty:
+    if scores.in_gusts is None:
         return np.asarray(enough)
-    structure = scores.structure
+    structure = scores.in_gusts.structure
     scale = scores.power.without / np.maximum(structure.total, 1e-300)  # of noise levels to power
     of_forces = _matters(structure.coherent, scale, motion, least, limits)
-    of_forces |= _matters(scores.mean_power, 1.0, motion, least, limits)
+    of_forces |= _matters(scores.in_gusts.mean_power, 1.0, motion, least, limits)
     return np.where(np.arange(len(CHANNELS)) < len(COEFFICIENTS), of_forces, enough)
 
 

@@ -23,7 +23,16 @@ from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.excited_axes import excited_channels
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
-from sysid_node.gap.selection.acceptance import ComparisonTable, DerivativeShift, RemainingPower, RemainingStructure
+from sysid_node.gap.selection.acceptance import (
+    AddedSize,
+    ChannelScores,
+    ComparisonTable,
+    DerivativeShift,
+    ReadingScores,
+    RemainingPower,
+    RemainingStructure,
+    ScoresInGusts,
+)
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.short_flights.readings import READINGS, reading_errors, reading_motion
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -41,98 +50,46 @@ class Comparison:
     without: FittedSet
     fitted: FittedSet
 
-    @property
-    def time(self) -> float | None:
-        """Size of what was added, s, where it is an effect of one time."""
-        added = self.fitted.added
-        if added is None or added.effect not in TIME_EFFECTS:
-            return None
-        entries = list(added.indices)
-        changes = self.fitted.fit.flights[0].point[entries] - self.fitted.fit.simulator.neutral()[entries]
-        return float(changes[np.abs(changes).argmax()])
-
-    @property
-    def sample_period(self) -> float:
-        """Sample period of the slowest topic, s."""
-        models = self.fitted.fit.models
-        return 1.0 / min(min(model.flight.actuator_rate, model.flight.air_rate) for model in models)
+    @cached_property
+    def added(self) -> AddedSize:
+        """Size of what was added."""
+        fitted, models = self.fitted, self.fitted.fit.models
+        period = 1.0 / min(min(model.flight.actuator_rate, model.flight.air_rate) for model in models)
+        return AddedSize(_time(fitted), period, _largest_size(fitted), _largest_bias(fitted))
 
     @cached_property
     def probability(self) -> float:
         """That flight not fitted is better predicted with what was added."""
         return probability_against(self.fitted, self.without)
 
-    @property
-    def gusty(self) -> bool:
-        """Whether any of the flights is one in gusts."""
-        return any(is_gusty(model) for model in self.fitted.fit.models)
-
     @cached_property
-    def motion(self) -> Array:
-        """Power (12,) of what was measured, about the windows' means.
-
-        Infinite for the coefficients of a motion that no command excites, so that nothing there matters.
-        """
-        return np.asarray(sum(self._motion_by_flight))
-
-    @cached_property
-    def _motion_by_flight(self) -> list[Array]:
-        """The same of each flight."""
-        models = [flight.model for flight in self.fitted.evidence.flights]
-        quiet = ~excited_channels(models) & (np.arange(len(CHANNELS)) < len(COEFFICIENTS))
-        return [np.where(quiet, np.inf, (np.abs(m.measured[:, 1:]) ** 2).sum(axis=(0, 1))) for m in models]
-
-    @cached_property
-    def power(self) -> RemainingPower:
-        """Power left on flight not fitted; of a flight too short to be divided, by channel, what more is removed of.
-
-        Half a manoeuvre may not determine what predicts the other half. That is seen by the predictive density, which
-        knows how uncertain it is, but not by the power of the prediction's error. What the fits leave counts as well.
-        """
-        predicted = RemainingPower(power_left(self.without.evidence), power_left(self.fitted.evidence))
-        if self.fitted.evidence.scores.size >= THRESHOLDS.evidence.fewest:
-            return predicted
-        fits = RemainingPower(_powers(self.without.fit)[0], _powers(self.fitted.fit)[0])
-        more = fits.share_removed > predicted.share_removed
-        return RemainingPower(
-            np.where(more, fits.without, predicted.without), np.where(more, fits.with_it, predicted.with_it)
+    def channels(self) -> ChannelScores:
+        """What was removed by channel."""
+        without, fitted, models = self.without, self.fitted, self.fitted.fit.models
+        motions = _motion_by_flight(fitted)
+        return ChannelScores(
+            motion=np.asarray(sum(motions)),
+            power=_power(without, fitted),
+            contribution=_contribution(self.base, without, fitted),
+            by_flight=_by_flight(without, fitted, motions),
+            in_gusts=scores_in_gusts(without, fitted) if any(is_gusty(model) for model in models) else None,
+            simulator_error=np.asarray(np.max([model.simulator_error for model in models], axis=0)),
         )
 
     @cached_property
-    def by_flight(self) -> tuple[tuple[Array, RemainingPower], ...]:
-        """The motion's power, and the power left, of each flight where there are several."""
-        pairs = zip(self.without.evidence.flights, self.fitted.evidence.flights, strict=True)
-        powers = [RemainingPower(power_of(before.residual), power_of(after.residual)) for before, after in pairs]
-        return tuple(zip(self._motion_by_flight, powers, strict=True)) if len(powers) > 1 else ()
+    def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:
+        """How far all derivatives together are from the file without and with what was added."""
+        return derivative_shift(self.without.fit), derivative_shift(self.fitted.fit)
 
     @cached_property
-    def structure(self) -> RemainingStructure:
-        """Of the flights fitted, what of the power is structure, in the noise that the larger set leaves."""
-        before = overidentification_of(self.without.fit, self.fitted.fit.powers)
-        after = overidentification_of(self.fitted.fit)
-        return RemainingStructure(RemainingPower(before.coherent, after.coherent), before.total)
-
-    @cached_property
-    def mean_power(self) -> RemainingPower:
-        """Power of the means of what is left."""
-        return RemainingPower(_power_of_means(self.without.evidence), _power_of_means(self.fitted.evidence))
-
-    @cached_property
-    def contribution(self) -> Array:
-        """Power (12,) that comes back without what was added, as a share of what nuisances alone leave.
-
-        The other candidates are held, and nuisances are fitted: free, the others would fit what is gone (a lag twice as
-        long for an engine half as strong). Infinite where nothing finite can be predicted without what was added.
-        """
-        fit = self.fitted.fit
-        kept = [c for c in fit.candidates if c.effect in self.without.fit.effects]
-        lacking = with_candidates(fit, kept, self.base.fit.nuisances, ()).with_powers(self.without.fit.powers)
-        try:
-            lacking = lacking.at(VariableProjection(lacking).points(lacking.values))
-        except np.linalg.LinAlgError:
-            return np.full(len(CHANNELS), np.inf)
-        without, now, whole = (_powers(each) for each in (lacking, fit, self.base.fit))
-        return np.asarray(np.max((without - now) / np.maximum(whole, 1e-300), axis=0))
+    def readings(self) -> ReadingScores:
+        """The errors of short flights: on flights held out, without these on those fitted."""
+        known = [model.reading_errors for model in self.fitted.fit.models]
+        return ReadingScores(
+            errors=RemainingPower(*(reading_errors(_flown(each)) for each in (self.without, self.fitted))),
+            motion=reading_motion([flight.model for flight in _flown(self.fitted)]),
+            simulator_error=np.array([max(errors.get(name, 0.0) for errors in known) for name in READINGS]),
+        )
 
     @cached_property
     def log_bayes_factor(self) -> float:
@@ -144,65 +101,111 @@ class Comparison:
         """Number of effects."""
         return len(EFFECTS)
 
-    @property
-    def simulator_error(self) -> Array:
-        """Error (12,) of the simulator's model, as a share of the motion."""
-        return np.asarray(np.max([model.simulator_error for model in self.fitted.fit.models], axis=0))
-
-    @property
-    def size(self) -> float:
-        """Largest size of what was added beyond its standard error, in multiples of what real parts show."""
-        fit, added = self.fitted.fit, self.fitted.added
-        if added is None or fit.information is None:
-            return 0.0
-        sizes = [i for i in added.indices if fit.simulator.parameters[i][1].switch]
-        errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))[[fit.indices.index(i) for i in sizes]]
-        changes = np.abs(fit.flights[0].point[sizes] - fit.simulator.neutral()[sizes])
-        return float(np.max((changes - 2.0 * errors) / fit.simulator.scales[sizes], initial=0.0))
-
-    @property
-    def bias(self) -> float:
-        """Largest bias that was added beyond its standard error, in 1 sigma that the file states.
-
-        Zero for what is no bias, and where the file does not state what stays constant in a flight.
-        """
-        fit, added = self.fitted.fit, self.fitted.added
-        stated = stated_biases(fit.simulator.aircraft)
-        names = {i: fit.simulator.names[i] for i in (added.indices if added else ())}
-        known = [(i, stated[name]) for i, name in names.items() if stated.get(name)]
-        return max((self._beyond_error(i) / sigma for i, sigma in known), default=0.0)
-
-    def _beyond_error(self, index: int) -> float:
-        """By how much a value that was added differs from the file's beyond two standard errors."""
-        fit = self.fitted.fit
-        place = fit.indices.index(index)
-        change = fit.flights[0].point[index] - fit.simulator.neutral()[index]
-        return float(abs(change) - 2.0 * np.sqrt(max(fit.covariance[place, place], 0.0)))
-
-    @cached_property
-    def shifts(self) -> tuple[DerivativeShift, DerivativeShift]:
-        """How far all derivatives together are from the file without and with what was added."""
-        return derivative_shift(self.without.fit), derivative_shift(self.fitted.fit)
-
-    @cached_property
-    def readings(self) -> RemainingPower:
-        """Mean squares (11,) of the errors of short flights: on flights held out, without these on those fitted."""
-        return RemainingPower(*(reading_errors(_flown(each)) for each in (self.without, self.fitted)))
-
-    @cached_property
-    def reading_motion(self) -> Array:
-        """Mean squares (11,) of the motion by reading on the same flights."""
-        return reading_motion([flight.model for flight in _flown(self.fitted)])
-
-    @property
-    def reading_errors(self) -> Array:
-        """Errors (11,) of the simulator's model on short flights, as shares of the motion."""
-        known = [model.reading_errors for model in self.fitted.fit.models]
-        return np.array([max(errors.get(name, 0.0) for errors in known) for name in READINGS])
-
     def table(self) -> ComparisonTable:
         """All scores as plain values."""
         return ComparisonTable(**{entry.name: getattr(self, entry.name) for entry in fields(ComparisonTable)})
+
+
+def _time(fitted: FittedSet) -> float | None:
+    """Size of what was added, s, where it is an effect of one time."""
+    added = fitted.added
+    if added is None or added.effect not in TIME_EFFECTS:
+        return None
+    entries = list(added.indices)
+    changes = fitted.fit.flights[0].point[entries] - fitted.fit.simulator.neutral()[entries]
+    return float(changes[np.abs(changes).argmax()])
+
+
+def _largest_size(fitted: FittedSet) -> float:
+    """Largest size of what was added beyond its standard error, in multiples of what real parts show."""
+    fit, added = fitted.fit, fitted.added
+    if added is None or fit.information is None:
+        return 0.0
+    sizes = [i for i in added.indices if fit.simulator.parameters[i][1].switch]
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))[[fit.indices.index(i) for i in sizes]]
+    changes = np.abs(fit.flights[0].point[sizes] - fit.simulator.neutral()[sizes])
+    return float(np.max((changes - 2.0 * errors) / fit.simulator.scales[sizes], initial=0.0))
+
+
+def _largest_bias(fitted: FittedSet) -> float:
+    """Largest bias that was added beyond its standard error, in 1 sigma that the file states.
+
+    Zero for what is no bias, and where the file does not state what stays constant in a flight.
+    """
+    fit, added = fitted.fit, fitted.added
+    if added is None or fit.information is None:
+        return 0.0
+    stated = stated_biases(fit.simulator.aircraft)
+    names = {i: fit.simulator.names[i] for i in added.indices}
+    known = [(i, stated[name]) for i, name in names.items() if stated.get(name)]
+    return max((_beyond_error(fit, i) / sigma for i, sigma in known), default=0.0)
+
+
+def _beyond_error(fit: CandidateFit, index: int) -> float:
+    """By how much a value that was added differs from the file's beyond two standard errors."""
+    place = fit.indices.index(index)
+    change = fit.flights[0].point[index] - fit.simulator.neutral()[index]
+    return float(abs(change) - 2.0 * np.sqrt(max(fit.covariance[place, place], 0.0)))
+
+
+def _motion_by_flight(fitted: FittedSet) -> list[Array]:
+    """Power (12,) of what was measured in each flight, about the windows' means.
+
+    Infinite for the coefficients of a motion that no command excites, so that nothing there matters.
+    """
+    models = [flight.model for flight in fitted.evidence.flights]
+    quiet = ~excited_channels(models) & (np.arange(len(CHANNELS)) < len(COEFFICIENTS))
+    return [np.where(quiet, np.inf, (np.abs(m.measured[:, 1:]) ** 2).sum(axis=(0, 1))) for m in models]
+
+
+def _power(without: FittedSet, fitted: FittedSet) -> RemainingPower:
+    """Power left on flight not fitted; of a flight too short to be divided, by channel, what more is removed of.
+
+    Half a manoeuvre may not determine what predicts the other half. That is seen by the predictive density, which
+    knows how uncertain it is, but not by the power of the prediction's error. What the fits leave counts as well.
+    """
+    predicted = RemainingPower(power_left(without.evidence), power_left(fitted.evidence))
+    if fitted.evidence.scores.size >= THRESHOLDS.evidence.fewest:
+        return predicted
+    fits = RemainingPower(_powers(without.fit)[0], _powers(fitted.fit)[0])
+    more = fits.share_removed > predicted.share_removed
+    return RemainingPower(
+        np.where(more, fits.without, predicted.without), np.where(more, fits.with_it, predicted.with_it)
+    )
+
+
+def _by_flight(without: FittedSet, fitted: FittedSet, motions: list[Array]) -> tuple[tuple[Array, RemainingPower], ...]:
+    """The motion's power, and the power left, of each flight where there are several."""
+    pairs = zip(without.evidence.flights, fitted.evidence.flights, strict=True)
+    powers = [RemainingPower(power_of(before.residual), power_of(after.residual)) for before, after in pairs]
+    return tuple(zip(motions, powers, strict=True)) if len(powers) > 1 else ()
+
+
+def scores_in_gusts(without: FittedSet, fitted: FittedSet) -> ScoresInGusts:
+    """What of the power is structure, in the noise that the larger set leaves, and what is off on average."""
+    before = overidentification_of(without.fit, fitted.fit.powers)
+    after = overidentification_of(fitted.fit)
+    return ScoresInGusts(
+        RemainingStructure(RemainingPower(before.coherent, after.coherent), before.total),
+        RemainingPower(_power_of_means(without.evidence), _power_of_means(fitted.evidence)),
+    )
+
+
+def _contribution(base: FittedSet, without: FittedSet, fitted: FittedSet) -> Array:
+    """Power (12,) that comes back without what was added, as a share of what nuisances alone leave.
+
+    The other candidates are held, and nuisances are fitted: free, the others would fit what is gone (a lag twice as
+    long for an engine half as strong). Infinite where nothing finite can be predicted without what was added.
+    """
+    fit = fitted.fit
+    kept = [c for c in fit.candidates if c.effect in without.fit.effects]
+    lacking = with_candidates(fit, kept, base.fit.nuisances, ()).with_powers(without.fit.powers)
+    try:
+        lacking = lacking.at(VariableProjection(lacking).points(lacking.values))
+    except np.linalg.LinAlgError:
+        return np.full(len(CHANNELS), np.inf)
+    left, now, whole = (_powers(each) for each in (lacking, fit, base.fit))
+    return np.asarray(np.max((left - now) / np.maximum(whole, 1e-300), axis=0))
 
 
 def derivative_shift(fit: CandidateFit) -> DerivativeShift:

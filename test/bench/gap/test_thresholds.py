@@ -9,16 +9,26 @@ import pytest
 from bench.gap import score_tables
 from bench.gap.score_tables import CandidateScores, RecordedDiagnosis, WeighedCause
 from bench.gap.thresholds import changed, named, page, sweeps
-from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
+from sysid_node.gap.selection.acceptance import (
+    AddedSize,
+    ChannelScores,
+    ComparisonTable,
+    RemainingPower,
+    RemainingStructure,
+    ScoresInGusts,
+)
 from sysid_node.gap.selection.calibration import CauseEvidence
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.verdict.decision import CauseScores, DoubtedScores, VerdictScores
 
 NOTHING = RemainingPower(np.zeros(12), np.zeros(12))
 COMPARISON = ComparisonTable(
-    time=0.1, sample_period=0.01, probability=0.97, gusty=False, motion=np.ones(12),
-    power=RemainingPower(np.full(12, 0.1), np.zeros(12)), structure=RemainingStructure(NOTHING, np.zeros(12)),
-    mean_power=NOTHING, contribution=np.ones(12), log_bayes_factor=50.0, searched=30,
+    AddedSize(time=0.1, sample_period=0.01), probability=0.97,
+    channels=ChannelScores(
+        np.ones(12), RemainingPower(np.full(12, 0.1), np.zeros(12)), contribution=np.ones(12),
+        in_gusts=ScoresInGusts(RemainingStructure(NOTHING, np.zeros(12)), NOTHING),
+    ),
+    log_bayes_factor=50.0, searched=30,
 )  # fmt: skip
 LAG = WeighedCause(
     "actuator_lag", True, 0.85, 0.15, CauseEvidence(100.0, 0.0, False), COMPARISON, -500.0,
@@ -47,7 +57,8 @@ def test_scores_are_read_as_they_were_written(known, tmp_path: Path) -> None:
     assert again.verdict(THRESHOLDS) == known.verdict(THRESHOLDS) == "explained"
     assert again.selection(THRESHOLDS) == known.selection(THRESHOLDS)
     assert again.causes[0].evidence == LAG.evidence
-    np.testing.assert_array_equal(again.first_stage[0].comparison.power.without, COMPARISON.power.without)
+    powers = again.first_stage[0].comparison.channels.power
+    np.testing.assert_array_equal(powers.without, COMPARISON.channels.power.without)
 
 
 def test_a_stricter_threshold_changes_the_verdict(known) -> None:

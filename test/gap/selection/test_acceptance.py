@@ -7,10 +7,14 @@ import pytest
 
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.acceptance import (
+    AddedSize,
+    ChannelScores,
     ComparisonTable,
     DerivativeShift,
+    ReadingScores,
     RemainingPower,
     RemainingStructure,
+    ScoresInGusts,
     channels_improved,
     is_accepted,
     nats_by_tolerances,
@@ -59,13 +63,38 @@ def test_one_gross_error_is_weighed_by_the_same_joint_prior() -> None:
     assert nats_by_tolerances(gross) == pytest.approx(18.0 * 24.0 / 25.0 - widening)
 
 
+def added(**changes: float) -> AddedSize:
+    """No time, and of no size that matters, with changes."""
+    return replace(AddedSize(time=None, sample_period=0.01), **changes)
+
+
+def powers(**changes: object) -> ChannelScores:
+    """90 % of what is left of CL is removed, a tenth of the motion's power; with changes."""
+    improved = ChannelScores(motion=np.ones(12), power=removed(0.1, 0.01), contribution=channels(0.5))
+    return replace(improved, **changes)
+
+
+LITTLE = powers(power=removed(0.1, 0.09))
+
+
+def hidden(power: RemainingPower) -> ChannelScores:
+    """The power of one flight, where another holds so much more that its own is hardly seen in the sum."""
+    return powers(power=removed(9.03, 9.0), by_flight=((np.ones(12), power),))
+
+
+def in_gusts(structure: RemainingStructure | None = None, mean_power: RemainingPower = NOTHING) -> ScoresInGusts:
+    """What is structure, and what is off on average: nothing."""
+    return ScoresInGusts(structure or RemainingStructure(NOTHING, np.zeros(12)), mean_power)
+
+
+def readings(without: float, with_it: float, motion: float = 1.0) -> ReadingScores:
+    """Of one reading, the others without error."""
+    return ReadingScores(reading(without, with_it), np.full(11, motion), np.zeros(11))
+
+
 def table(**changes: object) -> ComparisonTable:
-    """A candidate that is accepted: it removes 90 % of what is left of CL, a tenth of the motion's power."""
-    scores = ComparisonTable(
-        time=None, sample_period=0.01, probability=0.99, gusty=False, motion=np.ones(12), power=removed(0.1, 0.01),
-        structure=RemainingStructure(NOTHING, np.zeros(12)), mean_power=NOTHING, contribution=channels(0.5),
-        log_bayes_factor=50.0, searched=30,
-    )  # fmt: skip
+    """A candidate that is accepted, with changes."""
+    scores = ComparisonTable(added(), probability=0.99, channels=powers(), log_bayes_factor=50.0, searched=30)
     return replace(scores, **changes)
 
 
@@ -73,28 +102,28 @@ def table(**changes: object) -> ComparisonTable:
     ("changes", "reason"),
     [
         ({}, None),
-        ({"time": 0.005}, "within one sample"),
-        ({"time": -0.005}, "within one sample"),
-        ({"time": 0.1}, None),
+        ({"added": added(time=0.005)}, "within one sample"),
+        ({"added": added(time=-0.005)}, "within one sample"),
+        ({"added": added(time=0.1)}, None),
         ({"probability": 0.5}, "predict better"),
-        ({"power": removed(0.1, 0.09)}, "too little"),
-        ({"contribution": np.zeros(12)}, "too little"),
-        ({"contribution": channels(0.5, channel=1)}, "too little"),  # not on the channel that it improves
-        ({"contribution": np.full(12, np.inf)}, None),  # without it nothing finite is predicted
-        ({"size": LIMITS.plausible + 1e-9}, "so far"),
-        ({"size": LIMITS.plausible}, None),
-        ({"power": removed(0.1, 0.09), "shifts": shifted(40.0, 10.0)}, None),  # fifteen nats by the joint prior
-        ({"power": removed(0.1, 0.09), "shifts": shifted(10.0 + 2.0 * LOG_ODDS, 10.0)}, "too little"),
-        ({"power": removed(0.1, 0.09), "shifts": shifted(90.0, 60.0)}, "too little"),  # nor plausible with it
-        ({"power": removed(0.1, 0.09), "readings": reading(0.01, 0.007), "reading_motion": np.ones(11)}, None),
-        ({"power": removed(0.1, 0.09), "readings": reading(0.01, 0.008), "reading_motion": np.ones(11)}, "too little"),
-        ({"power": removed(0.1, 0.09), "readings": reading(0.003, 0.0), "reading_motion": np.ones(11)}, None),
-        ({"power": removed(0.1, 0.09), "readings": reading(0.0025, 0.0), "reading_motion": np.ones(11)}, "too little"),
-        ({"power": removed(0.1, 0.09), "readings": reading(9.0, 0.0)}, "too little"),  # of a reading not compared
-        ({"power": removed(0.1, 0.09), "bias": LIMITS.bias + 1e-9}, None),  # more than the file states of it
-        ({"power": removed(0.1, 0.09), "bias": LIMITS.bias}, "too little"),
-        ({"power": removed(9.03, 9.0), "by_flight": ((np.ones(12), removed(0.1, 0.01)),)}, None),  # another hides it
-        ({"power": removed(9.03, 9.0), "by_flight": ((np.ones(12), removed(0.1, 0.09)),)}, "too little"),
+        ({"channels": LITTLE}, "too little"),
+        ({"channels": powers(contribution=np.zeros(12))}, "too little"),
+        ({"channels": powers(contribution=channels(0.5, channel=1))}, "too little"),  # not on the one that it improves
+        ({"channels": powers(contribution=np.full(12, np.inf))}, None),  # without it nothing finite is predicted
+        ({"added": added(largest=LIMITS.plausible + 1e-9)}, "so far"),
+        ({"added": added(largest=LIMITS.plausible)}, None),
+        ({"channels": LITTLE, "shifts": shifted(40.0, 10.0)}, None),  # fifteen nats by the joint prior
+        ({"channels": LITTLE, "shifts": shifted(10.0 + 2.0 * LOG_ODDS, 10.0)}, "too little"),
+        ({"channels": LITTLE, "shifts": shifted(90.0, 60.0)}, "too little"),  # nor plausible with it
+        ({"channels": LITTLE, "readings": readings(0.01, 0.007)}, None),
+        ({"channels": LITTLE, "readings": readings(0.01, 0.008)}, "too little"),
+        ({"channels": LITTLE, "readings": readings(0.003, 0.0)}, None),
+        ({"channels": LITTLE, "readings": readings(0.0025, 0.0)}, "too little"),
+        ({"channels": LITTLE, "readings": readings(9.0, 0.0, np.inf)}, "too little"),  # of a reading not compared
+        ({"channels": LITTLE, "added": added(bias=LIMITS.bias + 1e-9)}, None),  # more than the file states of it
+        ({"channels": LITTLE, "added": added(bias=LIMITS.bias)}, "too little"),
+        ({"channels": hidden(removed(0.1, 0.01))}, None),
+        ({"channels": hidden(removed(0.1, 0.09))}, "too little"),
         ({"log_bayes_factor": 0.0}, "commands"),
         ({"log_bayes_factor": np.nan}, "commands"),
     ],
@@ -107,8 +136,8 @@ def test_each_rule(changes: dict[str, object], reason: str | None) -> None:
 
 @pytest.mark.parametrize(("time", "accepted"), [(0.01 - 1e-9, False), (0.01, True), (0.01 + 1e-9, True)])
 def test_boundary_of_one_sample(time: float, accepted: bool) -> None:
-    assert is_accepted(table(time=time)) is accepted
-    assert is_accepted(table(time=-time)) is accepted
+    assert is_accepted(table(added=added(time=time))) is accepted
+    assert is_accepted(table(added=added(time=-time))) is accepted
 
 
 @pytest.mark.parametrize(("change", "accepted"), [(-1e-9, False), (0.0, False), (1e-9, True)])
@@ -118,7 +147,7 @@ def test_a_probability_at_the_threshold_is_not_beyond_doubt(change: float, accep
 
 @pytest.mark.parametrize(("change", "accepted"), [(-1e-9, False), (0.0, False), (1e-9, True)])
 def test_boundary_of_the_share_that_comes_back(change: float, accepted: bool) -> None:
-    assert is_accepted(table(contribution=channels(LIMITS.share_of_gap + change))) is accepted
+    assert is_accepted(table(channels=powers(contribution=channels(LIMITS.share_of_gap + change)))) is accepted
 
 
 @pytest.mark.parametrize(("change", "accepted"), [(-1e-9, False), (0.0, False), (1e-9, True)])
@@ -135,24 +164,24 @@ def test_picked_from_more_effects_a_candidate_needs_more_support() -> None:
 def test_boundary_of_the_share_of_the_remainder(change: float, improved: bool) -> None:
     """A quarter of 0.1 of the motion."""
     power = removed(0.1, 0.1 * (1.0 - LIMITS.share_of_remainder) - change)
-    assert bool(channels_improved(table(power=power))[0]) is improved
+    assert bool(channels_improved(powers(power=power))[0]) is improved
 
 
 @pytest.mark.parametrize(("change", "improved"), [(-1e-9, False), (1e-9, True)])
 def test_boundary_of_a_noticeable_error(change: float, improved: bool) -> None:
     """All that is left of a channel is removed: it matters from 5 % of the motion (rms)."""
     power = removed(LIMITS.noticeable_error**2 + change, 0.0)
-    assert bool(channels_improved(table(power=power))[0]) is improved
+    assert bool(channels_improved(powers(power=power))[0]) is improved
 
 
 @pytest.mark.parametrize(("change", "improved"), [(-1e-9, False), (1e-9, True)])
 def test_a_large_error_counts_whatever_share_of_the_remainder_it_is(change: float, improved: bool) -> None:
     power = removed(1.0, 1.0 - LIMITS.large_error**2 - change)
-    assert bool(channels_improved(table(power=power))[0]) is improved
+    assert bool(channels_improved(powers(power=power))[0]) is improved
 
 
 def test_powers_count_as_shares_of_the_motion() -> None:
-    assert not is_accepted(table(motion=np.full(12, 100.0)))
+    assert not is_accepted(table(channels=powers(motion=np.full(12, 100.0))))
 
 
 def structure(without: float, with_it: float) -> RemainingStructure:
@@ -171,24 +200,24 @@ def structure(without: float, with_it: float) -> RemainingStructure:
 )
 def test_in_gusts_what_is_structure_of_forces_counts(found: RemainingStructure, improved: bool) -> None:
     """Of the power, hardly any is removed: the rest is weather."""
-    scores = table(gusty=True, power=removed(0.1, 0.09), structure=found)
+    scores = replace(LITTLE, in_gusts=in_gusts(found))
     assert bool(channels_improved(scores)[0]) is improved
-    assert not channels_improved(replace(scores, gusty=False))[0]
+    assert not channels_improved(replace(scores, in_gusts=None))[0]
 
 
 @pytest.mark.parametrize(
     ("means", "improved"), [((0.1, 0.01), True), ((0.1, 0.08), False), ((0.0024, 0.0), False), ((0.0026, 0.0), True)]
 )
 def test_in_gusts_what_is_off_on_average_counts(means: tuple[float, float], improved: bool) -> None:
-    scores = table(gusty=True, power=removed(0.1, 0.1), mean_power=removed(*means))
+    scores = powers(power=removed(0.1, 0.1), in_gusts=in_gusts(mean_power=removed(*means)))
     assert bool(channels_improved(scores)[0]) is improved
 
 
 def test_in_gusts_a_reading_counts_by_its_power() -> None:
     """Air data and attitude are predicted from the inertial instruments, in which gusts are."""
     assert len(COEFFICIENTS) <= V
-    scores = table(gusty=True, power=removed(0.1, 0.01, V), contribution=channels(0.5, channel=V))
-    assert is_accepted(scores)
+    scores = powers(power=removed(0.1, 0.01, V), contribution=channels(0.5, channel=V), in_gusts=in_gusts())
+    assert is_accepted(table(channels=scores))
     assert not channels_improved(replace(scores, power=removed(0.1, 0.01)))[0]  # a force's power does not count
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_node.gap.selection.acceptance import ComparisonTable, RemainingPower, RemainingStructure
+from sysid_node.gap.selection.acceptance import AddedSize, ChannelScores, ComparisonTable, RemainingPower
 from sysid_node.gap.selection.replacement import (
     AlternativeTable,
     PositionTable,
@@ -16,11 +16,10 @@ from sysid_node.gap.selection.replacement import (
 )
 from sysid_node.gap.thresholds import THRESHOLDS
 
-NOTHING = RemainingPower(np.zeros(12), np.zeros(12))
 ACCEPTED = ComparisonTable(
-    time=None, sample_period=0.01, probability=0.99, gusty=False, motion=np.ones(12),
-    power=RemainingPower(np.full(12, 0.1), np.zeros(12)), structure=RemainingStructure(NOTHING, np.zeros(12)),
-    mean_power=NOTHING, contribution=np.ones(12), log_bayes_factor=50.0, searched=30,
+    AddedSize(time=None, sample_period=0.01), probability=0.99,
+    channels=ChannelScores(np.ones(12), RemainingPower(np.full(12, 0.1), np.zeros(12)), contribution=np.ones(12)),
+    log_bayes_factor=50.0, searched=30,
 )  # fmt: skip
 REJECTED = replace(ACCEPTED, probability=0.5)
 LEAD = THRESHOLDS.search.lead
