@@ -28,6 +28,10 @@ from sysid_node.flight.topics import IMU, topic_names
 
 #: Messages of a piece: two minutes at 200 Hz, with air data, positions and commands at 50 Hz.
 PIECE = 40_000
+
+#: Most messages that a bag is believed to hold, by its own count: years of flight.
+_MOST = 10**12
+
 _COMMANDS = "commands"
 
 
@@ -67,7 +71,8 @@ def flight_pieces(
         pieces = _pieces(path, reader, chosen, RecordingWatch(name, inputs, chosen), frame, size)
         first = next(pieces)
         if not first.streams.actuators.content:
-            counts = {topic: sum(c.msgcount for c in connections) for topic, connections in chosen.items()}
+            promised = {topic: sum(c.msgcount for c in connections) for topic, connections in chosen.items()}
+            counts = {topic: min(count, _MOST) for topic, count in promised.items()}  # a damaged bag states any number
             yield FlightPieces(name, sum(counts.values()), counts[IMU], chain([first], pieces))
             return
     yield _whole(path, aircraft, topics, frame)

@@ -1,5 +1,6 @@
 """A flight in pieces is the flight: every message once, in order, whatever the size of the pieces."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,18 @@ def test_the_pieces_are_the_flight(bags: Path, storage: str, size: int) -> None:
     )
     assert (np.diff(order) > 0).all()
     assert [one for piece in pieces for one in piece.commands] == read_commands(bags / storage)
+
+
+def test_a_count_of_messages_that_no_bag_can_hold_is_not_believed(bags: Path, tmp_path: Path) -> None:
+    bag = tmp_path / "damaged"
+    shutil.copytree(bags / "sqlite3", bag)
+    metadata = bag / "metadata.yaml"
+    count = len(read_streams(bag).imu.arrival)
+    metadata.write_text(metadata.read_text().replace(f"message_count: {count}\n", f"message_count: {'9' * 400}\n"))
+    with flight_pieces(bag, AIRCRAFT) as flight, pytest.warns(match="messages on /imu/data"):
+        pieces = list(flight.pieces)
+        assert flight.imu_messages / flight.messages < 1.0
+    assert sum(len(piece.streams.imu.arrival) for piece in pieces) == count
 
 
 def test_commands_read_in_place_of_positions_are_the_commands_too(bags: Path) -> None:
