@@ -173,25 +173,26 @@ def align(
         carried = "commands" if known_from(actuators.stamps, actuators.values[:, 1:]) is not None else "positions"
     commands = commands_of(aircraft, carried, servos=servos)
     actuated, commands_from = _actuated(commands, actuators, right_act[used], at[used])
-    samples = np.column_stack(
-        [
-            imu.values[used],
-            interpolate(air.stamps, air.values, right_air[used], at[used]),
-            actuated[:, :1],
-            intervals(air.stamps, max_gap)[right_air[used]],
-            actuated[:, 1:],
-        ]
-    )
+    of_air = interpolate(air.stamps, air.values, right_air[used], at[used])
+    every = intervals(air.stamps, max_gap)[right_air[used]]
+    samples = np.column_stack([imu.values[used], of_air, actuated[:, :1], every, actuated[:, 1:]])
     gaps = {
         gap(AIR_DATA): int(np.count_nonzero(decided & ~near_air)),
         gap(ACTUATORS): int(np.count_nonzero(decided & near_air & ~near_act)),
     }
-    rejected = {
+    rejected = _rejected(imu, air, actuators, gaps)
+    return Alignment(imu, (air, actuators), (right_air, right_act), used, samples, rejected, commands_from)
+
+
+def _rejected(
+    imu: ScreenedMessages, air: ScreenedMessages, actuators: ScreenedMessages, gaps: Mapping[str, int]
+) -> Rejected:
+    """Messages left out by topic and reason; ``gaps`` are IMU messages without neighbours in another topic."""
+    return {
         IMU: {**imu.rejected, **{reason: count for reason, count in gaps.items() if count}},
         AIR_DATA: dict(air.rejected),
         ACTUATORS: dict(actuators.rejected),
     }
-    return Alignment(imu, (air, actuators), (right_air, right_act), used, samples, rejected, commands_from)
 
 
 def _actuated(

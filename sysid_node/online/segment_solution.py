@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from sysid_node.online.segment_information import finished_information, line_sec
 from sysid_node.online.state import EstimatorState, FinishedSums, InstrumentChecks, ModelTests, SegmentSolution, Steps
 from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals, corrected_signals, known_changes
-from sysid_node.online.systematic.estimation import SystematicErrors
+from sysid_node.online.systematic.estimation import CorrectedSolution, SystematicErrors
 from sysid_node.online.systematic.imperfections import line_model, remapped
 from sysid_node.online.systematic.servo_model import ServoModel
 
@@ -117,6 +118,16 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> Steps[None]:
     state.changes.monitor.references.clear()
 
 
+class _SolvedEquations(NamedTuple):
+    """The solution of all equations, and how far it can be trusted."""
+
+    solution: Solution
+    compensation: Array | None  # noise's part of the normal equations
+    spread: Uncertainty
+    inflation: Array  # (C,) factors of the variances by gusts
+    instruments: InstrumentChecks
+
+
 def solve_all(
     state: EstimatorState, segment: Information, at: tuple[SystematicErrors, float] | None = None
 ) -> Steps[None]:
@@ -131,27 +142,15 @@ def solve_all(
     yield
     total = recorded if signals is None else signals.information
     gram = total.grams.sum(axis=0)
-    strength, solution, compensation = _solve(state, total, gram)
-    equations, table, now = state.equations, state.model.table, state.transform.last
-    spread = least_squares.uncertainty(equations, solution, total)
-    noise_alone = spread.covariance
-    if state.flow.active:
-        spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
-    gusts = _gust_shares(state, total, equations, solution, spread)
-    inflation = gust_correlation.inflation(spread, gusts)
-    variance = inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
-    mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
-    none = np.zeros(len(equations.structure.coefficients), dtype=bool)
-    selection_bias = selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior)
-    bounds = weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts)
-    before = ReferenceEstimates(now, equations, solution, spread)
+    found = _solved(state, total, gram)
+    equations, spread, now = state.equations, found.spread, state.transform.last
+    before = ReferenceEstimates(now, equations, found.solution, spread)
     if signals is not None:
-        before = _with_recorded_signals(equations, recorded, compensation, now)
+        before = _with_recorded_signals(equations, recorded, found.compensation, now)
         yield
-    systematic = yield from _systematic(
-        state, signals, solution, before.solution, spread, inflation, at[1] if at else None
-    )
+    systematic = yield from _systematic(state, signals, found, before.solution, at[1] if at else None)
     yield
+    variance = found.inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
     if systematic is not None:
         variance = variance * systematic.considered.misfit[:, None]
     scale = before.solution.residual[:, None] * np.abs(before.solution.inverse.diagonal())
@@ -161,12 +160,12 @@ def solve_all(
         total=total,
         solution=before.solution,
         uncertainty=spread,
-        compensation=compensation,
+        compensation=found.compensation,
         finished=FinishedSums(past.grams.sum(axis=0), past.integrals),
         trim_noise=spread.bands[:, 0] * total.energy,
         factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
-        instruments=InstrumentChecks(strength, selection_bias, bounds),
-        tests=ModelTests(*_lag_test(state, solution, spread, gram, systematic), none, none),
+        instruments=found.instruments,
+        tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
     )
     state.changes.monitor.references.append(before)
@@ -211,10 +210,8 @@ def _corrected_signals(
 def _systematic(
     state: EstimatorState,
     signals: CorrectedSignals | None,
-    corrected: Solution,
+    corrected: _SolvedEquations,
     recorded: Solution,
-    spread: Uncertainty,
-    inflation: Array,
     share: float | None,
 ) -> Steps[SystematicErrors | None]:
     """The effect of the tolerances on the estimates; None where there are none, or nothing is solved for.
@@ -222,21 +219,17 @@ def _systematic(
     With a ``share`` of a step they are looked at anew, else when it is time.
     """
     imperfect, servos, equations = state.model.imperfections, state.servos, state.equations
-    if imperfect is None or servos is None or signals is None or not corrected.usable:
+    if imperfect is None or servos is None or signals is None or not corrected.solution.usable:
         return None
-    correction = signals.correction(equations, corrected, recorded)
+    correction = signals.correction(equations, corrected.solution, recorded)
     last = last_errors(state)
     if share is None and last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
         return replace(last, correction=correction)
     found = yield from estimation.systematic_errors(
         imperfect,
         servos,
-        equations,
-        corrected,
-        spread,
+        CorrectedSolution(equations, corrected.solution, corrected.spread, corrected.inflation, correction),
         signals,
-        inflation,
-        correction,
         state.finished.pieces,
         1.0 if share is None else share,
         tuple(state.search.rivals.values()),
@@ -259,6 +252,47 @@ def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[Inst
     if compensation is not None and not solution.usable:
         solution, compensation = least_squares.solve(equations, gram), None
     return instrument_strength, solution, compensation
+
+
+def _solved(state: EstimatorState, total: Information, gram: Array) -> _SolvedEquations:
+    """By the equations that the instruments' strength allows, which are the state's from now on."""
+    strength, solution, compensation = _solve(state, total, gram)
+    equations = state.equations
+    spread = least_squares.uncertainty(equations, solution, total)
+    noise_alone = spread.covariance
+    if state.flow.active:
+        spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
+    gusts = _gust_shares(state, total, equations, solution, spread)
+    checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
+    return _SolvedEquations(solution, compensation, spread, gust_correlation.inflation(spread, gusts), checks)
+
+
+def _instrument_checks(
+    state: EstimatorState,
+    total: Information,
+    gram: Array,
+    strength: InstrumentStrength,
+    solution: Solution,
+    spread: Uncertainty,
+    noise_alone: Array,
+    gusts: Array,
+) -> InstrumentChecks:
+    """How far the instruments can be trusted; ``noise_alone`` (C, P, P) is the covariance that noise makes."""
+    equations, table = state.equations, state.model.table
+    mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
+    return InstrumentChecks(
+        strength,
+        selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior),
+        weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts),
+    )
+
+
+def _model_tests(
+    state: EstimatorState, solution: Solution, spread: Uncertainty, gram: Array, systematic: SystematicErrors | None
+) -> ModelTests:
+    """The test for actuator lag; those for changes come later, with the renewal's watch for them."""
+    none = np.zeros(len(state.equations.structure.coefficients), dtype=bool)
+    return ModelTests(*_lag_test(state, solution, spread, gram, systematic), none, none)
 
 
 def _lag_test(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import jax
 import jax.numpy as jnp
 
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.models.model import ModelParameter, Scalars
 from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
@@ -16,6 +16,8 @@ from sysid_node.dynamics.tables import full_thrust, mach_number
 Signals = Mapping[str, jax.Array]
 #: ``signals, theta -> coefficient -> value``.
 Coefficients = Callable[[Signals, Scalars], dict[str, jax.Array]]
+#: ``name, signals -> value``.
+Regressor = Callable[[str, Signals], jax.Array]
 
 
 def derivative_parameters(
@@ -38,13 +40,33 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
     Rates are made non-dimensional with the airspeed of the moment, or with the reference airspeed where
     ``reference_rates``. CD_k multiplies CL^2 (parabolic drag polar).
     """
-    geometry, speed = aircraft.geometry, aircraft.reference.airspeed
-    halves = {"p": geometry.b / 2.0, "q": geometry.cbar / 2.0, "r": geometry.b / 2.0}
     terms = [split_derivative(name) for name in names]
     modelled = {coefficient for coefficient, _ in terms}
     tables = [table for table in aircraft.tables if table.coefficient in modelled]
-    packed = pack([(table.points, table.values) for table in tables]) if tables else None
-    full = full_thrust(aircraft)
+    regressor = _regressor_function(aircraft, reference_rates)
+    added_by_tables = _table_function(tables, regressor, full_thrust(aircraft)) if tables else None
+
+    def evaluate(signals: Signals, theta: Scalars) -> dict[str, jax.Array]:
+        total: dict[str, jax.Array] = {}
+        for (coefficient, name), value in zip(terms, theta, strict=True):
+            if name != "k":
+                total[coefficient] = total.get(coefficient, 0.0) + value * regressor(name, signals)
+        if added_by_tables is not None:
+            added = added_by_tables(signals)
+            for i, table in enumerate(tables):
+                total[table.coefficient] = total.get(table.coefficient, 0.0) + added[..., i]
+        for (coefficient, name), value in zip(terms, theta, strict=True):
+            if name == "k":
+                total[coefficient] = total.get(coefficient, 0.0) + value * total["CL"] ** 2
+        return total
+
+    return evaluate
+
+
+def _regressor_function(aircraft: Aircraft, reference_rates: bool) -> Regressor:
+    """What a derivative is multiplied by, by its name."""
+    geometry, speed = aircraft.geometry, aircraft.reference.airspeed
+    halves = {"p": geometry.b / 2.0, "q": geometry.cbar / 2.0, "r": geometry.b / 2.0}
 
     def regressor(name: str, signals: Signals) -> jax.Array:
         if name == "0":
@@ -55,6 +77,13 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
             return signals[name] * halves[name] / (speed if reference_rates else signals["V"])
         return signals[name]
 
+    return regressor
+
+
+def _table_function(tables: Sequence[LookupTable], regressor: Regressor, full: float) -> Callable[[Signals], jax.Array]:
+    """What T ``tables`` add (..., T); ``full`` (N): the thrust at full throttle."""
+    packed = pack([(table.points, table.values) for table in tables])
+
     def variable(name: str, signals: Signals) -> jax.Array:
         if name == "Mach":
             return jnp.asarray(mach_number(signals["V"], signals["rho"], jnp))
@@ -62,22 +91,12 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
             return signals.get("thrust", jnp.zeros_like(signals["V"])) / full
         return signals["V"] if name == "V" else regressor(name, signals)
 
-    def evaluate(signals: Signals, theta: Scalars) -> dict[str, jax.Array]:
-        total: dict[str, jax.Array] = {}
-        for (coefficient, name), value in zip(terms, theta, strict=True):
-            if name != "k":
-                total[coefficient] = total.get(coefficient, 0.0) + value * regressor(name, signals)
-        if packed is not None:
-            first, second = (_stacked([variable(table.over[k], signals) for table in tables]) for k in (0, -1))
-            added = interpolate(PackedTables(*(jnp.asarray(part) for part in packed)), first, second, jnp)
-            for i, table in enumerate(tables):
-                total[table.coefficient] = total.get(table.coefficient, 0.0) + added[..., i]
-        for (coefficient, name), value in zip(terms, theta, strict=True):
-            if name == "k":
-                total[coefficient] = total.get(coefficient, 0.0) + value * total["CL"] ** 2
-        return total
+    def added(signals: Signals) -> jax.Array:
+        first, second = (_stacked([variable(table.over[k], signals) for table in tables]) for k in (0, -1))
+        found: jax.Array = interpolate(PackedTables(*(jnp.asarray(part) for part in packed)), first, second, jnp)
+        return found
 
-    return evaluate
+    return added
 
 
 def _stacked(series: Sequence[jax.Array]) -> jax.Array:

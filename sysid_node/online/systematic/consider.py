@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,26 +113,73 @@ class Considered:
         return np.asarray(((self.covariance @ flat) * flat).sum(axis=0).reshape(C, places))
 
 
+@dataclass(frozen=True)
+class Beliefs:
+    """What is believed of K imperfections before the flight."""
+
+    sigmas: Array  # (K,) tolerances
+    centre: Array  # (K,) expected values
+    precision: Array  # (K, K) inverse of their correlations
+
+
+class _Sensitivities(NamedTuple):
+    """What one tolerance of each imperfection changes; N signals, and their rates."""
+
+    v: Array  # (N, C) combinations of signals that are the residuals
+    J: Array  # (C, P, K) what it moves the slopes by
+    residuals: Array  # (C, K + 1, 2N) what it changes of the residuals beyond that, and the residuals themselves
+
+
+class _Findings(NamedTuple):
+    """What the exogenous signals find of the imperfections in the residuals of C equations."""
+
+    scores: Scores
+    misfit: Array  # (C,) see ``Considered``
+    explained: Array  # (C,) see ``Fit``
+    moves: NDArray[np.bool_]  # (C,) coefficients that are more than rounding
+
+
 def consider(
     equations: NormalEquations,
     solution: Solution,
     noise: Array,
     signals: CorrectedSignals,
     place: NDArray[np.intp],
-    sigmas: Array,
-    centre: Array,
-    precision: Array,
+    beliefs: Beliefs,
     freedom: Array,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
-    ``place`` (W,): where the columns of the regression stand among the signals. ``sigmas`` (K,) are the tolerances,
-    ``centre`` (K,) the expected values before the flight, ``precision`` (K, K) the inverse of their correlations then,
-    and ``freedom`` (C,) the noise's degrees of freedom. It is made in two steps (``state.Steps``).
+    ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
+    degrees of freedom. It is made in two steps (``state.Steps``).
     """
-    structure = equations.structure
-    gram, changes, C = signals.gram, signals.changes, len(structure.coefficients)
-    v = np.zeros((changes.columns.width, C))
+    sigmas = beliefs.sigmas
+    of_each = _sensitivities(equations, solution, signals, place, sigmas)
+    yield
+    found = _findings(equations, of_each.residuals, noise, signals, place, freedom)
+    off = (beliefs.centre - signals.estimate) / sigmas
+    step, covariance = _posterior(*found.scores.weighed(), off, beliefs.precision)
+    jacobian = _jacobian(equations, signals.changes, of_each.v, of_each.J, sigmas, signals.corrected_means)
+    return Considered(
+        signals.estimate + sigmas * step,
+        sigmas * step,
+        sigmas[:, None] * covariance * sigmas,
+        jacobian / sigmas[:, None, None],
+        found.misfit,
+        Fit(found.explained, noise * found.misfit * found.moves, float(off @ beliefs.precision @ off)),
+    )
+
+
+def _sensitivities(
+    equations: NormalEquations,
+    solution: Solution,
+    signals: CorrectedSignals,
+    place: NDArray[np.intp],
+    sigmas: Array,
+) -> _Sensitivities:
+    """What the imperfections change of the slopes and the residuals, per tolerance."""
+    structure, gram, changes = equations.structure, signals.gram, signals.changes
+    v = np.zeros((changes.columns.width, len(structure.coefficients)))
     v[place] = misfits(equations, solution.theta)
     X, V = signals.matrix[place[equations.columns]], signals.matrix[place[equations.instruments]]
     residuals = v.T @ signals.matrix  # (C, 2N)
@@ -145,30 +193,33 @@ def consider(
     J *= structure.belongs.T[:, :, None]
     # what the instruments find in the residuals is the noise's part, or rounding
     left = inverse @ ((across @ residuals.T) * structure.belongs) * structure.belongs  # (P, C)
-    both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)  # (C, K + 1, 2N)
-    yield
-    scores, misfit, explained = Scores.none(sigmas.size), np.ones(C), np.zeros(C)
+    both = np.concatenate([Z - J.swapaxes(1, 2) @ X, (residuals - left.T @ X)[:, None]], axis=1)
+    return _Sensitivities(v, J, both)
+
+
+def _findings(
+    equations: NormalEquations,
+    residuals: Array,
+    noise: Array,
+    signals: CorrectedSignals,
+    place: NDArray[np.intp],
+    freedom: Array,
+) -> _Findings:
+    """What the exogenous signals find in the ``residuals`` (C, K + 1, 2N) and their changes."""
+    structure, gram = equations.structure, signals.gram
+    C = len(structure.coefficients)
+    scores, misfit, explained = Scores.none(residuals.shape[1] - 1), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(structure.block.max()) + 1):
-        project = _projection(equations, changes, place, gram, block)
+        project = _projection(equations, signals.changes, place, gram, block)
         for c in np.flatnonzero((structure.block == block) & (noise > 0.0) & moves).tolist():
-            q, D = project @ both[c].T, both[c, :-1]
+            q, D = project @ residuals[c].T, residuals[c, :-1]
             further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
             explained[c] = float(q[:, -1] @ q[:, -1])
             misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
             share = further / max(float(freedom[c]), 1.0)
-            scores.add(q[:, :-1].T @ q, D @ gram @ both[c].T, share, float(noise[c] * misfit[c]))
-    off = (centre - signals.estimate) / sigmas
-    step, covariance = _posterior(*scores.weighed(), off, precision)
-    jacobian = _jacobian(equations, changes, v, J, sigmas, signals.corrected_means)
-    return Considered(
-        signals.estimate + sigmas * step,
-        sigmas * step,
-        sigmas[:, None] * covariance * sigmas,
-        jacobian / sigmas[:, None, None],
-        misfit,
-        Fit(explained, noise * misfit * moves, float(off @ precision @ off)),
-    )
+            scores.add(q[:, :-1].T @ q, D @ gram @ residuals[c].T, share, float(noise[c] * misfit[c]))
+    return _Findings(scores, misfit, explained, moves)
 
 
 def _by_the_model(

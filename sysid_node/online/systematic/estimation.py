@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysid_node.online.regression.information import Information
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
-from sysid_node.online.systematic.consider import Considered, consider
+from sysid_node.online.systematic.consider import Beliefs, Considered, consider
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals, Known
 from sysid_node.online.systematic.imperfections import Imperfections, prior
 from sysid_node.online.systematic.servo_model import ServoModel
@@ -78,46 +78,49 @@ class SystematicErrors:
         return new and self.lines is servos and energy >= self.energy
 
 
+@dataclass(frozen=True)
+class CorrectedSolution:
+    """The solution of all equations by the corrected signals, and how far it is to be trusted."""
+
+    equations: NormalEquations
+    solution: Solution
+    spread: Uncertainty
+    inflation: (
+        Array  # (C,) factors of the statistical variances, which hold for what the flight tells of imperfections too
+    )
+    correction: Array  # (C, P + 1) by which the solution differs from that of the recorded signals
+
+
 def systematic_errors(
     imperfect: Imperfections,
     servos: ServoModel,
-    equations: NormalEquations,
-    solution: Solution,
-    spread: Uncertainty,
+    solved: CorrectedSolution,
     signals: CorrectedSignals,
-    inflation: Array,
-    correction: Array,
     pieces: int,
     share: float,
     rivals: tuple[Rival, ...],
 ) -> Generator[None, None, SystematicErrors]:
-    """By the corrected ``signals`` and their ``solution``, which differs by ``correction`` from that of recorded ones.
+    """By the corrected ``signals`` and what is ``solved`` with them.
 
-    The lines have the controls where the ``servos`` have them. ``inflation`` (C,): factors of the statistical
-    variances, which hold for what the flight tells of imperfections too. At most a ``share`` of the step is made. The
-    intervals reach to the ``rivals``. It is made in steps (``state.Steps``).
+    The lines have the controls where the ``servos`` have them. At most a ``share`` of the step is made. The intervals
+    reach to the ``rivals``. It is made in steps (``state.Steps``).
     """
-    sigmas, centre = prior(imperfect, servos)
-    noise = inflation * noise_per_gram(equations, spread, signals.information)
-    found = yield from consider(
-        equations, solution, noise, signals, imperfect.places, sigmas, centre, imperfect.precision, spread.freedom
-    )
-    at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
+    equations, spread = solved.equations, solved.spread
+    beliefs = Beliefs(*prior(imperfect, servos), imperfect.precision)
+    noise = solved.inflation * noise_per_gram(equations, spread, signals.information)
+    found = yield from consider(equations, solved.solution, noise, signals, imperfect.places, beliefs, spread.freedom)
     share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))
     found = found.shortened(share)
     for rival in rivals:
         found = found.widened(rival.imperfections - _base(imperfect, servos), rival.probability)
-    late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
-    late[at], curved[at] = found.estimate[S : S + m], found.estimate[S + m : S + 2 * m]
-    errors = np.sqrt(found.covariance.diagonal()[S : S + m])
     published = with_steps(imperfect, found)
     return SystematicErrors(
         found,
-        correction + found.correction,
+        solved.correction + found.correction,
         published.variance(),
         published.slope_covariance(),
-        ServoModel(servos.lateness + late, servos.curvature + curved, servos.third),
-        errors,
+        _moved(imperfect, servos, found.estimate),
+        np.sqrt(found.covariance.diagonal()[imperfect.servos]),
         servos,
         pieces,
         signals.information.energy,
@@ -125,6 +128,14 @@ def systematic_errors(
         signals.estimate,
         share,
     )
+
+
+def _moved(imperfect: Imperfections, servos: ServoModel, estimate: Array) -> ServoModel:
+    """The ``servos`` of all controls, moved by what is estimated of those that are not exactly known."""
+    at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
+    late, curved = np.zeros(servos.lateness.size), np.zeros(servos.lateness.size)
+    late[at], curved[at] = estimate[S : S + m], estimate[S + m : S + 2 * m]
+    return ServoModel(servos.lateness + late, servos.curvature + curved, servos.third)
 
 
 def with_steps(imperfect: Imperfections, found: Considered) -> Considered:
