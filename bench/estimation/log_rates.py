@@ -20,6 +20,10 @@ import numpy as np
 from bench.pages import publish, table
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, UncertainValue
+from sysid_node.batch.identify import METHODS, identify
+from sysid_node.batch.results.estimate import ParameterEstimate
+from sysid_node.batch.settings import BatchSettings
+from sysid_node.flight.align import flight_record
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.commands import read_commands
 from sysid_node.flight.frames import quaternion_from_euler
@@ -32,7 +36,9 @@ from sysid_node.flight.truth import read_truth
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import Estimates
+from sysid_node.online.types import DerivativeEstimate
+
+Estimate = DerivativeEstimate | ParameterEstimate
 
 BAGS = Path(__file__).resolve().parents[2] / "bags"
 #: Time constant of the servos in the bundled flights, s (bags/make.py).
@@ -115,13 +121,17 @@ def drawn(aircraft: Aircraft, seed: int) -> Aircraft:
     return replace(aircraft, derivatives=derivatives, effects={"actuator_lag": lag})
 
 
-def estimated(aircraft: Aircraft, streams: Streams) -> Estimates:
-    """The estimates at the end of a flight."""
+def estimated(aircraft: Aircraft, streams: Streams, method: str) -> Mapping[str, Estimate]:
+    """The estimates of all derivatives at the end of a flight, by the replay or by a batch method."""
+    if method != "replay":
+        record = flight_record(aircraft, streams, OnlineSettings().max_gap, "commands")
+        return identify(method, aircraft, [record], BatchSettings(actuators="commands")).fit.estimates
     settings = OnlineSettings()
     aligned = align_streams(aircraft, streams, settings.max_gap, "commands")
     time, interval = aligned.time, streams.actuators.interval
     samples, begin = aligned.samples, aligned.commands_from
-    return run(aircraft, settings, time, samples, time[-1:], commands_from=begin, command_interval=interval)[-1]
+    found = run(aircraft, settings, time, samples, time[-1:], commands_from=begin, command_interval=interval)
+    return found[-1].derivatives
 
 
 class Outcome(NamedTuple):
@@ -133,12 +143,12 @@ class Outcome(NamedTuple):
     error: float
 
 
-def outcomes(flight: str, rates: Rates, seed: int, *, vanes: bool, ideal: bool) -> list[Outcome]:
+def outcomes(flight: str, rates: Rates, seed: int, method: str, *, vanes: bool, ideal: bool) -> list[Outcome]:
     """Of all derivatives of a flight."""
     truth, known = read_truth(BAGS / flight), load_aircraft(flight[:4])
-    estimates = estimated(replace(drawn(known, seed), ideal=ideal), logged(BAGS / flight, rates, vanes=vanes))
+    streams = logged(BAGS / flight, rates, vanes=vanes)
     found = []
-    for row in estimates.derivatives.values():
+    for row in estimated(replace(drawn(known, seed), ideal=ideal), streams, method).values():
         if row.name not in truth or row.name.endswith("_0"):
             continue
         tolerance = known.derivatives[row.name].tolerance or 1.0
@@ -153,19 +163,29 @@ def main() -> None:
     parser.add_argument("--page", type=Path)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--ideal", action="store_true", help="intervals without what tolerances add to them")
+    parser.add_argument("--method", default="replay", choices=("replay", *METHODS))
+    parser.add_argument("--table", choices=[name for name, *_ in TABLES], help="this one alone")
     args = parser.parse_args()
     for name, flights, vanes in TABLES:
-        rows = [_row(label, rates, flights, args.seeds, vanes=vanes, ideal=args.ideal) for label, rates in LOGS.items()]
+        if args.table not in (None, name):
+            continue
+        rows = [
+            _row(label, rates, flights, args.seeds, args.method, vanes=vanes, ideal=args.ideal)
+            for label, rates in LOGS.items()
+        ]
         heads = ("log", "valid", "of these hold the truth", "median error of all, in tolerances", "of the valid")
-        publish(f"bench/estimation/log_rates.py {name}", table(heads, rows), args.page)
+        section = f"bench/estimation/log_rates.py {name}" + ("" if args.method == "replay" else f" {args.method}")
+        publish(section, table(heads, rows), args.page)
 
 
-def _row(label: str, rates: Rates, flights: Sequence[str], seeds: int, *, vanes: bool, ideal: bool) -> tuple[str, ...]:
+def _row(
+    label: str, rates: Rates, flights: Sequence[str], seeds: int, method: str, *, vanes: bool, ideal: bool
+) -> tuple[str, ...]:
     every = [
         one
         for flight in flights
         for seed in range(seeds)
-        for one in outcomes(flight, rates, seed, vanes=vanes, ideal=ideal)
+        for one in outcomes(flight, rates, seed, method, vanes=vanes, ideal=ideal)
     ]
     valid = [one for one in every if one.valid]
     holds = f"{100.0 * sum(one.holds for one in valid) / len(valid):.0f} %" if valid else "-"

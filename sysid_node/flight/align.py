@@ -308,7 +308,8 @@ def flight_record(
     start = int(aligned.imu.stamps[0])
     commanded = aligned.commands_from < aligned.used.size
     rejected = counts_by_reason(aligned.rejected)
-    return FlightRecord(aligned.time, columns, streams.name, start, rejected, commanded, interval)
+    between = streams.actuators.interval
+    return FlightRecord(aligned.time, columns, streams.name, start, rejected, commanded, interval, between)
 
 
 def sample_columns(aircraft: Aircraft) -> tuple[str, ...]:

@@ -48,6 +48,7 @@ class FlightRecord:
     rejected: Mapping[str, int] = field(default_factory=dict)
     commanded: bool = False  # whether the controls follow from commands by the aircraft file's servos
     air_interval: float = 0.0  # s between the messages of air data, on average; 0 = not known
+    command_interval: float = 0.0  # s between a log's commands where lines stand between them (``JointStream``)
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.size < 2:

@@ -127,6 +127,13 @@ def test_record_has_named_columns_attitude_and_counts():
     assert record.start_ns + round(record.time[0] * 1e9) == aligned.stamps[0]
 
 
+def test_record_keeps_the_interval_of_a_slow_logs_commands():
+    streams = made_streams(2.0)
+    slow = dataclasses.replace(streams, actuators=dataclasses.replace(streams.actuators, interval=0.1))
+    assert flight_record(AIRCRAFT, streams, 0.5).command_interval == 0.0
+    assert flight_record(AIRCRAFT, slow, 0.5).command_interval == 0.1
+
+
 def test_topics_that_do_not_overlap_are_said_so():
     streams = made_streams(1.0)
     later = with_stamps(streams.air_data, streams.air_data.arrival.stamp_ns + 50_000_000_000)

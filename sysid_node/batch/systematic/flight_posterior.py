@@ -7,6 +7,9 @@ flight tells the sum of two imperfections alone, a servo's lateness and the IMU'
 different places seem to tell both (Huang, Mourikis & Roumeliotis, Int. J. Robotics Research 29, 2010, call it
 inconsistency by linearisation). Flights with commands and flights with measured positions have no servos in common:
 their results, normal distributions, are multiplied, and the tolerances, which both of them hold, count once.
+
+Where a log holds commands slowly, the time of a step is not known within its interval. A flight shows the lateness of
+all steps together, and a derivative may rest on a single one: that time is added to the servos' lateness again.
 """
 
 from __future__ import annotations
@@ -81,6 +84,7 @@ class _OneFlight(NamedTuple):
     names: tuple[str, ...]
     jacobian: Array  # (K, D) per unit
     seconds: float
+    step_time: float  # s, 1 sigma of the time of a step in the commands
     online: Mapping[str, tuple[float, float]]
 
 
@@ -96,7 +100,9 @@ def flight_posterior(
 
 def _passed(aircraft: Aircraft, records: Sequence[FlightRecord], settings: OnlineSettings) -> EstimatorState:
     """The online estimator after flights that are alike in what was recorded of the controls, as if they were one."""
-    state, begin = estimator.init(aircraft, settings, commanded=records[0].commanded), 0.0
+    slowest = max(record.command_interval for record in records)
+    state = estimator.init(aircraft, settings, commanded=records[0].commanded, command_interval=slowest)
+    begin = 0.0
     for record in records:
         # each flight has its own beginning, and tells whether its thrust is known
         state.inputs.begin, state.inputs.thrust_known = math.nan, None
@@ -132,6 +138,7 @@ def _told(state: EstimatorState) -> _OneFlight | None:
         table.names,
         jacobian.reshape(sigmas.size, -1)[:, table.place],
         latest.total.energy,
+        imperfect.step_time,
         {name: (d.value, d.standard_error) for name, d in estimate(state).derivatives.items() if d.valid},
     )
 
@@ -168,10 +175,12 @@ def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
         jacobian[at] += flight.seconds * flight.jacobian
         weight[at] += flight.seconds
     covariance = np.linalg.inv(information)
+    step_time = max(flight.step_time for flight in told)
+    late = np.array([one.role == "lateness" and one.commanded for one in every])
     return FlightPosterior(
         every,
         expected + sigmas * (covariance @ score),
-        sigmas[:, None] * covariance * sigmas,
+        sigmas[:, None] * covariance * sigmas + np.diag(step_time**2 * late),
         told[0].names,
         jacobian / np.maximum(weight, 1e-9)[:, None],
         {n: _together(found) for n in told[0].names if (found := [one.online[n] for one in told if n in one.online])},

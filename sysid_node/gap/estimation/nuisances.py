@@ -150,8 +150,8 @@ def nuisances_of(
         sigma |= _turning_air(aircraft)
     limit = {name: THRESHOLDS.priors.limit * s for name, s in sigma.items()}
     limit |= {name: min(limit[name], room) for name, room in _room(model.simulator, believed).items()}
-    for clock, rate in zip(CLOCKS, (model.flight.actuator_rate, model.flight.air_rate), strict=True):
-        sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 / rate, 1.0 / rate
+    for clock, interval in zip(CLOCKS, (model.flight.step_interval, 1.0 / model.flight.air_rate), strict=True):
+        sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 * interval, interval
     names = model.simulator.names
     of_aircraft = ("derivative_error", "unsteady_aerodynamics", *CLOCKS, *(f"{name}" for name in believed))
     shared = np.array([name.startswith(of_aircraft) for name in sigma])

@@ -18,6 +18,7 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.opening import is_table, open_streams
 from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.flight.streams import Streams
 from sysid_node.gap.flightdata import flow_angles as inferred
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
 
@@ -36,7 +37,11 @@ _LATERAL = ("ay", "p", "r", "beta")
 
 @dataclass(frozen=True)
 class GapFlight:
-    """A record, and the rate at which each topic was sampled, Hz, from which the noise in the band follows."""
+    """A record, and the rate at which each topic was sampled, Hz, from which the noise in the band follows.
+
+    ``command_interval`` (s) is that of a log's commands where lines stand between them (``JointStream``); their
+    ``actuator_rate`` is then that of the lines.
+    """
 
     record: FlightRecord
     imu_rate: float
@@ -48,6 +53,12 @@ class GapFlight:
     inferred: tuple[str, ...] = field(default=())  # flow angles that no vane measured
     left_out: float = 0.0  # s without a manoeuvre that were cut off
     metered: bool = True  # whether thrust was measured; else it is inferred from the file's drag
+    command_interval: float = 0.0
+
+    @property
+    def step_interval(self) -> float:
+        """Time within which a step in the commands may have fallen, s."""
+        return self.command_interval or 1.0 / self.actuator_rate
 
 
 def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
@@ -56,12 +67,17 @@ def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | 
         record = read_csv(path)
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
-    streams = open_streams(path, aircraft, topics, frame)
+    return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path))
+
+
+def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "") -> GapFlight:
+    """The flight of recorded messages. Raises InputError where it lacks a signal or is too short."""
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
     record = flight_record(aircraft, streams, 0.2, "auto", servos=False)
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
-    return completed_flight(aircraft, GapFlight(record, rates[0], rates[1], rates[2], source=str(path)))
+    flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
+    return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))
 
 
 def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:

@@ -45,7 +45,7 @@ def with_added_noise(aircraft: Aircraft, flight: GapFlight, random: np.random.Ge
 
 def _resampled_commands(aircraft: Aircraft, flight: GapFlight, random: np.random.Generator) -> dict[str, Array]:
     """Commands (N,) as other samples of the same rate might have caught them: a step falls anywhere between two."""
-    record, period = flight.record, 1.0 / flight.actuator_rate
+    record, period = flight.record, flight.step_interval
     nodes = np.arange(0.0, record.duration + period, period)
     shift = np.interp(record.time, nodes, period * (random.random(nodes.size) - 0.5))
     symbols = [*aircraft.control_symbols, *(["thrust"] if aircraft.throttle and flight.metered else [])]

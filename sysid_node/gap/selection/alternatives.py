@@ -184,5 +184,5 @@ def _suffices(fitted: FittedSet, more: Candidate, less: Candidate) -> bool:
     sizes, stated = (np.array([at[entries].sum() for entries in rest]) for at in (point, fit.simulator.neutral()))
     chance = dict(zip(fit.indices, np.sqrt(np.diag(fit.covariance)), strict=False))
     errors = np.array([max(chance.get(i, 0.0) for i in entries) for entries in rest])
-    period = max(1.0 / flight.model.flight.actuator_rate for flight in fit.flights)
+    period = max(flight.model.flight.step_interval for flight in fit.flights)
     return are_as_stated(sizes, stated, errors, period if more.effect in TIME_EFFECTS else 0.0)

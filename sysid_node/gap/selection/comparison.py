@@ -54,7 +54,7 @@ class Comparison:
     def added(self) -> AddedSize:
         """Size of what was added."""
         fitted, models = self.fitted, self.fitted.fit.models
-        period = 1.0 / min(min(model.flight.actuator_rate, model.flight.air_rate) for model in models)
+        period = max(max(model.flight.step_interval, 1.0 / model.flight.air_rate) for model in models)
         return AddedSize(_time(fitted), period, _largest_size(fitted), _largest_bias(fitted))
 
     @cached_property

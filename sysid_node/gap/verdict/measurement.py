@@ -73,9 +73,9 @@ def sampling_power(fit: CandidateFit) -> Array:
     left, motion = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     for fitted in fit.flights:
         model, point = fitted.model, fitted.point
-        rates = np.array([model.flight.actuator_rate, model.flight.air_rate])
+        intervals = model.flight.step_interval, 1.0 / model.flight.air_rate
         slopes = model.slopes(point, [model.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
-        left += sum(power_of(slopes[..., i]) / (12.0 * rate**2) for i, rate in enumerate(rates))
+        left += sum(power_of(slopes[..., i]) * interval**2 / 12.0 for i, interval in enumerate(intervals))
         motion += (np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1))
     return left / np.maximum(motion, 1e-300)
 

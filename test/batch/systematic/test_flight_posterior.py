@@ -1,5 +1,7 @@
 """What flights tell of the imperfections, and several flights together."""
 
+import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -55,3 +57,18 @@ def test_a_flight_that_tells_nothing_leaves_the_others_as_they_are():
     found = flight_posterior(UNCERTAIN, [behind_servos(1), short], BatchSettings())
     assert found is not None
     assert found.mean == pytest.approx(posterior(1).mean)
+
+
+@pytest.mark.parametrize(("intervals", "slowest"), [((0.1,), 0.1), ((0.0, 0.1), 0.1), ((0.0204,), 0.0)])
+def test_the_time_of_a_step_in_a_slow_logs_commands_is_not_known(intervals, slowest):
+    """Truth: a uniform distribution's standard deviation, which no number of flights makes smaller."""
+    records = [replace(flight(1), commanded=True, command_interval=interval) for interval in intervals]
+    found = flight_posterior(KESTREL, records, BatchSettings(actuators="commands"))
+    if not slowest:
+        assert found is None
+        return
+    assert found is not None
+    late = [k for k, one in enumerate(found.imperfections) if one.role == "lateness"]
+    assert len(late) == len(KESTREL.controls)
+    assert (found.errors[late] > slowest / math.sqrt(12.0)).all()
+    assert (np.abs(found.mean[late]) < 0.1 * slowest).all()  # all surfaces are where they were commanded

@@ -38,6 +38,18 @@ def test_without_servos_they_do_not():
     assert max(off) > 10.0
 
 
+def test_intervals_hold_steps_that_a_slow_log_tells_too_late():
+    """Truth: a flight whose elevator was logged 30 ms late, within the 0.1 s between the log's commands."""
+    record = flight(1)
+    late = record.columns | {"de": np.interp(record.time - 0.03, record.time, record["de"])}
+    logged = replace(record, columns=late, commanded=True)
+    for interval, holds in ((0.0, False), (0.1, True)):
+        slow = replace(logged, command_interval=interval)
+        fit = identify("equation_error", KESTREL, [slow], BatchSettings(actuators="commands")).fit
+        found = fit.estimates["Cm_q"]
+        assert (found.lower <= TRUTH["Cm_q"] <= found.upper) == holds, (interval, found)
+
+
 def test_parts_of_the_standard_error_and_the_budget(found):
     for name, e in found.estimates.items():
         assert e.standard_error == pytest.approx(np.hypot(e.statistical_error, e.systematic_error)), name

@@ -31,6 +31,16 @@ def test_flights_without_lateral_instruments_are_judged_beside_others(aircraft, 
     assert len(nuisances_of(aircraft, alone).indices) < len(names[0])
 
 
+def test_the_clock_of_a_slow_logs_commands_may_be_off_by_its_interval(aircraft, plain_model) -> None:
+    """Between a log's commands stand lines at the model's rate, which do not tell when a step was."""
+    slow = replace(plain_model, flight=replace(plain_model.flight, command_interval=0.1))
+    clock = plain_model.simulator.names.index("actuator_stamp_delay.delay")
+    for model, interval in ((plain_model, 0.01), (slow, 0.1)):
+        found = nuisances_of(aircraft, model)
+        place = found.indices.index(clock)
+        assert (found.sigma[place], found.limit[place]) == pytest.approx((0.5 * interval, interval))
+
+
 def test_a_simulators_file_is_right_within_a_small_share_unless_it_states_tolerances(aircraft) -> None:
     plain = {name: replace(d, tolerance=None) for name, d in aircraft.derivatives.items()}
     assert derivative_tolerances(replace(aircraft, derivatives=plain)) == {}

@@ -7,8 +7,18 @@ import pytest
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
+from sysid_node.flight.logs.fractions import between_commands
 from sysid_node.flight.record import FlightRecord
-from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, completed_flight, resampled
+from sysid_node.gap.flightdata.gap_flight import (
+    ANALYSIS_RATE,
+    GapFlight,
+    completed_flight,
+    flight_of_streams,
+    resampled,
+)
+from sysid_node.sim import Simulator
+from sysid_node.sim.flying.recording import FlightSampler
+from sysid_node.sim.flying.sortie import fly_sortie
 
 RATE, DURATION = 200.0, 20.0
 NAMES = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "phi", "theta", "psi", "thrust")
@@ -83,6 +93,16 @@ def test_lateral_signals_that_were_not_measured_are_zero(aircraft) -> None:
 def test_a_signal_that_is_needed_is_named(aircraft, name: str) -> None:
     with pytest.raises(InputError, match=rf"no complete {name}"):
         completed_flight(aircraft, without(flight_with(aircraft), name))
+
+
+@pytest.mark.parametrize("logged", [10, 100])
+def test_a_slow_logs_commands_keep_their_interval_apart_from_the_rate_of_the_lines(aircraft, logged: int) -> None:
+    """Truth: the log's own rate. A rate of messages is not that at which steps were logged."""
+    simulator = Simulator(aircraft, 100.0)
+    streams = FlightSampler(100.0, 100.0, logged).record(fly_sortie(simulator, np.zeros((1001, 4))))
+    flight = flight_of_streams(replace(streams, actuators=between_commands(streams.actuators)), aircraft)
+    assert flight.step_interval == pytest.approx(1.0 / logged, rel=0.02)
+    assert flight.actuator_rate > 150.0
 
 
 def test_a_flight_that_is_too_short_is_refused(aircraft, time) -> None:
